@@ -1,0 +1,1 @@
+"""Case files: one YAML document that describes bodies, contact and what to run."""

@@ -1,0 +1,1 @@
+"""Contact: mortar spaces, complementarity, static ladders, local laws, restitution."""

@@ -1,0 +1,1 @@
+"""Linear elasticity: element kernels, assembly, factorisations, static and eigen solutions."""

@@ -1,0 +1,68 @@
+"""The kinds of trouble a user can meet, each with a text that says what to do."""
+
+__all__ = [
+    "ConvergenceError",
+    "InputError",
+    "KlackError",
+    "MissingExtraError",
+    "require_nonnegative",
+    "require_positive",
+]
+
+
+class KlackError(Exception):
+    """Root of all errors that klack raises on purpose."""
+
+
+class InputError(KlackError, ValueError):
+    """A value from the user cannot be used.
+
+    Parameters
+    ----------
+    where : str
+        File, line, key or function and argument.
+    got, expected : str
+        What came and what can be used, with units.
+    hint : str
+        What to try, one sentence.
+    """
+
+    def __init__(self, where: str, *, got: str, expected: str, hint: str) -> None:
+        self.where, self.got, self.expected, self.hint = where, got, expected, hint
+        super().__init__(f"{where}: got {got}, expected {expected}.\nTry: {hint}")
+
+
+class ConvergenceError(KlackError, RuntimeError):
+    """An iteration did not settle; the text names it, its state and a way out."""
+
+
+class MissingExtraError(KlackError, ImportError):
+    """An optional package is needed for this and is not installed."""
+
+    def __init__(self, package: str, purpose: str, extra: str) -> None:
+        super().__init__(
+            f"{purpose} needs the package '{package}', which is not installed.\n"
+            f"Try: uv sync --extra {extra} (or pip install 'klack[{extra}]')."
+        )
+
+
+def require_positive(where: str, value: float, unit: str) -> None:
+    """Raise :class:`InputError` unless ``value`` is above zero (also for nan)."""
+    if not value > 0:
+        raise InputError(
+            where,
+            got=f"{value:g} {unit}",
+            expected=f"a value above 0 {unit}",
+            hint="check the sign and the unit; inputs are SI (m, kg, s, N).",
+        )
+
+
+def require_nonnegative(where: str, value: float, unit: str) -> None:
+    """Raise :class:`InputError` unless ``value`` is zero or more (also for nan)."""
+    if not value >= 0:
+        raise InputError(
+            where,
+            got=f"{value:g} {unit}",
+            expected=f"0 {unit} or more",
+            hint="check the sign and the unit; inputs are SI (m, kg, s, N).",
+        )

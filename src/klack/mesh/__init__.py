@@ -1,0 +1,1 @@
+"""Meshes of bodies: families, named surfaces, profiles, sweeping, CAD, readers."""

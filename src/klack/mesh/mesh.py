@@ -1,0 +1,137 @@
+"""A finite-element mesh: points, blocks of elements, named surfaces and node sets."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES, ElementFamily
+
+__all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface"]
+
+
+@dataclass(frozen=True, slots=True)
+class ElementBlock:
+    """Elements of one family that belong to one solid.
+
+    Parameters
+    ----------
+    family : str
+        Key of :data:`klack.mesh.families.FAMILIES`, of dimension 3 or 2.
+    connectivity : int array, shape (n_elements, n_nodes)
+        Node numbers, Abaqus order.
+    solid : str
+        Name of the solid; the material is chosen by it.
+    """
+
+    family: str
+    connectivity: NDArray[np.int64]
+    solid: str
+
+    @property
+    def topology(self) -> ElementFamily:
+        """Topology of the elements."""
+        return FAMILIES[self.family]
+
+
+@dataclass(frozen=True, slots=True)
+class FaceBlock:
+    """Element faces of one family, oriented outwards.
+
+    Parameters
+    ----------
+    family : str
+        ``line2 line3`` (axisymmetric), ``tri3 tri6 quad4 quad8``.
+    connectivity : int array, shape (n_faces, n_nodes)
+    """
+
+    family: str
+    connectivity: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A named part of the boundary."""
+
+    name: str
+    blocks: tuple[FaceBlock, ...]
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        """Sorted node numbers of the surface."""
+        parts = [block.connectivity.ravel() for block in self.blocks]
+        return np.unique(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
+
+    @property
+    def face_count(self) -> int:
+        """Number of faces."""
+        return sum(len(block.connectivity) for block in self.blocks)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh:
+    """Nodal mesh of one body, in metres.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3) or (n, 2) [m]
+        Three columns x, y, z for a solid; two columns r, z for an axisymmetric body (axis r = 0).
+    blocks : tuple of ElementBlock
+    surfaces : mapping of str to Surface
+    node_sets : mapping of str to int array
+    """
+
+    points: NDArray[np.float64]
+    blocks: tuple[ElementBlock, ...]
+    surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        """3 for a solid, 2 for an axisymmetric body; also the degrees of freedom per node."""
+        return int(self.points.shape[1])
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
+    def dof_count(self) -> int:
+        """Number of degrees of freedom; that of node i and direction d is dimension * i + d."""
+        return self.node_count * self.dimension
+
+    @property
+    def element_count(self) -> int:
+        """Number of elements."""
+        return sum(len(block.connectivity) for block in self.blocks)
+
+    @property
+    def solids(self) -> tuple[str, ...]:
+        """Names of the solids, in order of first appearance."""
+        return tuple(dict.fromkeys(block.solid for block in self.blocks))
+
+    def surface(self, name: str) -> Surface:
+        """Surface by name.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name; the text lists the names there are.
+        """
+        if name not in self.surfaces:
+            known = ", ".join(sorted(self.surfaces)) or "none"
+            raise InputError(
+                f"surface '{name}'",
+                got="a name that the mesh does not have",
+                expected=f"one of: {known}",
+                hint="check the spelling, or name the face in the CAD or mesh file.",
+            )
+        return self.surfaces[name]
+
+    def moved(self, shift: NDArray[np.float64]) -> Self:
+        """The same mesh, translated by ``shift``, shape (dimension,) [m]."""
+        return replace(self, points=self.points + np.asarray(shift))

@@ -1,0 +1,1 @@
+"""Modal reduction of elastic bodies with static correction at their ports."""

@@ -1,0 +1,1 @@
+"""Charts, the self-contained report in HTML and PDF."""

@@ -1,0 +1,1 @@
+"""Time integration of reduced bodies: exact propagator, discrete-gradient contact."""

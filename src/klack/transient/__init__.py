@@ -1,0 +1,1 @@
+"""Full-order transient contact, the reference that every reduction is compared with."""

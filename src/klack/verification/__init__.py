@@ -1,0 +1,1 @@
+"""Exact and published cases that klack checks itself against."""

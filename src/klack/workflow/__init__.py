@@ -1,0 +1,1 @@
+"""From a case to its results: the steps in order, with progress."""
