@@ -1,0 +1,233 @@
+"""What one impact study leaves behind: everything that a report or a comparison needs.
+
+The numbers are plain arrays and small frozen records, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.history import ImpactHistory
+from klack.contact.restitution import Deviation, ImpactMeasures
+from klack.reduction.transfer import TransferComparison
+
+__all__ = [
+    "BodySummary",
+    "ContactSummary",
+    "ImpactStudy",
+    "LawSummary",
+    "LevelResult",
+    "ModalEnergy",
+    "SectionPicture",
+]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodySummary:
+    """One body in numbers.
+
+    Parameters
+    ----------
+    name, model, source, support, material : str
+        ``model`` is ``"3-D"`` or ``"axisymmetric"``; ``source`` says where the geometry came from.
+    mass : float [kg]
+    nodes, elements, dofs : int
+    frequencies : array [Hz]
+        Elastic eigenfrequencies that the reduction keeps.
+    compliance_share : float [-]
+        Share of the static compliance at the contact that the kept modes carry.
+    """
+
+    name: str
+    model: str
+    source: str
+    support: str
+    material: str
+    mass: float
+    nodes: int
+    elements: int
+    dofs: int
+    frequencies: NDArray[np.float64]
+    compliance_share: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactSummary:
+    """Static frictionless contact of the two full bodies.
+
+    Parameters
+    ----------
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``.
+    points : int
+        Number of contact points (mortar multipliers).
+    half_width : float [m]
+        Half width of the contact at the highest force of the impact.
+    size_ratio : float [-]
+        Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    approach, force, area : array, shape (n,) [m], [N], [m^2]
+        Ladder from first touch.
+    """
+
+    surfaces: str
+    points: int
+    half_width: float
+    size_ratio: float
+    approach: NDArray[np.float64]
+    force: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawSummary:
+    """The local contact law of the reduced level and its classical alternative.
+
+    Parameters
+    ----------
+    kind : str
+        ``"consistent"``, ``"linear"``, ``"hertz"``.
+    indentation, force : array [m], [N]
+    share : array [-]
+        Share of the static compliance that the law carries, at each ``force``.
+    linear_stiffness : float [N/m]
+        Straight line through the law over ``fit_range``.
+    fit_range : tuple of float [N]
+    classical_stiffness : float [N/m]
+        Linear fit of a static submodel of the contact region alone.
+    classical_size : float [m]
+        Radius of that submodel.
+    """
+
+    kind: str
+    indentation: NDArray[np.float64]
+    force: NDArray[np.float64]
+    share: NDArray[np.float64]
+    linear_stiffness: float
+    fit_range: tuple[float, float]
+    classical_stiffness: float
+    classical_size: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalEnergy:
+    """Energy left in the modes of one body after separation: (n,) [Hz], (n,) [J]."""
+
+    body: str
+    frequency: NDArray[np.float64]
+    energy: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LevelResult:
+    """One computed impact.
+
+    Parameters
+    ----------
+    level : str
+        ``lumped``, ``reduced``, ``reduced-attachment``, ``reduced-none``,
+        ``reduced-participation`` or ``full``.
+    label : str
+        What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
+    degrees_of_freedom, steps : int
+    step : float [s]
+    wall_time : float [s]
+        Of the time integration alone.
+    setup_time : float [s]
+        Of everything that this level needs before it can run (shared steps counted once each).
+    energies : mapping of str to float [J]
+        After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
+        entry is ``"initial kinetic"``.
+    energy_residual : float [-]
+        Ledger residual over the initial kinetic energy.
+    modal_energy : tuple of ModalEnergy
+    """
+
+    level: str
+    label: str
+    history: ImpactHistory
+    measures: ImpactMeasures
+    degrees_of_freedom: int
+    steps: int
+    step: float
+    wall_time: float
+    setup_time: float
+    energies: Mapping[str, float]
+    energy_residual: float
+    modal_energy: tuple[ModalEnergy, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SectionPicture:
+    """Half-section of a body in the (r, z) plane at one instant, true to the mesh.
+
+    Parameters
+    ----------
+    body : str
+    points : array, shape (n, 2) [m]
+        Undeformed coordinates, distance from the axis and height.
+    displacement : array, shape (n, 2) [m]
+        In the same two directions, elastic and rigid.
+    magnitude : array, shape (n,) [m]
+        Length of the displacement vector (three components) that colours the picture.
+    triangles : int array, shape (t, 3)
+    edges : int array, shape (e, 2)
+        Element edges to draw as thin lines.
+    time : float [s]
+    """
+
+    body: str
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    magnitude: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    time: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactStudy:
+    """All levels of one dry impact, side by side.
+
+    Parameters
+    ----------
+    case, title, description : str
+    speed, gap : float [m/s], [m]
+    version : str
+        Of klack; ``versions`` holds those of the libraries.
+    created : str
+        ISO 8601.
+    wall_time : float [s]
+        Of the whole study.
+    stage_times : mapping of str to float [s]
+    levels : mapping of str to LevelResult
+    reference : str
+        Level that the deviations refer to (``"full"`` when it was run).
+    deviations : mapping of level to Deviation
+    transfer : tuple of TransferComparison
+    sections : tuple of SectionPicture
+    warnings : tuple of str
+    """
+
+    case: str
+    title: str
+    description: str
+    case_text: str
+    speed: float
+    gap: float
+    version: str
+    versions: Mapping[str, str]
+    created: str
+    wall_time: float
+    stage_times: Mapping[str, float]
+    bodies: tuple[BodySummary, ...]
+    contact: ContactSummary
+    law: LawSummary
+    levels: Mapping[str, LevelResult]
+    reference: str
+    deviations: Mapping[str, Deviation]
+    transfer: tuple[TransferComparison, ...] = ()
+    sections: tuple[SectionPicture, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
