@@ -176,6 +176,8 @@ class SectionPicture:
     edges : int array, shape (e, 2)
         Element edges to draw as thin lines.
     time : float [s]
+    closing : float [m]
+        Mean axial displacement of a body that is held nowhere; 0 for a held one.
     """
 
     body: str
@@ -185,6 +187,7 @@ class SectionPicture:
     triangles: NDArray[np.int64]
     edges: NDArray[np.int64]
     time: float
+    closing: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
