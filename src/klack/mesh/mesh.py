@@ -133,5 +133,5 @@ class Mesh:
         return self.surfaces[name]
 
     def moved(self, shift: NDArray[np.float64]) -> Self:
-        """The same mesh, translated by ``shift``, shape (dimension,) [m]."""
+        """Translate the mesh by ``shift``, shape (dimension,) [m]."""
         return replace(self, points=self.points + np.asarray(shift))

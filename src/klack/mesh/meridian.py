@@ -1,0 +1,263 @@
+"""Axisymmetric meshes (r, z) of six-node triangles, from profiles.
+
+The triangles come from netgen; the nodes are then put exactly on the straight edges and arcs of
+the profiles, the mid nodes too, and nodes on the axis get r = 0.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
+from klack.mesh.profile import Curve, Profile, on_axis
+from klack.mesh.quality import require_positive_jacobians
+from klack.mesh.sizing import MeshSizing, disc_points
+
+__all__ = ["mesh_meridian"]
+
+_MM = 1e3  # netgen models in mm
+
+
+@dataclass(frozen=True)
+class _Triangulation:
+    """What netgen gives, with every boundary segment on a known curve."""
+
+    points: NDArray[np.float64]  # (n, 2) [m]
+    triangles: NDArray[np.int64]  # (n, 3)
+    domains: NDArray[np.int64]  # (n,) number of the solid of each triangle
+    segments: NDArray[np.int64]  # (n, 2)
+    segment_curves: NDArray[np.int64]  # (n,) into curves
+    curves: tuple[Curve, ...]
+
+
+def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
+    """Mesh of six-node triangles of one body made of one or several solids.
+
+    Solids that share an edge (or a part of one) are joined there.  Surfaces are the named edges
+    on the outside of the body, faces ``line3`` with the outward normal to the right of the walk;
+    edges on the axis are no surfaces.  Nodes of an inner edge between two solids are the node set
+    of the same name.
+
+    Parameters
+    ----------
+    profiles : mapping of solid name to Profile
+    sizing : MeshSizing
+        Refinements are rings (r, z), or points (0, 0, z) on the axis.
+
+    Returns
+    -------
+    Mesh
+        Of dimension 2.
+
+    Raises
+    ------
+    InputError
+        If solids overlap or do not touch, a sized surface does not exist, or the elements are too
+        coarse for an arc.
+    """
+    if not profiles:
+        raise InputError(
+            "mesh_meridian: profiles",
+            got="none",
+            expected="one profile per solid",
+            hint="give a mapping of solid name to Profile.",
+        )
+    names = tuple(dict.fromkeys(name for p in profiles.values() for name in p.names))
+    sizing.require_surfaces(names)
+    tri = _triangulate(profiles, sizing)
+    points = _corners_on_curves(tri)
+    edges, local_edges = _unique_edges(tri.triangles)
+    midpoints = 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])
+    segment_edge = _find_edges(edges, tri.segments)
+    for k, curve in enumerate(tri.curves):
+        on = tri.segment_curves == k
+        midpoints[segment_edge[on]] = _middle_on_curve(curve, points[tri.segments[on]])
+    connectivity = np.hstack([tri.triangles, len(points) + local_edges])
+    blocks = tuple(
+        ElementBlock("tri6", connectivity[tri.domains == i], solid)
+        for i, solid in enumerate(profiles)
+    )
+    use = np.bincount(local_edges.ravel(), minlength=len(edges))
+    surfaces, node_sets = _named_edges(tri, connectivity, use, segment_edge, len(points))
+    mesh = Mesh(
+        points=np.vstack([points, midpoints]),
+        blocks=blocks,
+        surfaces=surfaces,
+        node_sets=node_sets,
+    )
+    require_positive_jacobians("mesh_meridian", mesh)
+    return mesh
+
+
+def _triangulate(profiles: Mapping[str, Profile], sizing: MeshSizing) -> _Triangulation:
+    from netgen.meshing import MeshingParameters
+    from netgen.occ import Glue, OCCGeometry
+
+    faces = []
+    for i, profile in enumerate(profiles.values()):
+        face = _occ_face(profile)
+        face.faces.name = str(i)
+        faces.append(face)
+    shape = Glue(faces) if len(faces) > 1 else faces[0]
+    _require_one_piece(profiles, shape)
+    candidates = [curve for profile in profiles.values() for curve in profile.curves]
+    curves = []
+    for k, edge in enumerate(shape.edges):
+        edge.name = str(k)
+        matches = _matching_curves(edge, candidates)
+        sizes = [sizing.surfaces[c.name] for c in matches if c.name in sizing.surfaces]
+        if sizes:
+            edge.maxh = min(sizes) * _MM
+        curves.append(matches[0])
+    parameters = MeshingParameters(maxh=sizing.size * _MM, grading=sizing.grading)
+    for refinement in sizing.refinements:
+        for r, z in _meridian_points(refinement, shape):
+            parameters.RestrictH(r, z, 0.0, h=refinement.size * _MM)
+    mesh = OCCGeometry(shape, dim=2).GenerateMesh(mp=parameters)
+    return _read_netgen(mesh, tuple(curves))
+
+
+def _occ_face(profile: Profile) -> Any:
+    from netgen.occ import ArcOfCircle, Face, Segment, Wire, gp_Pnt
+
+    def vertex(point: NDArray | tuple[float, float]) -> Any:
+        return gp_Pnt(float(point[0]) * _MM, float(point[1]) * _MM, 0.0)
+
+    edges = []
+    for curve in profile.curves:
+        if curve.centre is None:
+            edges.append(Segment(vertex(curve.start), vertex(curve.end)))
+        else:
+            edges.append(ArcOfCircle(vertex(curve.start), vertex(curve.at(0.5)), vertex(curve.end)))
+    return Face(Wire(edges))
+
+
+def _require_one_piece(profiles: Mapping[str, Profile], shape: Any) -> None:
+    """Solids must neither overlap nor lie apart."""
+    expected = sum(profile.area for profile in profiles.values()) * _MM**2
+    if len(shape.faces) != len(profiles) or abs(shape.mass - expected) > 1e-6 * expected:
+        regions = f"{len(shape.faces)} regions of {shape.mass:.6g} mm^2"
+        raise InputError(
+            "mesh_meridian: profiles",
+            got=f"{regions} from {len(profiles)} profiles",
+            expected=f"one region per profile, {expected:.6g} mm^2 (no overlap)",
+            hint="let neighbouring solids share their common edge and nothing else.",
+        )
+
+
+def _matching_curves(edge: Any, candidates: list[Curve]) -> list[Curve]:
+    """Profile edges on which a (possibly split) edge of the glued shape lies."""
+    low, high = edge.parameter_interval
+    p = edge.Value(0.5 * (low + high))
+    ends = [(p.x, p.y), (edge.start.x, edge.start.y), (edge.end.x, edge.end.y)]
+    points = np.array(ends) / _MM
+    off = [float(curve.distance(points).max()) for curve in candidates]
+    tolerance = 1e-7 * max(curve.length for curve in candidates)
+    matches = [curve for curve, d in zip(candidates, off, strict=True) if d < tolerance]
+    return matches or [candidates[int(np.argmin(off))]]
+
+
+def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
+    """Points of constant size in the plane, within the box of the shape, shape (n, 2) [mm]."""
+    if not refinement.is_ring:
+        x, y, z = refinement.position
+        if np.hypot(x, y) > 0:
+            raise InputError(
+                "mesh_meridian: refinement",
+                got=f"a point at ({x:g}, {y:g}, {z:g}) m, off the axis",
+                expected="a ring (r, z), or a point on the axis",
+                hint="an axisymmetric mesh can only be refined on rings: give (r, z).",
+            )
+        refinement = type(refinement)(
+            position=(0.0, z), size=refinement.size, radius=refinement.radius
+        )
+    points = disc_points(refinement) * _MM
+    low, high = shape.bounding_box
+    inside = (points >= (low.x, low.y)).all(axis=1) & (points <= (high.x, high.y)).all(axis=1)
+    centre = np.array(refinement.position)[None, :] * _MM
+    return np.vstack([centre, points[inside]])
+
+
+def _read_netgen(mesh: Any, curves: tuple[Curve, ...]) -> _Triangulation:
+    triangles = mesh.Elements2D().NumPy()
+    segments = mesh.Elements1D().NumPy()
+    segment_curves = [int(mesh.GetBCName(int(i) - 1)) for i in segments["index"]]
+    names = {int(i): int(mesh.GetMaterial(int(i))) for i in np.unique(triangles["index"])}
+    return _Triangulation(
+        points=mesh.Coordinates()[:, :2] / _MM,
+        triangles=triangles["nodes"][:, :3].astype(np.int64) - 1,
+        domains=np.array([names[int(i)] for i in triangles["index"]]),
+        segments=segments["nodes"][:, :2].astype(np.int64) - 1,
+        segment_curves=np.array(segment_curves),
+        curves=curves,
+    )
+
+
+def _corners_on_curves(tri: _Triangulation) -> NDArray[np.float64]:
+    """Corner nodes put exactly on the profiles; corners of the profile exactly on their place."""
+    points = tri.points.copy()
+    for k, curve in enumerate(tri.curves):
+        nodes = np.unique(tri.segments[tri.segment_curves == k])
+        if len(nodes):
+            points[nodes] = curve.at(curve.fraction(points[nodes]))
+    ends = np.array([p for curve in tri.curves for p in (curve.start, curve.end)])
+    boundary = np.unique(tri.segments)
+    gap = np.linalg.norm(points[boundary, None, :] - ends[None, :, :], axis=2)
+    nearest = gap.argmin(axis=1)
+    same = gap.min(axis=1) < 1e-9 * np.ptp(ends, axis=0).max()
+    points[boundary[same]] = ends[nearest[same]]
+    for k, curve in enumerate(tri.curves):
+        if on_axis(curve):
+            points[tri.segments[tri.segment_curves == k], 0] = 0.0
+    return points
+
+
+def _middle_on_curve(curve: Curve, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of the edge halfway between pairs of its points, (n, 2, 2) -> (n, 2) [m]."""
+    return curve.at(curve.fraction(ends).mean(axis=1))
+
+
+def _unique_edges(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges (n, 2) with ascending nodes, and for every triangle the numbers of its three edges."""
+    local = np.array(FAMILIES["tri6"].edges)
+    pairs = np.sort(triangles[:, local].reshape(-1, 2), axis=1)
+    edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
+    return edges, inverse.reshape(-1, 3)
+
+
+def _find_edges(edges: NDArray[np.int64], segments: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Find the number of the edge that each segment is."""
+    base = int(edges.max()) + 1
+    keys = edges[:, 0] * base + edges[:, 1]
+    wanted = np.sort(segments, axis=1)
+    return np.searchsorted(keys, wanted[:, 0] * base + wanted[:, 1])
+
+
+def _named_edges(
+    tri: _Triangulation,
+    connectivity: NDArray[np.int64],
+    use: NDArray[np.int64],
+    segment_edge: NDArray[np.int64],
+    corner_count: int,
+) -> tuple[dict[str, Surface], dict[str, NDArray[np.int64]]]:
+    """Surfaces of the outer edges, node sets of the inner ones."""
+    edge_curve = np.full(len(use), -1)
+    edge_curve[segment_edge] = tri.segment_curves
+    sides = np.vstack([connectivity[:, list(face.nodes)] for face in FAMILIES["tri6"].faces])
+    side_curve = edge_curve[sides[:, 2] - corner_count]
+    outer = use[sides[:, 2] - corner_count] == 1
+    surfaces: dict[str, Surface] = {}
+    node_sets: dict[str, NDArray[np.int64]] = {}
+    for name in dict.fromkeys(c.name for c in tri.curves if c.name and not on_axis(c)):
+        numbers = [k for k, c in enumerate(tri.curves) if c.name == name and not on_axis(c)]
+        here = np.isin(side_curve, numbers)
+        if (here & outer).any():
+            surfaces[name] = Surface(name, (FaceBlock("line3", sides[here & outer]),))
+        if (here & ~outer).any():
+            node_sets[name] = np.unique(sides[here & ~outer])
+    return surfaces, node_sets

@@ -1,0 +1,407 @@
+r"""Meridian of a body of revolution: a closed chain of straight edges and circular arcs.
+
+The body is the profile turned once around the z axis.  Its exact mass properties follow from
+Green's theorem along the (anticlockwise) boundary,
+
+.. math:: \iint r^m z^n \, dr\, dz = \oint \frac{r^{m+1}}{m+1} z^n \, dz ,
+
+so a mesh can be checked against them: area (m=0), volume 2 pi (m=1), moments of inertia (m=3).
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["Arc", "Curve", "Line", "Profile"]
+
+Point = tuple[float, float]
+
+# Relative to the size of the profile: closer points are the same point.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Straight edge from the end of the edge before to ``end`` (r, z) [m]."""
+
+    end: Point
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """Circular arc to ``end`` around ``centre`` (r, z) [m].
+
+    Parameters
+    ----------
+    end, centre : (r, z) [m]
+    name : str
+        Name of the surface that the arc sweeps; edges of one name make one surface.
+    clockwise : bool or None
+        Sense of travel.  None takes the shorter way; for a half circle the way that stays at
+        r >= 0.
+    """
+
+    end: Point
+    centre: Point
+    name: str = ""
+    clockwise: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """An edge with both ends: straight if ``centre`` is None, else an arc of signed ``angle``.
+
+    Parameters
+    ----------
+    start, end : (r, z) [m]
+    name : str
+    centre : (r, z) [m] or None
+    angle : float [rad]
+        Angle turned from start to end, positive anticlockwise.
+    """
+
+    start: Point
+    end: Point
+    name: str
+    centre: Point | None = None
+    angle: float = 0.0
+
+    @property
+    def radius(self) -> float:
+        """Radius of the arc [m]; infinite for a straight edge."""
+        if self.centre is None:
+            return np.inf
+        return float(np.hypot(self.start[0] - self.centre[0], self.start[1] - self.centre[1]))
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        if self.centre is None:
+            return float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
+        return abs(self.angle) * self.radius
+
+    @property
+    def reversed(self) -> "Curve":
+        """The same edge, walked backwards."""
+        return Curve(self.end, self.start, self.name, self.centre, -self.angle)
+
+    def at(self, s: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        """Points at the fractions ``s`` of the length, shape (..., 2) [m]."""
+        s = np.asarray(s, dtype=float)[..., None]
+        start, end = np.array(self.start), np.array(self.end)
+        if self.centre is None:
+            return (1 - s) * start + s * end
+        centre = np.array(self.centre)
+        d = start - centre
+        phi = np.arctan2(d[1], d[0]) + s * self.angle
+        arc = centre + self.radius * np.concatenate([np.cos(phi), np.sin(phi)], axis=-1)
+        return np.where(s == 0, start, np.where(s == 1, end, arc))
+
+    def fraction(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Fraction of the length of the nearest point of the edge, clipped to [0, 1]."""
+        points = np.asarray(points, dtype=float)
+        start, end = np.array(self.start), np.array(self.end)
+        if self.centre is None:
+            t = end - start
+            return np.clip((points - start) @ t / (t @ t), 0, 1)
+        # measured from the middle of the arc, so that the cut lies opposite to the arc
+        middle = self.at(0.5) - np.array(self.centre)
+        d = points - np.array(self.centre)
+        cross = middle[0] * d[..., 1] - middle[1] * d[..., 0]
+        delta = np.arctan2(cross, d @ middle)
+        return np.clip(0.5 + delta / self.angle, 0, 1)
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points to the edge [m]."""
+        return np.linalg.norm(np.asarray(points) - self.at(self.fraction(points)), axis=-1)
+
+    def quadrature(self, order: int = 24) -> tuple[NDArray, NDArray, NDArray]:
+        """Points (q, 2) [m], tangents times weight (q, 2) [m], lengths times weight (q,) [m]."""
+        x, w = np.polynomial.legendre.leggauss(order)
+        s, w = 0.5 * (x + 1), 0.5 * w
+        points = self.at(s)
+        if self.centre is None:
+            tangent = np.tile(np.array(self.end) - np.array(self.start), (order, 1))
+        else:
+            d = points - np.array(self.centre)
+            tangent = self.angle * np.column_stack([-d[:, 1], d[:, 0]])
+        return points, tangent * w[:, None], self.length * w
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Closed meridian (r, z) of one solid; r is the distance from the axis z.
+
+    Parameters
+    ----------
+    start : (r, z) [m]
+        Where the first edge begins and the last one must end.
+    edges : tuple of Line or Arc
+        Either sense is accepted; :attr:`curves` is always anticlockwise in the (r, z) plane.
+
+    Examples
+    --------
+    A hemisphere of radius 2 mm, tip down:
+
+    >>> half = Profile((0, 0), (Arc((2e-3, 2e-3), (0, 2e-3), "tip"),
+    ...                         Line((0, 2e-3), "top"), Line((0, 0), "axis")))
+    >>> round(half.volume / (2 / 3 * np.pi * 2e-3**3), 12)
+    1.0
+    """
+
+    start: Point
+    edges: tuple[Line | Arc, ...]
+    _curves: tuple[Curve, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        curves = _chain(self.start, self.edges)
+        _require_simple(curves)
+        area = sum(_moment(curve, 0, 0) for curve in curves)
+        if area < 0:
+            curves = tuple(curve.reversed for curve in reversed(curves))
+        object.__setattr__(self, "_curves", curves)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """Edges with both ends, anticlockwise (material to the left)."""
+        return self._curves
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the surfaces, in order; edges on the axis sweep none."""
+        used = [c.name for c in self.curves if c.name and not on_axis(c)]
+        return tuple(dict.fromkeys(used))
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the meridian [m^2]."""
+        return self._integral(0, 0)
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume of the body of revolution [m^3] (Pappus)."""
+        return 2 * np.pi * self._integral(1, 0)
+
+    @cached_property
+    def centroid_height(self) -> float:
+        """Height z of the centre of volume [m]."""
+        return 2 * np.pi * self._integral(1, 1) / self.volume
+
+    @cached_property
+    def axial_moment(self) -> float:
+        """Volume moment about the axis, integral of r^2 dV [m^5]."""
+        return 2 * np.pi * self._integral(3, 0)
+
+    def surface_area(self, name: str) -> float:
+        """Area of the surface swept by the edges called ``name`` [m^2]."""
+        if name not in self.names:
+            raise InputError(
+                f"Profile.surface_area('{name}')",
+                got="a name that the profile does not have",
+                expected=f"one of: {', '.join(self.names) or 'none'}",
+                hint="name the edge where the profile is made.",
+            )
+        total = 0.0
+        for curve in self.curves:
+            if curve.name == name:
+                points, _, length = curve.quadrature()
+                total += float(2 * np.pi * points[:, 0] @ length)
+        return total
+
+    def _integral(self, m: int, n: int) -> float:
+        """Integral of r^m z^n over the meridian [m^(m+n+2)]."""
+        return sum(_moment(curve, m, n) for curve in self.curves)
+
+
+def on_axis(curve: Curve) -> bool:
+    """Tell whether an edge is straight and lies on r = 0."""
+    return curve.centre is None and curve.start[0] == 0 == curve.end[0]
+
+
+def _moment(curve: Curve, m: int, n: int) -> float:
+    points, tangent, _ = curve.quadrature()
+    r, z = points.T
+    return float(np.sum(r ** (m + 1) / (m + 1) * z**n * tangent[:, 1]))
+
+
+def _error(where: str, got: str, expected: str, hint: str) -> InputError:
+    return InputError(where, got=got, expected=expected, hint=hint)
+
+
+def _text(point: NDArray | Point) -> str:
+    return f"({point[0] * 1e3:.6g}, {point[1] * 1e3:.6g}) mm"
+
+
+def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
+    """Edges with both ends; checks numbers, closure and r >= 0."""
+    corners = np.array([start, *(edge.end for edge in edges)], dtype=float)
+    centres = np.array([e.centre for e in edges if isinstance(e, Arc)], dtype=float)
+    if len(edges) < 2 or not (np.all(np.isfinite(corners)) and np.all(np.isfinite(centres))):
+        raise _error(
+            "Profile.edges",
+            f"{len(edges)} edges" if len(edges) < 2 else "a coordinate that is not finite",
+            "at least two edges with finite (r, z) in m",
+            "list the edges in turn, each with its end point.",
+        )
+    size = float(np.ptp(corners, axis=0).max())
+    if np.linalg.norm(corners[-1] - corners[0]) > _SAME * size:
+        raise _error(
+            f"Profile: edge {len(edges)} '{edges[-1].name}'",
+            f"an end at {_text(corners[-1])}",
+            f"the start of the profile, {_text(corners[0])}",
+            "add the edge that closes the profile (often the axis).",
+        )
+    corners[-1] = corners[0]
+    corners[np.abs(corners[:, 0]) < _SAME * size, 0] = 0.0
+    curves = []
+    for i, edge in enumerate(edges):
+        where = f"Profile: edge {i + 1} '{edge.name}'"
+        curve = _curve(where, corners[i], corners[i + 1], edge, size)
+        lowest = curve.at(np.linspace(0, 1, 65))[:, 0].min()
+        if lowest < -_SAME * size:
+            raise _error(
+                where,
+                f"a radius of {lowest * 1e3:.6g} mm",
+                "r >= 0 everywhere",
+                "draw the half of the section that lies at positive r.",
+            )
+        curves.append(curve)
+    return tuple(curves)
+
+
+def _curve(where: str, start: NDArray, end: NDArray, edge: Line | Arc, size: float) -> Curve:
+    first: Point = (float(start[0]), float(start[1]))
+    last: Point = (float(end[0]), float(end[1]))
+    if np.linalg.norm(end - start) <= _SAME * size:
+        raise _error(
+            where,
+            "an edge without length",
+            "different start and end",
+            "remove it; a full circle needs two arcs.",
+        )
+    if isinstance(edge, Line):
+        return Curve(first, last, edge.name)
+    centre = np.array(edge.centre, dtype=float)
+    a, b = start - centre, end - centre
+    ra, rb = np.hypot(*a), np.hypot(*b)
+    if abs(ra - rb) > 1e-6 * max(ra, rb):
+        raise _error(
+            where,
+            f"a centre {ra * 1e3:.6g} mm from the start and {rb * 1e3:.6g} mm from the end",
+            "the same distance (the radius) to both",
+            "the centre lies on the perpendicular bisector of start and end.",
+        )
+    angle = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+    # put the centre on the bisector exactly, so that both ends lie on one circle
+    chord = end - start
+    centre = centre - ((centre - 0.5 * (start + end)) @ chord) / (chord @ chord) * chord
+    middle: Point = (float(centre[0]), float(centre[1]))
+    clockwise = edge.clockwise
+    if clockwise is None and np.pi - abs(angle) < 1e-6:
+        clockwise = _half_circle_sense(where, first, last, middle)
+    if clockwise is not None:
+        angle = angle % (2 * np.pi) - (2 * np.pi if clockwise else 0.0)
+    return Curve(first, last, edge.name, middle, angle)
+
+
+def _half_circle_sense(where: str, start: Point, end: Point, centre: Point) -> bool:
+    """Sense of a half circle that stays at r >= 0."""
+    keeps = [
+        Curve(start, end, "", centre, angle).at(np.linspace(0, 1, 65))[:, 0].min()
+        >= -1e-6 * np.hypot(start[0] - centre[0], start[1] - centre[1])
+        for angle in (np.pi, -np.pi)
+    ]
+    if keeps[0] == keeps[1]:
+        raise _error(
+            where,
+            "a half circle, for which both ways are equally long",
+            "clockwise True or False",
+            "set clockwise, or split the arc in two.",
+        )
+    return keeps[1]
+
+
+def _require_simple(curves: tuple[Curve, ...]) -> None:
+    """Raise if two edges touch or cross anywhere but at the corner that they share."""
+    count = len(curves)
+    corners = np.array([curve.start for curve in curves])
+    size = float(np.ptp(corners, axis=0).max())
+    for i, curve in enumerate(curves):
+        others = [k for k in range(count) if k not in (i, (i + 1) % count)]
+        for k in others:
+            if curve.distance(corners[k]) < _SAME * size:
+                _raise_crossing(curves, i, k, corners[k])
+    for i in range(count):
+        for j in range(i + 1, count):
+            for point in crossings(curves[i], curves[j]):
+                near = np.linalg.norm(corners - point, axis=1) < 1e-6 * size
+                if not near.any():
+                    _raise_crossing(curves, i, j, point)
+
+
+def _raise_crossing(curves: tuple[Curve, ...], i: int, j: int, point: NDArray) -> None:
+    raise _error(
+        f"Profile: edges {i + 1} '{curves[i].name}' and {j + 1} '{curves[j].name}'",
+        f"a common point at {_text(point)}",
+        "edges that meet only at the corners that join them",
+        "check the order of the edges and the sense of the arcs.",
+    )
+
+
+def crossings(a: Curve, b: Curve) -> NDArray[np.float64]:
+    """Points (n, 2) where two edges cross [m]; edges on one line or circle give none."""
+    if a.centre is None and b.centre is not None:
+        a, b = b, a
+    scale = a.length + b.length
+    if a.centre is None:
+        points = _line_line(a, b)
+    elif b.centre is None:
+        points = _circle_line(a, b)
+    else:
+        points = _circle_circle(a, b)
+    if len(points) == 0:
+        return points
+    on_both = (a.distance(points) < _SAME * scale) & (b.distance(points) < _SAME * scale)
+    return points[on_both]
+
+
+def _line_line(a: Curve, b: Curve) -> NDArray[np.float64]:
+    p, q = np.array(a.start), np.array(b.start)
+    s, t = np.array(a.end) - p, np.array(b.end) - q
+    cross = s[0] * t[1] - s[1] * t[0]
+    if abs(cross) < 1e-12 * a.length * b.length:
+        return np.empty((0, 2))
+    u = ((q - p)[0] * t[1] - (q - p)[1] * t[0]) / cross
+    return (p + u * s)[None, :]
+
+
+def _circle_line(a: Curve, b: Curve) -> NDArray[np.float64]:
+    p = np.array(b.start)
+    t = (np.array(b.end) - p) / b.length
+    d = p - np.array(a.centre)
+    half = d @ t
+    root = half**2 - d @ d + a.radius**2
+    if root < 0:
+        return np.empty((0, 2))
+    u = -half + np.sqrt(root) * np.array([-1.0, 1.0])
+    return p + u[:, None] * t
+
+
+def _circle_circle(a: Curve, b: Curve) -> NDArray[np.float64]:
+    p = np.array(a.centre)
+    d = np.array(b.centre) - p
+    distance = np.hypot(*d)
+    if distance < 1e-12 * (a.radius + b.radius):
+        return np.empty((0, 2))
+    along = (distance**2 + a.radius**2 - b.radius**2) / (2 * distance)
+    root = a.radius**2 - along**2
+    if root < 0:
+        return np.empty((0, 2))
+    e = d / distance
+    side = np.sqrt(root) * np.array([-1.0, 1.0])
+    return p + along * e + side[:, None] * np.array([-e[1], e[0]])
