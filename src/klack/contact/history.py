@@ -1,0 +1,267 @@
+"""What happened in one contact between two bodies, whichever solver computed it.
+
+The lumped, the reduced and the full-order level all return this object, so any two can be laid over
+each other.  Axis of motion z; body a (the needle) is above and moves in -z onto body b.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["BodyEnergy", "EnergyLedger", "ImpactHistory"]
+
+_ARRAYS = (
+    "force",
+    "peak_force",
+    "gap",
+    "velocity_a",
+    "velocity_b",
+    "displacement_a",
+    "displacement_b",
+    "external_force",
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyEnergy:
+    """Energy of one body at the end of a run.
+
+    Parameters
+    ----------
+    name : str
+    translation : float [J]
+        Kinetic energy of the centre of mass along z, ``m v_cm^2 / 2``.
+    vibration : float [J]
+        All other kinetic energy, and the strain energy.
+    strain : float [J]
+        The part of ``vibration`` that is strain energy.
+    frequency : array, shape (m,) [Hz]
+        Undamped frequency of each elastic mode, empty for a solver that has none.
+    modal : array, shape (m,) [J]
+        Kinetic and strain energy of each elastic mode.
+    """
+
+    name: str
+    translation: float
+    vibration: float
+    strain: float
+    frequency: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    modal: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def total(self) -> float:
+        """Translation and vibration [J]."""
+        return self.translation + self.vibration
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EnergyLedger:
+    """Where the energy of an impact went.
+
+    Parameters
+    ----------
+    initial : float [J]
+        Kinetic and strain energy of all bodies at the start.
+    bodies : tuple of BodyEnergy
+        At the end.
+    contact : float [J]
+        Stored in the contacts at the end (0 after separation).
+    contact_dissipation : float [J]
+        Lost in contact damping, including work clipped where a law would have pulled.
+    damping : float [J]
+        Lost in modal damping.
+    work : float [J]
+        Done on the bodies by constant forces.
+    spring : float [J]
+        Change of the energy stored in springs to ground.
+    """
+
+    initial: float
+    bodies: tuple[BodyEnergy, ...]
+    contact: float = 0.0
+    contact_dissipation: float = 0.0
+    damping: float = 0.0
+    work: float = 0.0
+    spring: float = 0.0
+
+    @property
+    def residual(self) -> float:
+        """Energy that appeared from nowhere, relative to the energy turned over [-]."""
+        held = sum(body.total for body in self.bodies) + self.contact + self.spring
+        lost = self.contact_dissipation + self.damping
+        turned_over = max(self.initial, abs(self.work))
+        return (held + lost - self.initial - self.work) / turned_over if turned_over else 0.0
+
+    def parts(self) -> dict[str, float]:
+        """Return every entry by its name in words [J], the initial energy first."""
+        out = {"initial kinetic": self.initial}
+        for body in self.bodies:
+            out[f"{body.name} kinetic (rigid)"] = body.translation
+            out[f"{body.name} vibration"] = body.vibration
+        out["contact"] = self.contact
+        out["contact dissipation"] = self.contact_dissipation
+        out["modal damping"] = self.damping
+        out["work of constant forces"] = self.work
+        out["springs"] = self.spring
+        return out
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactHistory:
+    """Records of one contact on a uniform grid of ``n`` intervals.
+
+    Forces and gaps are means over an interval (so sums are impulses, exactly); velocities and
+    displacements hold at its ends.
+
+    Parameters
+    ----------
+    step : float [s]
+        Length of an interval; a multiple of the integration step.
+    force : array, shape (n,) [N]
+        Mean contact force over the interval, >= 0: pushes a in +z and b in -z.
+    gap : array, shape (n,) [m]
+        Mean gap over the interval, negative where closed (for a full-order contact: the
+        pressure-weighted or area-weighted mean).
+    velocity_a, velocity_b : array, shape (n + 1,) [m/s]
+        Centre-of-mass velocity along z; zero for a supported body.
+    speed : float [m/s]
+        Relative speed of approach at the start, above zero.
+    mass_a, mass_b : float [kg]
+        ``mass_b`` is ``inf`` for a supported body.
+    ledger : EnergyLedger
+    peak_force : array, shape (n,) [N], optional
+        Largest force of any integration step within the interval; the mean where not given.
+    displacement_a, displacement_b : array, shape (n + 1,) [m], optional
+        Of the contact ports along z; empty where not given.
+    external_force : array, shape (n,) [N], optional
+        Mean axial force on body a from outside the contact (springs, constant forces), + in z.
+    longest_period : float [s]
+        Of the elastic modes of body a; 0 for a rigid body.  Separates clusters of sub-contacts.
+    solver : str
+        What computed this, in words.
+    start : float [s]
+        Time of the first interval's beginning.
+    """
+
+    step: float
+    force: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    velocity_a: NDArray[np.float64]
+    velocity_b: NDArray[np.float64]
+    speed: float
+    mass_a: float
+    mass_b: float
+    ledger: EnergyLedger
+    peak_force: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    displacement_a: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    displacement_b: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    external_force: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    longest_period: float = 0.0
+    solver: str = ""
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        n = self.force.size
+        if self.peak_force.size == 0:
+            object.__setattr__(self, "peak_force", self.force)
+        if self.external_force.size == 0:
+            object.__setattr__(self, "external_force", np.zeros(n))
+        for name, size in (
+            ("peak_force", n),
+            ("gap", n),
+            ("external_force", n),
+            ("velocity_a", n + 1),
+            ("velocity_b", n + 1),
+        ):
+            if getattr(self, name).shape != (size,):
+                raise InputError(
+                    f"ImpactHistory.{name}",
+                    got=f"shape {getattr(self, name).shape}",
+                    expected=f"({size},) for {n} intervals",
+                    hint="forces and gaps are per interval, velocities per end of interval.",
+                )
+
+    @property
+    def time(self) -> NDArray:
+        """Middle of each interval, shape (n,) [s]."""
+        return self.start + (np.arange(self.force.size) + 0.5) * self.step
+
+    @property
+    def edges(self) -> NDArray:
+        """Ends of the intervals, shape (n + 1,) [s]."""
+        return self.start + np.arange(self.force.size + 1) * self.step
+
+    @property
+    def impulse(self) -> float:
+        """Integral of the contact force over the whole record [N s]."""
+        return float(np.sum(self.force) * self.step)
+
+    def to_arrays(self) -> dict[str, NDArray]:
+        """Return everything as plain arrays (numbers only; words as UTF-8 bytes of JSON)."""
+        out: dict[str, NDArray] = {name: getattr(self, name) for name in _ARRAYS}
+        out["scalars"] = np.array(
+            [self.step, self.speed, self.mass_a, self.mass_b, self.longest_period, self.start]
+        )
+        ledger = self.ledger
+        out["ledger"] = np.array(
+            [
+                ledger.initial,
+                ledger.contact,
+                ledger.contact_dissipation,
+                ledger.damping,
+                ledger.work,
+                ledger.spring,
+            ]
+        )
+        words = {"solver": self.solver, "bodies": [body.name for body in ledger.bodies]}
+        out["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        for i, body in enumerate(ledger.bodies):
+            out[f"body{i}_energy"] = np.array([body.translation, body.vibration, body.strain])
+            out[f"body{i}_frequency"] = body.frequency
+            out[f"body{i}_modal"] = body.modal
+        return out
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray]) -> "ImpactHistory":
+        """Rebuild what :meth:`to_arrays` took apart."""
+        words = json.loads(np.asarray(arrays["words"], dtype=np.uint8).tobytes().decode())
+        step, speed, mass_a, mass_b, longest_period, start = map(float, arrays["scalars"])
+        initial, contact, contact_dissipation, damping, work, spring = map(float, arrays["ledger"])
+        bodies = []
+        for i, name in enumerate(words["bodies"]):
+            translation, vibration, strain = map(float, arrays[f"body{i}_energy"])
+            bodies.append(
+                BodyEnergy(
+                    name=name,
+                    translation=translation,
+                    vibration=vibration,
+                    strain=strain,
+                    frequency=np.asarray(arrays[f"body{i}_frequency"], dtype=float),
+                    modal=np.asarray(arrays[f"body{i}_modal"], dtype=float),
+                )
+            )
+        ledger = EnergyLedger(
+            initial=initial,
+            bodies=tuple(bodies),
+            contact=contact,
+            contact_dissipation=contact_dissipation,
+            damping=damping,
+            work=work,
+            spring=spring,
+        )
+        return cls(
+            step=step,
+            speed=speed,
+            mass_a=mass_a,
+            mass_b=mass_b,
+            longest_period=longest_period,
+            start=start,
+            solver=words["solver"],
+            ledger=ledger,
+            **{name: np.asarray(arrays[name], dtype=float) for name in _ARRAYS},
+        )

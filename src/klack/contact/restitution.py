@@ -1,0 +1,296 @@
+r"""Numbers of one impact: peak force, contact time, impulse, restitution, vibration left behind.
+
+Restitution is a *result* and belongs to the centres of mass, never to a point of the surface:
+
+.. math:: e = -\frac{(v_a - v_b)_\text{after}}{(v_a - v_b)_\text{before}}
+
+(``v_b = 0`` for a supported body).  Contacts closer than two longest periods of body a, or 50 us,
+form one cluster = one impact; ``after`` is after the last of them.
+
+Times are found inside the records: the impulse gathered since first touch grows like a power
+``1 + n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give
+the exponent and the instant of touch.  The same rule, backwards, gives the end.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from klack.contact.history import ImpactHistory
+from klack.errors import InputError
+
+__all__ = ["ContactPhase", "Deviation", "ImpactMeasures", "find_contacts", "measure_impact"]
+
+_CLUSTER_TIME = 50e-6  # [s]
+_SETTLING = (10e-6, 40e-6)  # window after the last contact for the speed of rebound [s]
+_EXPONENTS = (1.0, 2.0)  # of the force at touch, clamps what noise could suggest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactPhase:
+    """One uninterrupted contact.
+
+    Parameters
+    ----------
+    start, end : float [s]
+        First touch and separation, located inside the records.
+    peak_force : float [N]
+    peak_time : float [s]
+        Middle of the record that holds the peak.
+    first, last : int
+        Records ``first <= i < last`` belong to the contact.
+    """
+
+    start: float
+    end: float
+    peak_force: float
+    peak_time: float
+    first: int
+    last: int
+
+    @property
+    def duration(self) -> float:
+        """Time from first touch to separation [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactMeasures:
+    """The numbers of the first impact (cluster of contacts) of a history.
+
+    Parameters
+    ----------
+    peak_force : float [N]
+        Largest force of any integration step.
+    peak_time : float [s]
+        Counted from first touch.
+    first_touch : float [s]
+    contact_time : float [s]
+        First touch to the end of the first contact.
+    total_contact_time : float [s]
+        First touch to the end of the last contact of the cluster.
+    sub_contacts : int
+        Contacts in the cluster.
+    impulse : float [N s]
+        Of the cluster.
+    approach_speed, rebound_speed : float [m/s]
+        Relative speed of the centres of mass, both above zero for an ordinary rebound.
+    restitution : float [-]
+        nan where the record ends before separation.
+    restitution_from_impulse : float [-]
+        ``J (1/m_a + 1/m_b)/v - 1`` (with the impulse of outside forces): must agree.
+    impulse_residual : float [-]
+        ``(J - m_a dv_a + outside) / J`` over the cluster: momentum balance of body a.
+    dissipated_share : float [-]
+        Contact dissipation and modal damping of the whole record over the energy of approach.
+    vibration_share : float [-]
+        ``1 - e^2 - dissipated_share``: energy of approach left in vibration.
+    impacts : int
+        Clusters in the record.
+    """
+
+    peak_force: float
+    peak_time: float
+    first_touch: float
+    contact_time: float
+    total_contact_time: float
+    sub_contacts: int
+    impulse: float
+    approach_speed: float
+    rebound_speed: float
+    restitution: float
+    restitution_from_impulse: float
+    impulse_residual: float
+    dissipated_share: float
+    vibration_share: float
+    impacts: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deviation:
+    """How far one history is from another (candidate minus reference).
+
+    Parameters
+    ----------
+    peak_force, contact_time, impulse : float [-]
+        Relative to the reference.
+    restitution : float [-]
+        Absolute.
+    history_l2 : float [-]
+        Root mean square force difference over the contact, first touch aligned, over the peak
+        force of the reference.
+    third_octave_max_dB : float [dB]
+        Largest level difference over the bands of the reference within 40 dB of its highest band.
+    third_octave_up_to_Hz : float [Hz]
+        Middle frequency of the highest band compared.
+    """
+
+    peak_force: float
+    contact_time: float
+    impulse: float
+    restitution: float
+    history_l2: float
+    third_octave_max_dB: float
+    third_octave_up_to_Hz: float
+
+
+def find_contacts(history: ImpactHistory, *, threshold: float = 2e-3) -> tuple[ContactPhase, ...]:
+    """Every contact of a record, in order.
+
+    A contact is a run of records with force above ``threshold`` times the peak force of the
+    history, extended outwards while the force keeps falling and stays above zero.  Chatter below
+    the threshold neither makes a contact nor prolongs one.
+
+    Parameters
+    ----------
+    history : ImpactHistory
+    threshold : float [-]
+    """
+    force = history.force
+    peak = float(force.max(initial=0.0))
+    if peak <= 0.0:
+        return ()
+    closed = np.concatenate(([False], force > threshold * peak, [False])).astype(np.int8)
+    starts = np.flatnonzero(np.diff(closed) == 1)
+    ends = np.flatnonzero(np.diff(closed) == -1)
+    phases: list[ContactPhase] = []
+    for k, (first, last) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+        floor = phases[-1].last if phases else 0
+        ceiling = int(starts[k + 1]) if k + 1 < starts.size else force.size
+        while first > floor and 0.0 < force[first - 1] < force[first]:
+            first -= 1
+        while last < ceiling and 0.0 < force[last] < force[last - 1]:
+            last += 1
+        phases.append(_phase(history, first, last))
+    return tuple(phases)
+
+
+def measure_impact(history: ImpactHistory, *, threshold: float = 2e-3) -> ImpactMeasures:
+    """Numbers of the first impact in a history.
+
+    Parameters
+    ----------
+    history : ImpactHistory
+    threshold : float [-]
+        See :func:`find_contacts`.
+    """
+    phases = find_contacts(history, threshold=threshold)
+    if not phases:
+        raise InputError(
+            "measure_impact: history",
+            got=f"no contact force in {history.force.size} records",
+            expected="at least one contact",
+            hint="simulate longer: the gap takes gap / speed seconds to close.",
+        )
+    clusters = _clusters(phases, max(_CLUSTER_TIME, 2.0 * history.longest_period))
+    cluster = clusters[0]
+    first, last = cluster[0].first, cluster[-1].last
+    touch, release = cluster[0].start, cluster[-1].end
+    until = clusters[1][0].first if len(clusters) > 1 else history.force.size
+
+    inverse_a, inverse_b = 1.0 / history.mass_a, 1.0 / history.mass_b
+    before = _velocity_before(history, first, touch)
+    after = _velocity_after(history, last, release, until)
+    e = -after / before
+
+    strongest = max(cluster, key=lambda phase: phase.peak_force)
+    J = float(np.sum(history.force[first:last]) * history.step)
+    J_outside = float(np.sum(history.external_force[first:last]) * history.step)
+    gained = history.mass_a * (history.velocity_a[last] - history.velocity_a[first])
+    dv = J * (inverse_a + inverse_b) + J_outside * inverse_a
+    approach_energy = 0.5 * before**2 / (inverse_a + inverse_b)
+    lost = history.ledger.contact_dissipation + history.ledger.damping
+    return ImpactMeasures(
+        peak_force=strongest.peak_force,
+        peak_time=strongest.peak_time - touch,
+        first_touch=touch,
+        contact_time=cluster[0].duration,
+        total_contact_time=release - touch,
+        sub_contacts=len(cluster),
+        impulse=J,
+        approach_speed=-before,
+        rebound_speed=after,
+        restitution=e,
+        restitution_from_impulse=dv / -before - 1.0,
+        impulse_residual=(J - gained + J_outside) / J,
+        dissipated_share=lost / approach_energy,
+        vibration_share=1.0 - e**2 - lost / approach_energy,
+        impacts=len(clusters),
+    )
+
+
+def _phase(history: ImpactHistory, first: int, last: int) -> ContactPhase:
+    force, h = history.force, history.step
+    top = first + int(np.argmax(history.peak_force[first:last]))
+    start, end = history.start + first * h, history.start + last * h
+    if first > 0:  # else it was closed from the start
+        start += h - _time_since_touch(force[first : first + 3], h)
+    if last < force.size:
+        end -= h - _time_since_touch(force[max(first, last - 3) : last][::-1], h)
+    return ContactPhase(
+        start=start,
+        end=end,
+        peak_force=float(history.peak_force[top]),
+        peak_time=history.start + (top + 0.5) * h,
+        first=first,
+        last=last,
+    )
+
+
+def _time_since_touch(force: NDArray[np.float64], h: float) -> float:
+    """Part of the first record that was closed [s], from the first three mean forces."""
+    if force.size < 2 or not 0.0 < force[0] < force[1]:
+        return h
+    J = np.cumsum(force)  # J^(1/(1+n)) is a straight line in time that starts at touch
+
+    def bend(n: float) -> float:
+        x = J ** (1.0 / (1.0 + n))
+        return float((x[2] - x[1]) - (x[1] - x[0]))
+
+    low, high = _EXPONENTS
+    if force.size < 3 or bend(low) <= 0.0:
+        n = low
+    elif bend(high) >= 0.0:
+        n = high
+    else:
+        n = float(brentq(bend, low, high, xtol=1e-12))
+    x = J ** (1.0 / (1.0 + n))
+    return float(min(h, h * x[0] / (x[1] - x[0])))
+
+
+def _clusters(phases: tuple[ContactPhase, ...], distance: float) -> list[list[ContactPhase]]:
+    clusters = [[phases[0]]]
+    for phase in phases[1:]:
+        if phase.start - clusters[-1][-1].end < distance:
+            clusters[-1].append(phase)
+        else:
+            clusters.append([phase])
+    return clusters
+
+
+def _outside_speed(history: ImpactHistory) -> NDArray[np.float64]:
+    """Speed that outside forces have given body a since the start, at the record ends [m/s]."""
+    gained = np.cumsum(history.external_force) * history.step / history.mass_a
+    return np.concatenate(([0.0], gained))
+
+
+def _velocity_before(history: ImpactHistory, first: int, touch: float) -> float:
+    """Relative velocity of the centres of mass at first touch [m/s], negative."""
+    relative = history.velocity_a[first] - history.velocity_b[first]
+    since = touch - (history.start + first * history.step)
+    return float(relative + history.external_force[first] / history.mass_a * since)
+
+
+def _velocity_after(history: ImpactHistory, last: int, release: float, until: int) -> float:
+    """Relative velocity at separation: mean over the window, drift by outside forces removed."""
+    edges = history.edges[last : until + 1]
+    if edges.size < 2:
+        return float("nan")
+    outside = _outside_speed(history)
+    drift = outside[last : until + 1] - np.interp(release, history.edges, outside)
+    relative = history.velocity_a[last : until + 1] - history.velocity_b[last : until + 1] - drift
+    settled = (edges >= release + _SETTLING[0]) & (edges <= release + _SETTLING[1])
+    chosen = settled if np.any(settled) else np.ones(edges.size, dtype=bool)
+    return float(np.mean(relative[chosen]))
