@@ -1,6 +1,7 @@
 """The kinds of trouble a user can meet, each with a text that says what to do."""
 
 __all__ = [
+    "AccuracyWarning",
     "ConvergenceError",
     "InputError",
     "KlackError",
@@ -34,6 +35,10 @@ class InputError(KlackError, ValueError):
 
 class ConvergenceError(KlackError, RuntimeError):
     """An iteration did not settle; the text names it, its state and a way out."""
+
+
+class AccuracyWarning(UserWarning):
+    """A result is less accurate than it could be; the text says why and what to refine."""
 
 
 class MissingExtraError(KlackError, ImportError):

@@ -1,0 +1,526 @@
+r"""Contact points between two meshes that do not match: mortar hats on curved quadratic faces.
+
+Each node k of the *slave* surface (the finer one) carries a multiplier with a hat
+:math:`\psi_k`, linear on the pieces into which the nodes cut a quadratic face (four triangles of a
+6-node face, two halves of a 3-node line).  Its gap is the mean
+
+.. math::
+    g_k = \frac{1}{A_k} \int \psi_k \, g \, dA, \qquad A_k = \int \psi_k \, dA, \qquad
+    g = n \cdot (x_m - x_s) ,
+
+taken on the *curved* faces, with :math:`x_m` on the master along the outward slave normal *n*
+(:mod:`klack.contact.pairing`).  For small displacements
+
+.. math:: g = g_0 + G_a u_a + G_b u_b, \qquad f_a = G_a^T \lambda, \quad f_b = G_b^T \lambda,
+    \qquad \lambda_k \ge 0 \text{ in N}, \quad p_k = \lambda_k / A_k .
+
+A gap above zero is open and the forces push both bodies apart.  The same weights enter the gap and
+the force, and an integration point that meets no master face is left out of all three integrals,
+so a rigid translation of both bodies changes no gap and the two resultants cancel exactly.
+
+These multipliers pass the patch test; nodes as contact points do not, and dual hats have negative
+weights on quadratic faces, which create energy in impacts (Popp et al. 2012 on the latter).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from klack.contact.pairing import (
+    Projection,
+    axial_distance,
+    face_gaps,
+    face_geometry,
+    face_thickness,
+    project_to_surface,
+)
+from klack.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.errors import ConvergenceError, InputError
+from klack.mesh.mesh import FaceBlock, Mesh, Surface
+
+__all__ = ["ContactSpace", "check_initial_gap", "contact_space", "touching_shift"]
+
+_POINTS_BY_COST = {2: 400, 3: 1000}
+"""Number of contact points that an automatic reach aims at, by dimension."""
+
+_COVERED = 0.05
+"""Least share of a hat's area that has to face the master."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactSpace:
+    """Gaps and forces of the contact points between body a (needle, above) and body b.
+
+    ``gap + G_a u_a + G_b u_b`` are the gaps, ``G_a.T lam`` and ``G_b.T lam`` the nodal forces.
+
+    Parameters
+    ----------
+    G_a, G_b : sparse array, shape (nc, dofs of a), (nc, dofs of b) [-]
+    gap : array, shape (nc,) [m]
+        Initial weighted gaps, positive when open.
+    area : array, shape (nc,) [m^2]
+        Area of each hat; axisymmetric: of the whole ring.
+    points : array, shape (nc, dimension) [m]
+        Slave node of each hat.
+    axial : array, shape (nc,) [-]
+        Change of the gaps per unit translation of a along +z; ``axial @ lam`` is the axial force
+        that pushes a to +z and b to -z.
+    rim : bool array, shape (nc,)
+        Hats at the border of the candidates: a neighbour was left out because its gap exceeds
+        ``reach``.  None of them may ever carry a force.
+    size : array, shape (nc,) [m]
+        Element size across the contact (mean shortest extent of the slave faces at the hat).
+    slave : "a" or "b"
+        Side that carries the hats, the finer one.
+    nodes : int array, shape (nc,)
+        Slave node of each hat.
+    reach : float [m]
+        Largest gap of a candidate.
+    """
+
+    G_a: csr_array
+    G_b: csr_array
+    gap: NDArray[np.float64]
+    area: NDArray[np.float64]
+    points: NDArray[np.float64]
+    axial: NDArray[np.float64]
+    rim: NDArray[np.bool_]
+    size: NDArray[np.float64]
+    slave: Literal["a", "b"]
+    nodes: NDArray[np.int64]
+    reach: float
+
+    @property
+    def count(self) -> int:
+        """Number of contact points."""
+        return len(self.gap)
+
+    @property
+    def dimension(self) -> int:
+        """3, or 2 for axisymmetric bodies."""
+        return int(self.points.shape[1])
+
+    @property
+    def touch(self) -> float:
+        """Distance [m] that a has to move to -z, rigidly, until the first point closes."""
+        facing = self.axial > 1e-6
+        if not np.any(facing):
+            raise InputError(
+                "contact space: touch",
+                got="contact points whose gap does not change with the axial position",
+                expected="surfaces that face each other along the axis of motion z",
+                hint="check the orientation of the geometry; the axis of motion is z.",
+            )
+        return float(np.min(self.gap[facing] / self.axial[facing]))
+
+    def shifted(self, distance: float) -> Self:
+        """Return the same contact points with a moved rigidly along +z by a small ``distance`` [m].
+
+        First order; rebuild the space after moves that are not small against the element size.
+        """
+        return replace(self, gap=self.gap + distance * self.axial)
+
+    def restricted(self, keep: NDArray[np.bool_]) -> Self:
+        """Only the contact points ``keep``, shape (nc,); the new border becomes the rim."""
+        keep = np.asarray(keep, dtype=bool)
+        # two hats are neighbours when they share slave nodes
+        G = self.G_a if self.slave == "a" else self.G_b
+        shared = abs(G) @ (abs(G).T @ (~keep).astype(float))
+        rim = self.rim | (shared > 0)
+        return replace(
+            self,
+            **{name: getattr(self, name)[keep] for name in _ROWS if name != "rim"},
+            rim=rim[keep],
+        )
+
+
+_ROWS = ("G_a", "G_b", "gap", "area", "points", "axial", "rim", "size", "nodes")
+
+
+def contact_space(
+    mesh_a: Mesh,
+    surface_a: Surface,
+    mesh_b: Mesh,
+    surface_b: Surface,
+    *,
+    reach: float | None = None,
+    slave: Literal["a", "b"] | None = None,
+) -> ContactSpace:
+    """Contact points between two surfaces that face each other.
+
+    Parameters
+    ----------
+    mesh_a, surface_a : needle
+    mesh_b, surface_b : stop or seat
+    reach : float, optional [m]
+        Largest gap of a contact point, counted from the smallest one; somewhat more than the
+        largest expected approach, so that the contact never grows to the rim.  Without it the
+        reach is set by cost: the faces with the smallest gaps, up to about 400 contact points
+        (axisymmetric) or 1000 (solid).
+    slave : "a" or "b", optional
+        Side that carries the multipliers; without it the side with the smaller elements across
+        the contact.
+
+    Raises
+    ------
+    InputError
+        If the surfaces do not face each other or the meshes have different dimensions.
+    """
+    _check_pair(mesh_a, surface_a, mesh_b, surface_b, reach)
+    sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
+    others = {"a": sides["b"], "b": sides["a"]}
+    gaps = {side: face_gaps(*sides[side], *others[side]) for side in sides}
+    if not all(np.any(np.isfinite(gap)) for gap in gaps.values()):
+        raise _not_facing(surface_a, surface_b)
+    floor = min(float(np.nanmin(gap)) for gap in gaps.values())
+    if reach is None:
+        points = _POINTS_BY_COST[mesh_a.dimension]
+        limit = min(_reach_by_cost(gaps[side], points) for side in sides)
+    else:
+        limit = floor + reach
+    if slave is None:
+        slave = _finer(sides, gaps, limit)
+    near = np.isfinite(gaps[slave]) & (gaps[slave] <= limit)
+    return _build(sides, slave, near, limit, limit - floor)
+
+
+def _check_pair(
+    mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface, reach: float | None
+) -> None:
+    where = f"contact of surface '{surface_a.name}' with surface '{surface_b.name}'"
+    if mesh_a.dimension != mesh_b.dimension:
+        raise InputError(
+            where,
+            got=f"a mesh of dimension {mesh_a.dimension} against one of {mesh_b.dimension}",
+            expected="two solids or two axisymmetric bodies",
+            hint="model both bodies in the same way.",
+        )
+    for surface in (surface_a, surface_b):
+        if surface.face_count == 0:
+            raise InputError(
+                where,
+                got=f"surface '{surface.name}' without faces",
+                expected="at least one face",
+                hint="name the faces of the contact in the geometry.",
+            )
+    if reach is not None and not reach > 0:
+        raise InputError(
+            f"{where}: reach",
+            got=f"{reach:g} m",
+            expected="a length above 0 m",
+            hint="take about twice the largest expected approach, some micrometres.",
+        )
+
+
+def _reach_by_cost(gaps: NDArray[np.float64], points: int) -> float:
+    """Gap up to which the faces carry about ``points`` hats (two per face at most)."""
+    finite = np.sort(gaps[np.isfinite(gaps)])
+    return float(finite[min(points // 2, len(finite)) - 1])
+
+
+def _finer(
+    sides: dict[str, tuple[Mesh, Surface]], gaps: dict[str, NDArray[np.float64]], limit: float
+) -> Literal["a", "b"]:
+    """Side with the smaller elements within reach; a when they are alike."""
+    size = {}
+    for side in sides:
+        near = np.isfinite(gaps[side]) & (gaps[side] <= limit)
+        near[np.nanargmin(gaps[side])] = True
+        size[side] = float(np.median(face_thickness(*sides[side])[near]))
+    return "b" if size["b"] < 0.95 * size["a"] else "a"
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """Part of a reference face on which the hats are smooth."""
+
+    nodes: tuple[int, ...]
+    xi: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    hats: NDArray[np.float64]
+
+
+_PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line2": ((0, 1),),
+    "line3": ((0, 2), (2, 1)),
+    "tri3": ((0, 1, 2),),
+    "tri6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    "quad4": ((0, 1, 2, 3),),
+    "quad8": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6, 7)),
+}
+"""Nodes of the pieces of every face: lines, triangles, and quads for the middle of a quad."""
+
+
+def _pieces(family: str) -> list[_Piece]:
+    """Integration points and linear hats on every piece of a face."""
+    corner = reference_nodes(family)
+    pieces = []
+    for nodes in _PIECES[family]:
+        shape = {2: "line2", 3: "tri3", 4: "quad4"}[len(nodes)]
+        xi, weight = _rule(shape)
+        hats, slopes = shape_functions(shape, xi)
+        jacobian = np.einsum("qnk,nd->qkd", slopes, corner[list(nodes)])
+        stretch = np.abs(np.linalg.det(jacobian))
+        pieces.append(_Piece(nodes, hats @ corner[list(nodes)], weight * stretch, hats))
+    return pieces
+
+
+def _rule(shape: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Eight points on a line, six on a triangle (degree 4), four times four on a quad."""
+    if shape == "line2":
+        x, w = np.polynomial.legendre.leggauss(8)
+        return x[:, None], w
+    if shape == "quad4":
+        x, w = np.polynomial.legendre.leggauss(4)
+        return np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2), np.outer(w, w).ravel()
+    # Dunavant 1985, degree 4, six points
+    points, weights = [], []
+    for a, w in ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)):
+        points += [(a, a), (1.0 - 2.0 * a, a), (a, 1.0 - 2.0 * a)]
+        weights += [w / 2.0] * 3
+    return np.array(points), np.array(weights)
+
+
+@dataclass(slots=True)
+class _Sums:
+    """Integrals over the slave faces, collected per slave node."""
+
+    dimension: int
+    covered: NDArray[np.float64]
+    full: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    slave: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
+    master: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
+
+
+def _build(
+    sides: dict[str, tuple[Mesh, Surface]],
+    slave: Literal["a", "b"],
+    near: NDArray[np.bool_],
+    limit: float,
+    reach: float,
+) -> ContactSpace:
+    mesh, surface = sides[slave]
+    other_mesh, other_surface = sides["b" if slave == "a" else "a"]
+    inner = _nodes_of(surface, near)
+    ring = _faces_at(surface, inner)
+    zeros = np.zeros(mesh.node_count)
+    sums = _Sums(mesh.dimension, zeros.copy(), zeros.copy(), zeros.copy(), [], [])
+    start = 0
+    for block in surface.blocks:
+        chosen = block.connectivity[ring[start : start + len(block.connectivity)]]
+        start += len(block.connectivity)
+        if len(chosen):
+            faces = FaceBlock(block.family, chosen)
+            for piece in _pieces(block.family):
+                _integrate(sums, mesh, faces, piece, other_mesh, other_surface)
+    return _assemble(sides, slave, sums, inner, ring, limit, reach)
+
+
+def _nodes_of(surface: Surface, faces: NDArray[np.bool_]) -> NDArray[np.int64]:
+    start, parts = 0, []
+    for block in surface.blocks:
+        parts.append(block.connectivity[faces[start : start + len(block.connectivity)]].ravel())
+        start += len(block.connectivity)
+    return np.unique(np.concatenate(parts))
+
+
+def _faces_at(surface: Surface, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+    parts = [np.isin(block.connectivity, nodes).any(axis=1) for block in surface.blocks]
+    return np.concatenate(parts)
+
+
+def _integrate(
+    sums: _Sums,
+    mesh: Mesh,
+    faces: FaceBlock,
+    piece: _Piece,
+    other_mesh: Mesh,
+    other_surface: Surface,
+) -> None:
+    """Add the integrals of one piece of every face."""
+    at = face_geometry(mesh.points, faces, piece.xi)
+    f, q, d = at.position.shape
+    weight = at.stretch * piece.weight  # dA
+    met = project_to_surface(
+        at.position.reshape(f * q, d), at.normal.reshape(f * q, d), other_mesh, other_surface
+    )
+    hats = faces.connectivity[:, piece.nodes]
+    share = weight[:, :, None] * piece.hats  # psi_k dA, (f, q, hats)
+    np.add.at(sums.full, hats, share.sum(axis=1))
+    share = np.where(met.met.reshape(f, q, 1), share, 0.0)
+    np.add.at(sums.covered, hats, share.sum(axis=1))
+    gap = np.nan_to_num(met.gap).reshape(f, q, 1)
+    np.add.at(sums.gap, hats, (share * gap).sum(axis=1))
+    N, _ = shape_functions(faces.family, piece.xi)
+    value = -np.einsum("fqk,qn,fqd->fknd", share, N, at.normal)
+    _store(sums.slave, sums.dimension, hats[:, :, None], faces.connectivity[:, None, :], value)
+    normal = at.normal.reshape(f * q, d)
+    rows = np.repeat(hats, q, axis=0)
+    flat = share.reshape(f * q, -1)
+    _integrate_master(sums, rows, flat, normal, met, other_surface)
+
+
+def _integrate_master(
+    sums: _Sums,
+    rows: NDArray[np.int64],
+    share: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    met: Projection,
+    surface: Surface,
+) -> None:
+    for number, block in enumerate(surface.blocks):
+        point = np.flatnonzero(met.block == number)
+        if not len(point):
+            continue
+        N, _ = shape_functions(block.family, met.xi[point])
+        value = np.einsum("pk,pn,pd->pknd", share[point], N, normal[point])
+        nodes = block.connectivity[met.face[point]]
+        _store(sums.master, sums.dimension, rows[point][:, :, None], nodes[:, None, :], value)
+
+
+def _store(
+    entries: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]],
+    dimension: int,
+    rows: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+    value: NDArray[np.float64],
+) -> None:
+    dofs = dimension * nodes[..., None] + np.arange(dimension)
+    row, column, _ = np.broadcast_arrays(rows[..., None], dofs, value)
+    entries.append((row.ravel(), column.ravel(), value.ravel()))
+
+
+def _assemble(
+    sides: dict[str, tuple[Mesh, Surface]],
+    slave: Literal["a", "b"],
+    sums: _Sums,
+    inner: NDArray[np.int64],
+    ring: NDArray[np.bool_],
+    limit: float,
+    reach: float,
+) -> ContactSpace:
+    """Choose the hats and divide their sums by their areas."""
+    mesh, surface = sides[slave]
+    full = np.where(sums.full > 0, sums.full, 1.0)
+    facing = sums.covered > _COVERED * full
+    gap = sums.gap / np.where(facing, sums.covered, 1.0)
+    inside = np.zeros(mesh.node_count, dtype=bool)
+    inside[inner] = True
+    candidate = inside & facing & (gap <= limit)
+    if not np.any(candidate):  # the nearest hat alone, on a mesh far coarser than the reach
+        candidate = inside & facing & (gap <= np.min(gap[inside & facing], initial=np.inf))
+    nodes = np.flatnonzero(candidate)
+    number = np.full(mesh.node_count, -1)
+    number[nodes] = np.arange(len(nodes))
+    area = sums.covered[nodes]
+    matrices = {}
+    for side, parts in ((slave, sums.slave), ("b" if slave == "a" else "a", sums.master)):
+        row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+        row = number[row]
+        kept = row >= 0
+        shape = (len(nodes), sides[side][0].dof_count)
+        scaled = value[kept] / area[row[kept]]
+        matrices[side] = coo_array((scaled, (row[kept], column[kept])), shape=shape).tocsr()
+    left_out = (inside & facing & ~candidate) | ((sums.full > 0) & ~inside)
+    dimension = mesh.dimension
+    return ContactSpace(
+        G_a=matrices["a"],
+        G_b=matrices["b"],
+        gap=gap[nodes],
+        area=area,
+        points=mesh.points[nodes],
+        axial=matrices["a"] @ np.tile(np.eye(dimension)[-1], sides["a"][0].node_count),
+        rim=_touches(surface, ring, left_out, mesh.node_count)[nodes],
+        size=_node_size(mesh, surface)[nodes],
+        slave=slave,
+        nodes=nodes,
+        reach=reach,
+    )
+
+
+def _touches(
+    surface: Surface, faces: NDArray[np.bool_], marked: NDArray[np.bool_], count: int
+) -> NDArray[np.bool_]:
+    """Nodes that share one of ``faces`` with a marked node."""
+    start, result = 0, np.zeros(count, dtype=bool)
+    for block in surface.blocks:
+        connectivity = block.connectivity[faces[start : start + len(block.connectivity)]]
+        start += len(block.connectivity)
+        result[connectivity[marked[connectivity].any(axis=1)]] = True
+    return result
+
+
+def _node_size(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
+    """Mean thickness of the faces at each node [m]."""
+    thickness = face_thickness(mesh, surface)
+    total, count = np.zeros(mesh.node_count), np.zeros(mesh.node_count)
+    start = 0
+    for block in surface.blocks:
+        part = thickness[start : start + len(block.connectivity)]
+        start += len(block.connectivity)
+        np.add.at(total, block.connectivity, part[:, None])
+        np.add.at(count, block.connectivity, 1.0)
+    return total / np.maximum(count, 1.0)
+
+
+def check_initial_gap(space: ContactSpace, expected_approach: float) -> None:
+    """Refuse bodies that overlap before the impact.
+
+    A negative initial gap is stored energy that nobody put in.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    expected_approach : float [m]
+        Largest approach of the impact; an overlap of 1 % of it is accepted.
+    """
+    lowest = float(np.min(space.gap))
+    if lowest < -0.01 * expected_approach:
+        at = ", ".join(f"{x * 1e3:.4g}" for x in space.points[np.argmin(space.gap)])
+        raise InputError(
+            "contact: initial gap",
+            got=f"an overlap of {-lowest * 1e6:.4g} um at ({at}) mm",
+            expected=f"at most 1 % of the expected approach of {expected_approach * 1e6:.4g} um",
+            hint="move the needle by klack.contact.mortar.touching_shift(...) along z.",
+        )
+
+
+def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface) -> float:
+    """Find the translation of a along z [m] after which the smallest weighted gap is zero.
+
+    Lines along z give the first place from any distance or overlap; then the weighted gaps are
+    rebuilt after every move, since points slide along the other surface.
+
+    Raises
+    ------
+    ConvergenceError
+        If the place is not found within 30 moves.
+    """
+    shift = -axial_distance(mesh_a, surface_a, mesh_b, surface_b)
+    if not np.isfinite(shift):
+        raise _not_facing(surface_a, surface_b)
+    along = np.zeros(mesh_a.dimension)
+    for _ in range(30):
+        along[-1] = shift
+        step = contact_space(mesh_a.moved(along), surface_a, mesh_b, surface_b).touch
+        shift -= step
+        if abs(step) <= 1e-12:
+            return shift
+    raise ConvergenceError(
+        f"contact: placing surface '{surface_a.name}' on '{surface_b.name}' did not settle, the "
+        f"last move was {step * 1e6:.3g} um.\n"
+        "Try: a finer mesh on the contact surfaces."
+    )
+
+
+def _not_facing(surface_a: Surface, surface_b: Surface) -> InputError:
+    return InputError(
+        f"contact of surface '{surface_a.name}' with surface '{surface_b.name}'",
+        got="no line along a surface normal that meets the other surface from its front",
+        expected="two surfaces that face each other",
+        hint="check the names of the two surfaces, their units, their overlap and the axis z.",
+    )

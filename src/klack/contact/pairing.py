@@ -1,0 +1,317 @@
+r"""Which point of one surface faces which point of the other.
+
+From a point of the slave surface a straight line along the outward normal **n** is cut with the
+*curved* faces of the master surface,
+
+.. math:: x_s + g\, n = x_m(\xi), \qquad g > 0 \text{ open},
+
+by Newton's method in :math:`(\xi, g)`.  Straight facets instead of the curved faces would leave
+wrong gaps of micrometres between surfaces that do not match, and a negative wrong gap is a source
+of energy.  Every master face whose bounding ball the line meets is tried; among several cuts with
+opposed normals the nearest counts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import FaceBlock, Mesh, Surface
+
+__all__ = [
+    "FaceGeometry",
+    "Projection",
+    "axial_distance",
+    "face_gaps",
+    "face_geometry",
+    "face_thickness",
+    "project_to_surface",
+]
+
+_INSIDE = 1e-8
+"""Reference coordinate by which a cut may lie outside a face (faces share their edges)."""
+
+_OPPOSED = -0.1
+"""Largest cosine between the normals of two points that face each other."""
+
+_DEPTH = 0.1
+"""Deepest penetration that counts, relative to the extent of the master surface."""
+
+_PAIRS = 2_000_000
+"""Number of (point, face) pairs looked at in one go; bounds the memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaceGeometry:
+    """Points on faces of one family.
+
+    Parameters
+    ----------
+    position : array, shape (f, q, d) [m]
+    normal : array, shape (f, q, d) [-]
+        Outward unit normals.
+    stretch : array, shape (f, q) [m^(d-1)]
+        Area (axisymmetric: of the full ring, 2 pi r ds) per unit of the reference domain.
+    """
+
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    stretch: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Where lines from slave points meet a master surface.
+
+    Parameters
+    ----------
+    block, face : int array, shape (p,)
+        Face block of the surface and face within it; -1 where nothing was met.
+    xi : array, shape (p, d - 1) [-]
+        Reference coordinates on that face.
+    gap : array, shape (p,) [m]
+        Distance along the slave normal, negative for a penetration; nan where nothing was met.
+    """
+
+    block: NDArray[np.int64]
+    face: NDArray[np.int64]
+    xi: NDArray[np.float64]
+    gap: NDArray[np.float64]
+
+    @property
+    def met(self) -> NDArray[np.bool_]:
+        """Points whose line meets the master surface."""
+        return self.face >= 0
+
+
+def face_geometry(
+    points: NDArray[np.float64], block: FaceBlock, xi: NDArray[np.float64]
+) -> FaceGeometry:
+    """Position, outward normal and stretch at reference points of every face.
+
+    Parameters
+    ----------
+    points : array, shape (n, d) [m]
+    block : FaceBlock
+    xi : array, shape (q, d - 1) [-]
+    """
+    N, dN = shape_functions(block.family, xi)
+    corners = points[block.connectivity]
+    position = np.einsum("qn,fnd->fqd", N, corners)
+    tangents = np.einsum("qnk,fnd->fqkd", dN, corners)
+    normal = _normals(tangents)
+    length = np.linalg.norm(normal, axis=-1)
+    if not np.all(length > 0):
+        face = int(np.argwhere(length <= 0)[0, 0])
+        centre = ", ".join(f"{x:.6g}" for x in corners[face].mean(axis=0))
+        raise InputError(
+            f"contact surface, {block.family} face {face}",
+            got=f"a face without area near ({centre}) m",
+            expected="faces with an area above 0",
+            hint="repair or remesh the surface; two nodes of the face may coincide.",
+        )
+    normal = normal / length[..., None]
+    stretch = length
+    if points.shape[1] == 2:
+        stretch = length * 2.0 * np.pi * np.maximum(position[..., 0], 0.0)
+    return FaceGeometry(position, normal, stretch)
+
+
+def _normals(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Outward normals, not normalised, from tangents of shape (..., d - 1, d)."""
+    if tangents.shape[-1] == 3:
+        return np.cross(tangents[..., 0, :], tangents[..., 1, :])
+    along = tangents[..., 0, :]
+    return np.stack([along[..., 1], -along[..., 0]], axis=-1)
+
+
+def face_thickness(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
+    """Shortest extent of every face [m], in the order of the blocks.
+
+    Length of a line; smallest height of a triangle; area over longest side of a quad.  On swept
+    meshes, fine along the meridian and coarse around, this is the size along the meridian.
+    """
+    sizes = []
+    for block in surface.blocks:
+        topology = FAMILIES[block.family]
+        corner = mesh.points[block.connectivity[:, : topology.corners]]
+        sides = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
+        longest = sides.max(axis=1)
+        if topology.dimension == 1:
+            sizes.append(longest)
+            continue
+        fan = np.cross(corner[:, 1:-1] - corner[:, :1], corner[:, 2:] - corner[:, :1])
+        area = np.linalg.norm(fan.sum(axis=1), axis=1) / 2.0
+        sizes.append(area / longest * (2.0 if topology.corners == 3 else 1.0))
+    return np.concatenate(sizes)
+
+
+def project_to_surface(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    mesh: Mesh,
+    surface: Surface,
+    *,
+    deepest: float | None = None,
+) -> Projection:
+    """Cut the lines through ``points`` along ``normals`` with the curved faces of a surface.
+
+    Parameters
+    ----------
+    points, normals : array, shape (p, d) [m], [-]
+    mesh, surface : the master side
+    deepest : float, optional [m]
+        Deepest penetration that counts as one; a tenth of the extent of the master surface unless
+        given, since a line that starts beside a ring-shaped seat may meet its far side backwards.
+    """
+    count, d = points.shape
+    block_of = np.full(count, -1, dtype=np.int64)
+    face_of = np.full(count, -1, dtype=np.int64)
+    xi_of = np.zeros((count, d - 1))
+    gap_of = np.full(count, np.nan)
+    nearest = np.full(count, np.inf)
+    if deepest is None:
+        deepest = _DEPTH * float(np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0)))
+    for number, block in enumerate(surface.blocks):
+        for point, face in _candidates(points, normals, mesh.points, block):
+            xi, gap, good = _newton(points[point], normals[point], mesh.points, block, face)
+            good &= gap >= -deepest
+            point, face, xi, gap = point[good], face[good], xi[good], gap[good]
+            order = np.lexsort((np.abs(gap), point))
+            first = np.ones(len(order), dtype=bool)
+            first[1:] = point[order][1:] != point[order][:-1]
+            best = order[first]
+            best = best[np.abs(gap[best]) < nearest[point[best]]]
+            target = point[best]
+            nearest[target] = np.abs(gap[best])
+            block_of[target], face_of[target] = number, face[best]
+            xi_of[target], gap_of[target] = xi[best], gap[best]
+    return Projection(block_of, face_of, xi_of, gap_of)
+
+
+def _candidates(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    nodes: NDArray[np.float64],
+    block: FaceBlock,
+) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Pairs (point, face) whose line meets the bounding ball of the face, in chunks."""
+    corner = nodes[block.connectivity]
+    origin = corner.mean(axis=(0, 1))
+    centre = corner.mean(axis=1) - origin
+    radius = np.linalg.norm(corner - corner.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    square = np.sum(centre**2, axis=1)
+    chunk = max(1, _PAIRS // len(centre))
+    pairs = []
+    for start in range(0, len(points), chunk):
+        x = points[start : start + chunk] - origin
+        n = normals[start : start + chunk]
+        along = n @ centre.T - np.sum(x * n, axis=1)[:, None]
+        distance = square - 2.0 * x @ centre.T + np.sum(x**2, axis=1)[:, None]
+        # a quarter more than the nodes span, for the bulge of a curved face
+        point, face = np.nonzero(distance - along**2 <= (1.25 * radius) ** 2)
+        if len(point):
+            pairs.append((point + start, face))
+    return pairs
+
+
+def _newton(
+    x: NDArray[np.float64],
+    n: NDArray[np.float64],
+    nodes: NDArray[np.float64],
+    block: FaceBlock,
+    face: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Find reference coordinates and gap of every (line, face) pair and whether the cut is valid."""
+    d = x.shape[1]
+    corner = nodes[block.connectivity[face]]
+    start = reference_nodes(block.family)[: FAMILIES[block.family].corners].mean(axis=0)
+    xi = np.tile(start, (len(x), 1))
+    gap = np.einsum("pd,pd->p", corner.mean(axis=1) - x, n)
+    cosine = np.zeros(len(x))
+    settled = np.zeros(len(x), dtype=bool)
+    open_ = np.arange(len(x))
+    for _ in range(25):
+        N, dN = shape_functions(block.family, xi[open_])
+        tangents = np.einsum("pnk,pnd->pkd", dN, corner[open_])
+        residual = x[open_] + gap[open_, None] * n[open_]
+        residual -= np.einsum("pn,pnd->pd", N, corner[open_])
+        jacobian = np.empty((len(open_), d, d))
+        jacobian[:, :, : d - 1] = -np.swapaxes(tangents, 1, 2)
+        jacobian[:, :, d - 1] = n[open_]
+        normal = _normals(tangents)
+        length = np.linalg.norm(normal, axis=1)
+        slope = np.einsum("pd,pd->p", normal, n[open_])
+        regular = np.abs(slope) > 1e-3 * length  # a line that grazes the face meets nothing
+        open_, length, slope = open_[regular], length[regular], slope[regular]
+        step = np.linalg.solve(jacobian[regular], -residual[regular, :, None])[:, :, 0]
+        move = np.abs(step[:, : d - 1]).max(axis=1)
+        step[:, : d - 1] *= (1.0 / np.maximum(move, 1.0))[:, None]
+        xi[open_] += step[:, : d - 1]
+        gap[open_] += step[:, d - 1]
+        cosine[open_] = slope / length
+        done = move < 1e-12
+        settled[open_[done]] = True
+        near = np.abs(xi[open_]).max(axis=1) < 4.0
+        open_ = open_[~done & near]
+        if not len(open_):
+            break
+    return xi, gap, settled & _inside(block.family, xi) & (cosine < _OPPOSED)
+
+
+def _inside(family: str, xi: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if family.startswith("tri"):
+        return (xi.min(axis=1) >= -_INSIDE) & (xi.sum(axis=1) <= 1.0 + _INSIDE)
+    return np.abs(xi).max(axis=1) <= 1.0 + _INSIDE
+
+
+def face_gaps(
+    mesh: Mesh, surface: Surface, other_mesh: Mesh, other_surface: Surface
+) -> NDArray[np.float64]:
+    """Smallest gap [m] sampled on every face (corners and centre); nan where nothing is met.
+
+    The order is that of the blocks of ``surface``.
+    """
+    gaps = []
+    for block in surface.blocks:
+        position, normal = _samples(mesh, block)
+        met = project_to_surface(position, normal, other_mesh, other_surface)
+        gap = np.where(met.met, met.gap, np.inf).reshape(len(block.connectivity), -1).min(axis=1)
+        gaps.append(np.where(np.isfinite(gap), gap, np.nan))
+    return np.concatenate(gaps)
+
+
+def axial_distance(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface) -> float:
+    """Distance [m] that a has to move to -z until it touches b; negative where they overlap.
+
+    Sampled along lines parallel to z from the faces of both surfaces; nan if none meets the other.
+    """
+    least = np.inf
+    sides = (
+        (mesh_a, surface_a, -1.0, mesh_b, surface_b),
+        (mesh_b, surface_b, 1.0, mesh_a, surface_a),
+    )
+    for mesh, surface, sign, other_mesh, other_surface in sides:
+        for block in surface.blocks:
+            position, normal = _samples(mesh, block)
+            upright = sign * normal[:, -1] > 0.05  # a wall along z has no axial gap
+            along = np.zeros_like(normal[upright])
+            along[:, -1] = sign
+            met = project_to_surface(
+                position[upright], along, other_mesh, other_surface, deepest=np.inf
+            )
+            least = min(least, float(np.min(met.gap[met.met], initial=np.inf)))
+    return least if np.isfinite(least) else float("nan")
+
+
+def _samples(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position and normal at the centre and, drawn in a little, at the corners of every face."""
+    corners = reference_nodes(block.family)[: FAMILIES[block.family].corners]
+    centre = corners.mean(axis=0, keepdims=True)
+    # exactly at a border of two surfaces of the same size a line may miss
+    at = face_geometry(mesh.points, block, np.vstack([centre, centre + 0.98 * (corners - centre)]))
+    d = at.position.shape[2]
+    return at.position.reshape(-1, d), at.normal.reshape(-1, d)
