@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
+from klack.mesh.occ import MM, box_mm, glue, matching_curves, plane_face
 from klack.mesh.profile import Curve, Profile, on_axis
 from klack.mesh.quality import require_positive_jacobians
 from klack.mesh.sizing import MeshSizing, disc_points
 
 __all__ = ["mesh_meridian"]
-
-_MM = 1e3  # netgen models in mm
 
 
 @dataclass(frozen=True)
@@ -96,50 +95,35 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
 
 def _triangulate(profiles: Mapping[str, Profile], sizing: MeshSizing) -> _Triangulation:
     from netgen.meshing import MeshingParameters
-    from netgen.occ import Glue, OCCGeometry
+    from netgen.occ import OCCGeometry
 
     faces = []
     for i, profile in enumerate(profiles.values()):
-        face = _occ_face(profile)
+        face = plane_face(profile)
         face.faces.name = str(i)
         faces.append(face)
-    shape = Glue(faces) if len(faces) > 1 else faces[0]
+    shape = glue(faces)
     _require_one_piece(profiles, shape)
     candidates = [curve for profile in profiles.values() for curve in profile.curves]
     curves = []
     for k, edge in enumerate(shape.edges):
         edge.name = str(k)
-        matches = _matching_curves(edge, candidates)
+        matches = matching_curves(edge, candidates)
         sizes = [sizing.surfaces[c.name] for c in matches if c.name in sizing.surfaces]
         if sizes:
-            edge.maxh = min(sizes) * _MM
+            edge.maxh = min(sizes) * MM
         curves.append(matches[0])
-    parameters = MeshingParameters(maxh=sizing.size * _MM, grading=sizing.grading)
+    parameters = MeshingParameters(maxh=sizing.size * MM, grading=sizing.grading)
     for refinement in sizing.refinements:
         for r, z in _meridian_points(refinement, shape):
-            parameters.RestrictH(r, z, 0.0, h=refinement.size * _MM)
+            parameters.RestrictH(r, z, 0.0, h=refinement.size * MM)
     mesh = OCCGeometry(shape, dim=2).GenerateMesh(mp=parameters)
     return _read_netgen(mesh, tuple(curves))
 
 
-def _occ_face(profile: Profile) -> Any:
-    from netgen.occ import ArcOfCircle, Face, Segment, Wire, gp_Pnt
-
-    def vertex(point: NDArray | tuple[float, float]) -> Any:
-        return gp_Pnt(float(point[0]) * _MM, float(point[1]) * _MM, 0.0)
-
-    edges = []
-    for curve in profile.curves:
-        if curve.centre is None:
-            edges.append(Segment(vertex(curve.start), vertex(curve.end)))
-        else:
-            edges.append(ArcOfCircle(vertex(curve.start), vertex(curve.at(0.5)), vertex(curve.end)))
-    return Face(Wire(edges))
-
-
 def _require_one_piece(profiles: Mapping[str, Profile], shape: Any) -> None:
     """Solids must neither overlap nor lie apart."""
-    expected = sum(profile.area for profile in profiles.values()) * _MM**2
+    expected = sum(profile.area for profile in profiles.values()) * MM**2
     if len(shape.faces) != len(profiles) or abs(shape.mass - expected) > 1e-6 * expected:
         regions = f"{len(shape.faces)} regions of {shape.mass:.6g} mm^2"
         raise InputError(
@@ -148,18 +132,6 @@ def _require_one_piece(profiles: Mapping[str, Profile], shape: Any) -> None:
             expected=f"one region per profile, {expected:.6g} mm^2 (no overlap)",
             hint="let neighbouring solids share their common edge and nothing else.",
         )
-
-
-def _matching_curves(edge: Any, candidates: list[Curve]) -> list[Curve]:
-    """Profile edges on which a (possibly split) edge of the glued shape lies."""
-    low, high = edge.parameter_interval
-    p = edge.Value(0.5 * (low + high))
-    ends = [(p.x, p.y), (edge.start.x, edge.start.y), (edge.end.x, edge.end.y)]
-    points = np.array(ends) / _MM
-    off = [float(curve.distance(points).max()) for curve in candidates]
-    tolerance = 1e-7 * max(curve.length for curve in candidates)
-    matches = [curve for curve, d in zip(candidates, off, strict=True) if d < tolerance]
-    return matches or [candidates[int(np.argmin(off))]]
 
 
 def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
@@ -176,10 +148,10 @@ def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
         refinement = type(refinement)(
             position=(0.0, z), size=refinement.size, radius=refinement.radius
         )
-    points = disc_points(refinement) * _MM
-    low, high = shape.bounding_box
-    inside = (points >= (low.x, low.y)).all(axis=1) & (points <= (high.x, high.y)).all(axis=1)
-    centre = np.array(refinement.position)[None, :] * _MM
+    points = disc_points(refinement) * MM
+    low, high = box_mm(shape)
+    inside = ((points >= low[:2]) & (points <= high[:2])).all(axis=1)
+    centre = np.array(refinement.position)[None, :] * MM
     return np.vstack([centre, points[inside]])
 
 
@@ -189,7 +161,7 @@ def _read_netgen(mesh: Any, curves: tuple[Curve, ...]) -> _Triangulation:
     segment_curves = [int(mesh.GetBCName(int(i) - 1)) for i in segments["index"]]
     names = {int(i): int(mesh.GetMaterial(int(i))) for i in np.unique(triangles["index"])}
     return _Triangulation(
-        points=mesh.Coordinates()[:, :2] / _MM,
+        points=mesh.Coordinates()[:, :2] / MM,
         triangles=triangles["nodes"][:, :3].astype(np.int64) - 1,
         domains=np.array([names[int(i)] for i in triangles["index"]]),
         segments=segments["nodes"][:, :2].astype(np.int64) - 1,

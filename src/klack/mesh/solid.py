@@ -1,0 +1,270 @@
+"""Solid meshes of ten-node tetrahedra from CAD: STEP files and revolved profiles.
+
+Netgen (with OpenCASCADE inside) makes the mesh; it models in millimetres, here and only here.
+Mid nodes lie on the true geometry.  Named faces become surfaces; a face between two solids of one
+body is no surface, its nodes are a node set of the same name.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.boundary import FaceTable
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import ElementBlock, Mesh, Surface
+from klack.mesh.occ import MM, box_mm, glue, revolved_solids
+from klack.mesh.profile import Profile
+from klack.mesh.quality import require_connected, require_positive_jacobians
+from klack.mesh.sizing import MeshSizing, Refinement, ball_points
+
+__all__ = ["mesh_revolved", "mesh_step", "step_names", "write_step_revolved"]
+
+
+def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
+    """Mesh all solids of a STEP file as one body.
+
+    Parameters
+    ----------
+    path : path
+        STEP file (AP203, AP214 or AP242); its declared unit of length is respected.  Names of
+        solids and faces are kept; those without get ``solid1``, ``face1`` and so on.
+    sizing : MeshSizing
+        Refinements are points (x, y, z) or rings (r, z) around the z axis.
+
+    Returns
+    -------
+    Mesh
+        Of dimension 3, elements ``tet10``.
+
+    Raises
+    ------
+    InputError
+        If the file is not STEP, has no solid, a solid is inside out, a sized surface is not there,
+        the solids do not touch, or netgen cannot mesh it.
+    """
+    shape = _read_step(Path(path))
+    return _mesh_shape(f"mesh_step: {path}", shape, sizing)
+
+
+def mesh_revolved(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
+    """Mesh the full turn of one or several profiles (one per solid) as one body.
+
+    Parameters
+    ----------
+    profiles : mapping of solid name to Profile
+    sizing : MeshSizing
+        Refinements are points (x, y, z) or rings (r, z) around the z axis.
+
+    Returns
+    -------
+    Mesh
+        Of dimension 3, elements ``tet10``; surfaces named like the edges of the profiles.
+    """
+    shape = _glued("mesh_revolved", revolved_solids(profiles))
+    return _mesh_shape("mesh_revolved", shape, sizing)
+
+
+def write_step_revolved(profiles: Mapping[str, Profile], path: str | Path) -> None:
+    """Write the full turn of one or several profiles as a STEP file with named faces, in mm."""
+    from netgen.occ import Compound
+
+    solids = revolved_solids(profiles)
+    shape = solids[0] if len(solids) == 1 else Compound(solids)
+    path = Path(path)
+    shape.WriteStep(str(path))
+    # the writer puts the date and a running number in; the same profiles shall give the same file
+    text = path.read_text(encoding="latin-1")
+    text = re.sub(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'", "'1970-01-01T00:00:00'", text, count=1)
+    text = re.sub(r"'Open CASCADE STEP translator [\d. ]+'", "'klack'", text)
+    path.write_text(text, encoding="latin-1")
+
+
+def step_names(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the solids and of the faces in a STEP file, as :func:`mesh_step` gives them."""
+    shape = _read_step(Path(path))
+    return _names(shape.solids, "solid"), tuple(dict.fromkeys(_names(shape.faces, "face")))
+
+
+def _read_step(path: Path) -> Any:
+    from netgen.occ import OCCGeometry
+
+    if not path.is_file():
+        raise InputError(
+            str(path),
+            got="no such file",
+            expected="a STEP file (.step, .stp)",
+            hint="check the path; it is relative to where you started the program.",
+        )
+    start = path.read_bytes()[:2048].lstrip()
+    if not start.startswith(b"ISO-10303-21"):
+        raise InputError(
+            str(path),
+            got=f"a file that starts with {start[:24]!r}",
+            expected="a STEP file, which starts with 'ISO-10303-21;'",
+            hint="export the part as STEP (AP214 or AP242) from the CAD program.",
+        )
+    try:
+        shape = OCCGeometry(str(path)).shape
+    except Exception as error:  # OpenCASCADE raises plain exceptions of several types
+        raise InputError(
+            str(path),
+            got=f"a STEP file that OpenCASCADE cannot read ({error})",
+            expected="at least one closed solid",
+            hint="open it in a CAD program, repair it and export it again.",
+        ) from error
+    if not shape.solids:
+        raise InputError(
+            str(path),
+            got="no solid",
+            expected="at least one closed solid",
+            hint="export solids, not surfaces or a wire frame.",
+        )
+    return _glued(str(path), list(shape.solids))
+
+
+def _glued(where: str, solids: list[Any]) -> Any:
+    """One shape of solids that share faces; overlapping solids are refused."""
+    shape = glue(solids)
+    if len(shape.solids) != len(solids):
+        raise InputError(
+            where,
+            got=f"{len(shape.solids)} regions of space from {len(solids)} solids",
+            expected="solids that touch at faces and do not overlap",
+            hint="cut the common volume out of one of the solids in the CAD program.",
+        )
+    return shape
+
+
+def _names(shapes: Any, kind: str) -> tuple[str, ...]:
+    """Names of solids or faces; those without are called after their place in the list."""
+    return tuple(shape.name or f"{kind}{k + 1}" for k, shape in enumerate(shapes))
+
+
+def _mesh_shape(where: str, shape: Any, sizing: MeshSizing) -> Mesh:
+    from netgen.meshing import MeshingParameters
+    from netgen.occ import OCCGeometry
+
+    solids, faces = _names(shape.solids, "solid"), _names(shape.faces, "face")
+    _require_upright(where, shape, solids)
+    sizing.require_surfaces(faces)
+    for k, solid in enumerate(shape.solids):
+        solid.name = str(k)
+    for k, face in enumerate(shape.faces):
+        face.name = str(k)
+        if faces[k] in sizing.surfaces:
+            face.maxh = sizing.surfaces[faces[k]] * MM
+    parameters = MeshingParameters(maxh=sizing.size * MM, grading=sizing.grading)
+    for refinement in sizing.refinements:
+        for x, y, z in _refined_points(refinement, shape):
+            parameters.RestrictH(x, y, z, h=refinement.size * MM)
+    try:
+        netgen = OCCGeometry(shape).GenerateMesh(mp=parameters)
+        netgen.SecondOrder()
+    except Exception as error:  # netgen raises its own and plain exceptions
+        raise InputError(
+            where,
+            got=f"a geometry that netgen cannot mesh ({error})",
+            expected="closed solids without slivers or gaps",
+            hint="repair the geometry in the CAD program, or choose a smaller size.",
+        ) from error
+    mesh = _read_netgen(netgen, solids, faces)
+    require_connected(where, mesh)
+    require_positive_jacobians(where, mesh)
+    return mesh
+
+
+def _require_upright(where: str, shape: Any, names: tuple[str, ...]) -> None:
+    """Solids must have a positive volume."""
+    for name, solid in zip(names, shape.solids, strict=True):
+        if not solid.mass > 0:
+            raise InputError(
+                f"{where}: solid '{name}'",
+                got=f"a volume of {solid.mass:.6g} mm^3",
+                expected="a volume above 0 (normals that point outwards)",
+                hint="the solid is inside out or not closed: reverse or heal it in CAD.",
+            )
+
+
+def _refined_points(refinement: Refinement, shape: Any) -> NDArray[np.float64]:
+    """Points of constant size within the box of the shape, shape (n, 3) [mm]."""
+    points = ball_points(refinement) * MM
+    low, high = box_mm(shape)
+    margin = refinement.size * MM
+    return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
+
+
+def _read_netgen(netgen: Any, solids: tuple[str, ...], faces: tuple[str, ...]) -> Mesh:
+    """Our mesh from netgen's, with our orientation and mid-node order."""
+    points = np.asarray(netgen.Coordinates()) / MM
+    elements = netgen.Elements3D().NumPy()
+    nodes = elements["nodes"].astype(np.int64) - 1
+    nodes = _abaqus_order(points, nodes)
+    owner = np.array([int(netgen.GetMaterial(int(i))) for i in range(1, len(solids) + 1)])
+    solid = owner[elements["index"] - 1]
+    blocks = tuple(
+        ElementBlock("tet10", nodes[solid == k], name)
+        for k, name in enumerate(solids)
+        if (solid == k).any()
+    )
+    surfaces, node_sets = _named_faces(netgen, blocks, faces)
+    used = np.unique(nodes)
+    if len(used) < len(points):  # leave out nodes that no element has
+        raise InputError(
+            "netgen mesh",
+            got=f"{len(points) - len(used)} nodes without an element",
+            expected="none",
+            hint="mesh the solids one by one to find the faulty one.",
+        )
+    return Mesh(points=points, blocks=blocks, surfaces=surfaces, node_sets=node_sets)
+
+
+def _abaqus_order(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Ten-node tetrahedra with positive volume and mid nodes in the order of our edges.
+
+    Which mid node lies on which edge is found from the coordinates: the mid node whose mean
+    distance from the middle of the chord is smallest.
+    """
+    corners = points[nodes[:, :4]]
+    volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    flip = volume < 0
+    edges = np.array(FAMILIES["tet10"].edges)
+    middle = points[nodes[:, edges]].mean(axis=2)  # (n, 6, 3)
+    gap = np.linalg.norm(points[nodes[:, 4:]][:, None, :, :] - middle[:, :, None, :], axis=-1)
+    order = np.median(gap, axis=0).argmin(axis=1)
+    if len(set(order.tolist())) != 6:
+        raise InputError(
+            "netgen mesh",
+            got="mid nodes that are not near the middle of one edge each",
+            expected="one mid node per edge",
+            hint="choose a smaller element size.",
+        )
+    nodes = np.hstack([nodes[:, :4], nodes[:, 4 + order]])
+    # swapping corners 0 and 1 swaps edges (1,2)-(2,0) and (0,3)-(1,3)
+    nodes[flip] = nodes[flip][:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
+    return nodes
+
+
+def _named_faces(
+    netgen: Any, blocks: tuple[ElementBlock, ...], names: tuple[str, ...]
+) -> tuple[dict[str, Surface], dict[str, NDArray[np.int64]]]:
+    """Surfaces of the outer faces (normals from the elements), node sets of the inner ones."""
+    table = FaceTable.of(blocks)
+    triangles = netgen.Elements2D().NumPy()
+    rows = table.find(triangles["nodes"][:, :3].astype(np.int64) - 1)
+    number = np.array([int(d.bcname) for d in netgen.FaceDescriptors()])
+    face = number[triangles["index"] - 1]
+    surfaces: dict[str, Surface] = {}
+    node_sets: dict[str, NDArray[np.int64]] = {}
+    for name in dict.fromkeys(names):
+        here = rows[np.isin(face, [k for k, other in enumerate(names) if other == name])]
+        inner = table.shared[here]
+        if (~inner).any():
+            surfaces[name] = table.surface(name, here[~inner])
+        if inner.any():
+            node_sets[name] = table.surface(name, here[inner]).nodes
+    return surfaces, node_sets
