@@ -1,0 +1,157 @@
+"""What a full-order impact leaves behind."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.history import ImpactHistory
+
+__all__ = ["EnergyRecord", "FieldsOfBody", "FullOrderResult", "SolverStatistics"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EnergyRecord:
+    """Energies at every m-th step, at the start and at the end.
+
+    Parameters
+    ----------
+    time : array, shape (k,) [s]
+    kinetic, strain : array, shape (k, n_bodies) [J]
+        Of body a, then body b.
+    contact : array, shape (k,) [J]
+        Work that the contact forces took out of the bodies when points closed or opened within
+        a step, >= 0; the first of the two numerical losses.
+    overshoot : array, shape (k,) [J]
+        Taken out by removing the inertial overshoot, >= 0; the second one.
+    work : array, shape (k,) [J]
+        Done by the constant force.
+    """
+
+    time: NDArray[np.float64]
+    kinetic: NDArray[np.float64]
+    strain: NDArray[np.float64]
+    contact: NDArray[np.float64]
+    overshoot: NDArray[np.float64]
+    work: NDArray[np.float64]
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """Kinetic and strain energy of all bodies, shape (k,) [J]."""
+        return self.kinetic.sum(axis=1) + self.strain.sum(axis=1)
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """Energy from nowhere, shape (k,) [J]: round-off in a sound run."""
+        return self.total - self.total[0] + self.contact + self.overshoot - self.work
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FieldsOfBody:
+    """Nodal fields of one body, all degrees of freedom (zero where fixed).
+
+    Parameters
+    ----------
+    name : str
+    peak_displacement : array, shape (n_dof,) [m]
+        At the end of the step with the largest contact force, counted from the start of the run.
+    end_displacement : array, shape (n_dof,) [m]
+    end_velocity : array, shape (n_dof,) [m/s]
+        At the end; its mass-weighted projection on the modes says where the energy went.
+    """
+
+    name: str
+    peak_displacement: NDArray[np.float64]
+    end_displacement: NDArray[np.float64]
+    end_velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolverStatistics:
+    """Effort of one run.
+
+    Parameters
+    ----------
+    scheme, backend : str
+    degrees_of_freedom : int
+        Free ones, of both bodies.
+    contact_points : int
+    steps, steps_in_contact : int
+    rounds_per_step : float
+        Active sets tried per step in contact.
+    watched : float
+        Mean number of contact points that were near enough to be looked at.
+    repeats : int
+        Steps done twice because a point outside of these closed.
+    factor_entries : int
+        Stored entries of all factors (0 where the solver does not tell).
+    set_up_time, loop_time : float [s]
+        Wall-clock.
+    """
+
+    scheme: str
+    backend: str
+    degrees_of_freedom: int
+    contact_points: int
+    steps: int
+    steps_in_contact: int
+    rounds_per_step: float
+    watched: float
+    repeats: int
+    factor_entries: int
+    set_up_time: float
+    loop_time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FullOrderResult:
+    """One impact with every degree of freedom.
+
+    Parameters
+    ----------
+    history : ImpactHistory
+        Contact force, gap and centre-of-mass velocities; the ledger's contact dissipation is the
+        numerical loss of the scheme.
+    point_force : float32 array, shape (n, nc) [N]
+        Force of every contact point, mean over each step.
+    area : array, shape (nc,) [m^2]
+        Of the contact points.
+    energy : EnergyRecord
+    fields : tuple of FieldsOfBody
+        Of body a and, unless it is a rigid wall, body b.
+    approach : float [m]
+        Largest approach of the centre of mass of a after the first touch.
+    retraction : float [m]
+        Distance that a was moved back along +z at the start because the bodies overlapped.
+    statistics : SolverStatistics
+    """
+
+    history: ImpactHistory
+    point_force: NDArray[np.float32]
+    area: NDArray[np.float64]
+    energy: EnergyRecord
+    fields: tuple[FieldsOfBody, ...]
+    approach: float
+    retraction: float
+    statistics: SolverStatistics
+
+    @property
+    def pressure(self) -> NDArray[np.float32]:
+        """Contact pressure of every point, shape (n, nc) [Pa]."""
+        return self.point_force / self.area.astype(np.float32)
+
+    @property
+    def peak_index(self) -> int:
+        """Step with the largest contact force."""
+        return int(np.argmax(self.history.force))
+
+    @property
+    def contact_area(self) -> NDArray[np.float64]:
+        """Area of the points that carry a force, shape (n,) [m^2]."""
+        return (self.point_force > 0) @ self.area
+
+    @property
+    def energy_loss(self) -> float:
+        """Energy that the scheme lost, relative to the energy at the start [-]."""
+        lost = self.energy.total[0] + self.energy.work[-1] - self.energy.total[-1]
+        return float(lost / max(self.energy.total[0], abs(self.energy.work[-1])))
