@@ -1,0 +1,87 @@
+"""The few numbers of a study that a script or a terminal wants."""
+
+from typing import Any
+
+from klack.contact.restitution import Deviation
+from klack.workflow.study import ImpactStudy, LevelResult
+
+__all__ = ["SUMMARY_COLUMNS", "study_to_json", "summary_rows"]
+
+SUMMARY_COLUMNS = (
+    "level",
+    "peak force [N]",
+    "contact time [us]",
+    "impulse [mN s]",
+    "restitution",
+    "energy residual",
+    "degrees of freedom",
+    "wall time [s]",
+)
+
+
+def study_to_json(study: ImpactStudy) -> dict[str, Any]:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        ``case``; ``levels``: per level the numbers of the impact; ``deviation``: of ``reduced``
+        against the reference, None when there is nothing to compare; ``deviations``: of every level
+        that is not the reference.  Numbers that do not exist (nan) are None.
+    """
+    deviations = {name: _deviation(item) for name, item in study.deviations.items()}
+    return {
+        "case": study.case,
+        "levels": {name: _level(result) for name, result in study.levels.items()},
+        "deviation": deviations.get("reduced"),
+        "deviations": deviations,
+    }
+
+
+def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`SUMMARY_COLUMNS`, one per level, as text."""
+    return tuple(
+        (
+            name,
+            f"{result.measures.peak_force:.2f}",
+            f"{1e6 * result.measures.contact_time:.3f}",
+            f"{1e3 * result.measures.impulse:.4f}",
+            f"{result.measures.restitution:.4f}",
+            f"{result.energy_residual:.1e}",
+            f"{result.degrees_of_freedom}",
+            f"{result.wall_time:.3g}",
+        )
+        for name, result in study.levels.items()
+    )
+
+
+def _level(result: LevelResult) -> dict[str, float | int | None]:
+    measures = result.measures
+    return {
+        "peak_force_N": _number(measures.peak_force),
+        "contact_time_s": _number(measures.contact_time),
+        "impulse_Ns": _number(measures.impulse),
+        "restitution": _number(measures.restitution),
+        "sub_contacts": int(measures.sub_contacts),
+        "energy_residual": _number(result.energy_residual),
+        "degrees_of_freedom": int(result.degrees_of_freedom),
+        "steps": int(result.steps),
+        "wall_time_s": _number(result.wall_time),
+    }
+
+
+def _deviation(deviation: Deviation) -> dict[str, float | None]:
+    return {
+        "peak_force": _number(deviation.peak_force),
+        "contact_time": _number(deviation.contact_time),
+        "impulse": _number(deviation.impulse),
+        "restitution": _number(deviation.restitution),
+        "history_l2": _number(deviation.history_l2),
+        "third_octave_max_dB": _number(deviation.third_octave_max_dB),
+        "third_octave_up_to_Hz": _number(deviation.third_octave_up_to_Hz),
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if abs(value) < float("inf") else None

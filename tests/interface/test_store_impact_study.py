@@ -1,0 +1,170 @@
+"""Round trip and damage of stored studies; the truth is the object that was saved."""
+
+import shutil
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from klack.errors import InputError
+from klack.workflow import store
+from klack.workflow.store import RESULT_NAME, load_study, save_study
+from klack.workflow.study import ImpactStudy
+
+
+def assert_same(a: object, b: object, where: str = "study") -> None:
+    """Equal to the last bit, arrays also in shape and kind of number."""
+    if is_dataclass(a):
+        assert type(a) is type(b), where
+        for field in fields(a):
+            assert_same(getattr(a, field.name), getattr(b, field.name), f"{where}.{field.name}")
+    elif isinstance(a, np.ndarray):
+        assert isinstance(b, np.ndarray), where
+        assert a.dtype == b.dtype, where
+        np.testing.assert_array_equal(a, b, err_msg=where)
+    elif isinstance(a, dict):
+        assert list(a) == list(b), where
+        for key in a:
+            assert_same(a[key], b[key], f"{where}[{key!r}]")
+    elif isinstance(a, tuple):
+        assert len(a) == len(b), where
+        for i, (one, other) in enumerate(zip(a, b, strict=True)):
+            assert_same(one, other, f"{where}[{i}]")
+    else:
+        assert a == b or (a != a and b != b), where
+
+
+def test_a_study_comes_back_to_the_last_bit(impact_study: ImpactStudy, tmp_path: Path) -> None:
+    assert save_study(impact_study, tmp_path) == tmp_path / RESULT_NAME
+
+    assert_same(load_study(tmp_path), impact_study)
+    assert_same(load_study(tmp_path / RESULT_NAME), impact_study)
+    assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
+
+
+def test_numbers_that_json_lacks_and_odd_names_come_back(
+    lonely_study: ImpactStudy, tmp_path: Path
+) -> None:
+    """inf (mass of a held body), nan (no separation), names with slashes and empty arrays."""
+    measures = replace(lonely_study.levels["reduced"].measures, restitution=float("nan"))
+    result = replace(lonely_study.levels["reduced"], measures=measures)
+    odd = replace(
+        lonely_study, title="a/b: <é> 100 %", levels={"reduced/1 §": result}, versions={"a/b": "1"}
+    )
+
+    save_study(odd, tmp_path)
+
+    assert_same(load_study(tmp_path), odd)
+
+
+def test_arrays_carry_units_for_other_readers(impact_study: ImpactStudy, tmp_path: Path) -> None:
+    save_study(impact_study, tmp_path)
+
+    force = zarr.open_array(tmp_path / RESULT_NAME / "study/levels/full/history/force", mode="r")
+
+    assert force.attrs["unit"] == "N"
+    np.testing.assert_array_equal(force[...], impact_study.levels["full"].history.force)
+
+
+def test_saving_again_replaces_the_result(
+    impact_study: ImpactStudy, lonely_study: ImpactStudy, tmp_path: Path
+) -> None:
+    save_study(impact_study, tmp_path)
+    save_study(lonely_study, tmp_path)
+
+    assert list(load_study(tmp_path).levels) == ["reduced"]
+    assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
+
+
+def test_an_interrupted_save_leaves_the_old_result(
+    impact_study: ImpactStudy,
+    lonely_study: ImpactStudy,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    save_study(impact_study, tmp_path)
+
+    def interrupt(*_: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(store, "_checksum", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        save_study(lonely_study, tmp_path)
+    monkeypatch.undo()
+
+    assert list(load_study(tmp_path).levels) == ["full", "reduced"]
+    assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
+
+
+def test_an_end_between_the_two_renames_loses_nothing(
+    lonely_study: ImpactStudy, tmp_path: Path
+) -> None:
+    save_study(lonely_study, tmp_path)
+    (tmp_path / RESULT_NAME).rename(tmp_path / f"{RESULT_NAME}.old")
+
+    assert load_study(tmp_path).case == "demo"
+
+
+def test_no_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"folder that does not exist.*\nTry: run"):
+        load_study(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no klack result"):
+        load_study(tmp_path)
+
+
+def test_a_foreign_store_is_refused(tmp_path: Path) -> None:
+    zarr.open_group(tmp_path / RESULT_NAME, mode="w", zarr_format=3)
+
+    with pytest.raises(InputError, match="format None"):
+        load_study(tmp_path)
+
+
+def test_another_format_version_is_refused(lonely_study: ImpactStudy, tmp_path: Path) -> None:
+    save_study(lonely_study, tmp_path)
+    root = zarr.open_group(tmp_path / RESULT_NAME, mode="r+")
+    root.attrs["format_version"] = 99
+
+    with pytest.raises(InputError, match="format version 99"):
+        load_study(tmp_path)
+
+
+FORCE = "study/levels/reduced/history/force"
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [
+        FORCE,
+        f"{FORCE}/c",
+        f"{FORCE}/zarr.json",
+        "study",
+        "study/levels/reduced",
+        "study/contact/zarr.json",
+        "zarr.json",
+    ],
+)
+def test_a_store_with_a_lost_part_is_refused(
+    lost: str, lonely_study: ImpactStudy, tmp_path: Path
+) -> None:
+    """Zarr itself reads a lost chunk as zeros: only the checksum notices."""
+    save_study(lonely_study, tmp_path)
+    path = tmp_path / RESULT_NAME / lost
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
+
+    with pytest.raises(InputError, match=r"result .*\nTry: (copy|run)"):
+        load_study(tmp_path)
+
+
+@pytest.mark.parametrize("cut", [f"{FORCE}/c/0", f"{FORCE}/zarr.json", "study/zarr.json"])
+def test_a_cut_file_is_refused(cut: str, lonely_study: ImpactStudy, tmp_path: Path) -> None:
+    save_study(lonely_study, tmp_path)
+    path = tmp_path / RESULT_NAME / cut
+    path.write_bytes(path.read_bytes()[:-20])
+
+    with pytest.raises(InputError, match=r"result .*\nTry: copy"):
+        load_study(tmp_path)
