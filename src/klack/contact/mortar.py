@@ -78,7 +78,11 @@ class ContactSpace:
     nodes : int array, shape (nc,)
         Slave node of each hat.
     reach : float [m]
-        Largest gap of a candidate.
+        Largest gap of a candidate, above the smallest one.
+    clearance : float [m]
+        Distance that a has to move to -z, rigidly, until the curved surfaces themselves touch.
+        The weighted gaps close a little later (:attr:`touch`), by about h^2/(50 R) on elements of
+        size h and surfaces of relative radius R.
     """
 
     G_a: csr_array
@@ -92,6 +96,7 @@ class ContactSpace:
     slave: Literal["a", "b"]
     nodes: NDArray[np.int64]
     reach: float
+    clearance: float
 
     @property
     def count(self) -> int:
@@ -105,7 +110,7 @@ class ContactSpace:
 
     @property
     def touch(self) -> float:
-        """Distance [m] that a has to move to -z, rigidly, until the first point closes."""
+        """Distance [m] that a has to move to -z, rigidly, until the first weighted gap closes."""
         facing = self.axial > 1e-6
         if not np.any(facing):
             raise InputError(
@@ -121,7 +126,9 @@ class ContactSpace:
 
         First order; rebuild the space after moves that are not small against the element size.
         """
-        return replace(self, gap=self.gap + distance * self.axial)
+        return replace(
+            self, gap=self.gap + distance * self.axial, clearance=self.clearance + distance
+        )
 
     def restricted(self, keep: NDArray[np.bool_]) -> Self:
         """Only the contact points ``keep``, shape (nc,); the new border becomes the rim."""
@@ -225,7 +232,7 @@ def _finer(
     sides: dict[str, tuple[Mesh, Surface]], gaps: dict[str, NDArray[np.float64]], limit: float
 ) -> Literal["a", "b"]:
     """Side with the smaller elements within reach; a when they are alike."""
-    size = {}
+    size: dict[str, float] = {}
     for side in sides:
         near = np.isfinite(gaps[side]) & (gaps[side] <= limit)
         near[np.nanargmin(gaps[side])] = True
@@ -277,11 +284,9 @@ def _rule(shape: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         x, w = np.polynomial.legendre.leggauss(4)
         return np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2), np.outer(w, w).ravel()
     # Dunavant 1985, degree 4, six points
-    points, weights = [], []
-    for a, w in ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)):
-        points += [(a, a), (1.0 - 2.0 * a, a), (a, 1.0 - 2.0 * a)]
-        weights += [w / 2.0] * 3
-    return np.array(points), np.array(weights)
+    orbits = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
+    nodes = [p for c, _ in orbits for p in ((c, c), (1.0 - 2.0 * c, c), (c, 1.0 - 2.0 * c))]
+    return np.array(nodes), np.repeat([weight / 2.0 for _, weight in orbits], 3)
 
 
 @dataclass(slots=True)
@@ -292,6 +297,7 @@ class _Sums:
     covered: NDArray[np.float64]
     full: NDArray[np.float64]
     gap: NDArray[np.float64]
+    clearance: float
     slave: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
     master: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
 
@@ -308,7 +314,7 @@ def _build(
     inner = _nodes_of(surface, near)
     ring = _faces_at(surface, inner)
     zeros = np.zeros(mesh.node_count)
-    sums = _Sums(mesh.dimension, zeros.copy(), zeros.copy(), zeros.copy(), [], [])
+    sums = _Sums(mesh.dimension, zeros.copy(), zeros.copy(), zeros.copy(), np.inf, [], [])
     start = 0
     for block in surface.blocks:
         chosen = block.connectivity[ring[start : start + len(block.connectivity)]]
@@ -348,6 +354,9 @@ def _integrate(
     met = project_to_surface(
         at.position.reshape(f * q, d), at.normal.reshape(f * q, d), other_mesh, other_surface
     )
+    upright = met.met & (np.abs(at.normal[..., -1]).ravel() > 0.05)
+    lift = met.gap[upright] / np.abs(at.normal[..., -1]).ravel()[upright]
+    sums.clearance = min(sums.clearance, float(np.min(lift, initial=np.inf)))
     hats = faces.connectivity[:, piece.nodes]
     share = weight[:, :, None] * piece.hats  # psi_k dA, (f, q, hats)
     np.add.at(sums.full, hats, share.sum(axis=1))
@@ -439,6 +448,7 @@ def _assemble(
         slave=slave,
         nodes=nodes,
         reach=reach,
+        clearance=sums.clearance,
     )
 
 

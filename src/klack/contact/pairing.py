@@ -131,21 +131,22 @@ def _normals(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
 def face_thickness(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
     """Shortest extent of every face [m], in the order of the blocks.
 
-    Length of a line; smallest height of a triangle; area over longest side of a quad.  On swept
-    meshes, fine along the meridian and coarse around, this is the size along the meridian.
+    The shortest side, or sqrt(2) times the height over the longest side if a face is flatter than
+    half a square.  On swept meshes, fine along the meridian and coarse around, this is the size
+    along the meridian.
     """
     sizes = []
     for block in surface.blocks:
         topology = FAMILIES[block.family]
         corner = mesh.points[block.connectivity[:, : topology.corners]]
         sides = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
-        longest = sides.max(axis=1)
-        if topology.dimension == 1:
-            sizes.append(longest)
-            continue
-        fan = np.cross(corner[:, 1:-1] - corner[:, :1], corner[:, 2:] - corner[:, :1])
-        area = np.linalg.norm(fan.sum(axis=1), axis=1) / 2.0
-        sizes.append(area / longest * (2.0 if topology.corners == 3 else 1.0))
+        shortest, longest = sides.min(axis=1), sides.max(axis=1)
+        if topology.dimension == 2:
+            fan = np.cross(corner[:, 1:-1] - corner[:, :1], corner[:, 2:] - corner[:, :1])
+            area = np.linalg.norm(fan.sum(axis=1), axis=1) / 2.0
+            height = area / longest * (2.0 if topology.corners == 3 else 1.0)
+            shortest = np.minimum(shortest, np.sqrt(2.0) * height)
+        sizes.append(shortest)
     return np.concatenate(sizes)
 
 
@@ -225,7 +226,7 @@ def _newton(
     block: FaceBlock,
     face: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Find reference coordinates and gap of every (line, face) pair and whether the cut is valid."""
+    """Find reference coordinates and gap of every (line, face) pair, and which are valid."""
     d = x.shape[1]
     corner = nodes[block.connectivity[face]]
     start = reference_nodes(block.family)[: FAMILIES[block.family].corners].mean(axis=0)

@@ -1,0 +1,306 @@
+r"""Static frictionless contact of two elastic bodies over a ladder of approaches.
+
+All the elasticity is condensed to the contact points,
+
+.. math:: C = G_a F_a G_a^T + G_b F_b G_b^T ,
+
+with the flexibility F of each body (inertia relief for a free one).  For a rigid approach
+:math:`\delta` of a towards b, counted from first touch of the curved surfaces,
+
+.. math:: g = g_0 - \delta\, a + C \lambda \ge 0, \qquad \lambda \ge 0, \qquad \lambda^T g = 0,
+    \qquad P = a^T \lambda ,
+
+with the axial weights *a* of the contact space.  For a free body the approach is that of its centre
+of mass, as in a modal model with the rigid mode as one coordinate.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.complementarity import ComplementaritySolver
+from klack.contact.mortar import ContactSpace
+from klack.elasticity.statics import Flexibility
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+
+__all__ = ["StaticContact", "check_resolution", "check_rim", "contact_compliance", "static_contact"]
+
+_CHUNK = 64
+"""Right-hand sides solved at once."""
+
+_RING = 0.25
+"""Spread of the pressure over its mean radius below which the contact is a ring.
+
+A Hertzian circle has 0.39, a full disc of uniform pressure 0.35."""
+
+
+def contact_compliance(
+    space: ContactSpace, flexibility_a: Flexibility, flexibility_b: Flexibility
+) -> NDArray[np.float64]:
+    """Condense the static compliance of both bodies to the contact points.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    flexibility_a, flexibility_b : Flexibility
+
+    Returns
+    -------
+    array, shape (nc, nc) [m/N]
+        Symmetric.
+    """
+    C = np.zeros((space.count, space.count))
+    for G, flexibility in ((space.G_a, flexibility_a), (space.G_b, flexibility_b)):
+        for start in range(0, space.count, _CHUNK):
+            columns = slice(start, start + _CHUNK)
+            C[:, columns] += G @ flexibility.solve(G[columns].T.toarray())
+    return (C + C.T) / 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StaticContact:
+    """Ladder of static contact states, from first touch upwards (first touch not included).
+
+    Parameters
+    ----------
+    space : ContactSpace
+    approach : array, shape (n,) [m]
+        Rigid approach from first touch, increasing.
+    force : array, shape (n,) [N]
+        Axial force.
+    pressures : array, shape (n, nc) [N]
+        Forces of the contact points; over ``space.area`` they are pressures.
+    area : array, shape (n,) [m^2]
+        Sum of the hats that carry.
+    active_count : int array, shape (n,)
+    half_width : array, shape (n,) [m]
+        Half width of a ring contact, or radius of a contact around one point, of the Hertzian
+        pressure with the same second moment.
+    """
+
+    space: ContactSpace
+    approach: NDArray[np.float64]
+    force: NDArray[np.float64]
+    pressures: NDArray[np.float64]
+    area: NDArray[np.float64]
+    active_count: NDArray[np.int64]
+    half_width: NDArray[np.float64]
+
+    @property
+    def max_force(self) -> float:
+        """Highest axial force of the ladder [N]."""
+        return float(self.force[-1])
+
+    def pattern_at(self, force: float) -> NDArray[np.float64]:
+        """Pressure pattern at an axial force [N], shape (nc,), scaled to a resultant of 1 N."""
+        if not 0 < force <= self.max_force * (1 + 1e-9):
+            raise InputError(
+                "static contact: pattern_at",
+                got=f"a force of {force:g} N",
+                expected=f"above 0 N and at most {self.max_force:g} N, the end of the ladder",
+                hint="compute the static contact up to a higher force.",
+            )
+        upper = int(np.clip(np.searchsorted(self.force, force), 1, max(len(self.force) - 1, 1)))
+        lower = max(upper - 1, 0)
+        upper = min(upper, len(self.force) - 1)
+        span = self.force[upper] - self.force[lower]
+        share = (force - self.force[lower]) / span if span > 0 else 0.0
+        share = min(max(share, 0.0), 1.0)
+        lam = (1 - share) * self.pressures[lower] + share * self.pressures[upper]
+        return lam / float(self.space.axial @ lam)
+
+    def load_patterns(self, force: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Nodal loads on a and b, resultants +1 N and -1 N along z, in the pattern at ``force``."""
+        lam = self.pattern_at(force)
+        return self.space.G_a.T @ lam, self.space.G_b.T @ lam
+
+    def half_width_at(self, force: float) -> float:
+        """Half width of the contact [m] at an axial force [N]."""
+        forces, widths = np.append(0.0, self.force), np.append(0.0, self.half_width)
+        return float(np.interp(force, forces, widths))
+
+
+def static_contact(
+    space: ContactSpace, C: NDArray[np.float64], max_force: float, count: int = 24
+) -> StaticContact:
+    """Contact states from first touch to an axial force.
+
+    The approaches rise with ``(i / count)^2`` from the first closed weighted gap: close together
+    where the contact begins.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    C : array, shape (nc, nc) [m/N]
+        From :func:`contact_compliance`.
+    max_force : float [N]
+        The ladder ends at the first approach found that carries at least this much (up to 1 %
+        more).  Take it above the highest force of the impact.
+    count : int
+        Number of states.
+
+    Raises
+    ------
+    InputError
+        If a contact point at the rim of the candidates carries a force.
+    """
+    require_positive("static contact: max_force", max_force, "N")
+    require_positive("static contact: count", count, "states")
+    ladder = _Ladder(space, C)
+    highest = _approach_for(ladder, max_force)
+    lowest = ladder.first_touch
+    approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
+    pressures = np.array([ladder.pressures(delta) for delta in approach])
+    active = pressures > 0
+    result = StaticContact(
+        space=space,
+        approach=approach,
+        force=pressures @ space.axial,
+        pressures=pressures,
+        area=active @ space.area,
+        active_count=active.sum(axis=1),
+        half_width=np.array([_half_width(space, lam) for lam in pressures]),
+    )
+    check_rim(result)
+    return result
+
+
+class _Ladder:
+    """Pressures at one approach after the other."""
+
+    def __init__(self, space: ContactSpace, C: NDArray[np.float64]) -> None:
+        self.space = space
+        # the surfaces touch a little before the first weighted gap closes
+        self.start = min(space.clearance, space.touch)
+        self.first_touch = space.touch - self.start
+        self.solver = ComplementaritySolver(C)
+        self.active: NDArray[np.bool_] | None = None
+
+    def pressures(self, approach: float) -> NDArray[np.float64]:
+        q = self.space.gap - (self.start + approach) * self.space.axial
+        lam, self.active, _ = self.solver.solve(q, self.active)
+        return lam
+
+    def force(self, approach: float) -> float:
+        return float(self.space.axial @ self.pressures(approach))
+
+
+def _approach_for(ladder: _Ladder, target: float) -> float:
+    """Approach whose force is between ``target`` and 1.01 ``target``: doubling, then secants."""
+    first = int(np.argmin(np.where(ladder.space.axial > 1e-6, ladder.space.gap, np.inf)))
+    low, low_force = ladder.first_touch, 0.0
+    high = low + target * float(ladder.solver.A[first, first]) * 0.1
+    for _ in range(60):
+        high_force = ladder.force(high)
+        if high_force >= target:
+            break
+        low, low_force = high, high_force
+        high = 2.0 * high
+    for _ in range(60):
+        if target <= high_force <= 1.01 * target:
+            return high
+        # aim at the middle of the window, but shorten the bracket by a tenth at least
+        share = (1.005 * target - low_force) / (high_force - low_force)
+        trial = low + min(max(share, 0.1), 0.9) * (high - low)
+        force = ladder.force(trial)
+        if force >= target:
+            high, high_force = trial, force
+        else:
+            low, low_force = trial, force
+    raise ConvergenceError(
+        f"static contact: no approach found for a force of {target:g} N, last {high_force:g} N at "
+        f"{high * 1e6:.4g} um.\nTry: check units and supports of the two bodies."
+    )
+
+
+def _half_width(space: ContactSpace, lam: NDArray[np.float64]) -> float:
+    """Half width from second moments of the pressure.
+
+    Semi-elliptic over a strip of half width b: variance b^2/4.  Hertzian over a circle of radius
+    a: mean square distance 2 a^2/5.  A single row of hats of elements of size h spreads its load
+    with a variance of h^2/24, the floor.
+    """
+    total = lam.sum()
+    if not total > 0:
+        return 0.0
+    weight = lam / total
+    floor = float(weight @ space.size) / np.sqrt(6.0)
+    spread, mean = min(_about_axis(space, weight, axis) for axis in _axes(space))
+    if spread < _RING * mean:
+        return max(2.0 * spread, floor)
+    centre = weight @ space.points
+    if space.dimension == 2:
+        centre[0] = 0.0
+    return max(float(np.sqrt(2.5 * weight @ np.sum((space.points - centre) ** 2, axis=1))), floor)
+
+
+def _axes(space: ContactSpace) -> list[NDArray[np.float64]]:
+    """Where a ring may be centred: the axis of motion, and the middle of the candidates."""
+    if space.dimension == 2:
+        return [np.zeros(1)]
+    return [np.zeros(2), np.average(space.points[:, :2], axis=0, weights=space.area)]
+
+
+def _about_axis(
+    space: ContactSpace, weight: NDArray[np.float64], axis: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Spread of the pressure in the meridian plane [m] and its mean radius [m]."""
+    radius = np.linalg.norm(space.points[:, :-1] - axis, axis=1)
+    across = np.column_stack([radius, space.points[:, -1]])
+    mean = weight @ across
+    return float(np.sqrt(weight @ np.sum((across - mean) ** 2, axis=1))), float(mean[0])
+
+
+def check_rim(static: StaticContact) -> None:
+    """Refuse a contact that has grown to the border of the candidate points.
+
+    Raises
+    ------
+    InputError
+        It names the reach and the highest force without contact at the rim.
+    """
+    touched = (static.pressures[:, static.space.rim] > 0).any(axis=1)
+    if not np.any(touched):
+        return
+    first = int(np.argmax(touched))
+    below = static.force[first - 1] if first else 0.0
+    raise InputError(
+        "contact: reach",
+        got=f"contact at the rim of the candidate points above {below:.4g} N "
+        f"(reach {static.space.reach * 1e6:.4g} um)",
+        expected=f"a reach that holds the contact up to {static.max_force:.4g} N",
+        hint=f"enlarge the reach to about {2e6 * static.approach[-1]:.3g} um, or the surface.",
+    )
+
+
+def check_resolution(static: StaticContact, force: float | None = None) -> float:
+    """Element size across the contact over its half width, at an axial force.
+
+    About one or less is good; above 1.5 the weighted gaps blur the contact and a warning is given.
+
+    Parameters
+    ----------
+    static : StaticContact
+    force : float, optional [N]
+        Without it the end of the ladder.
+
+    Returns
+    -------
+    float [-]
+    """
+    force = static.max_force if force is None else force
+    lam = static.pattern_at(force)
+    width = static.half_width_at(force)
+    size = float(np.average(static.space.size, weights=lam))
+    ratio = size / width if width > 0 else float("inf")
+    if ratio > 1.5:
+        warnings.warn(
+            f"contact: elements of {size * 1e6:.3g} um across a contact of half width "
+            f"{width * 1e6:.3g} um at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful "
+            f"above 1.5). Refine the contact surfaces to about {width * 1e6:.2g} um.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return ratio

@@ -1,0 +1,125 @@
+r"""Stiffness of the contact region alone: the classical constant contact stiffness.
+
+The usual recipe for reduced bodies takes the stiffness of the contact from a static model of a
+small region around it, fixed where it is cut out of the bodies, and fits a straight line: the
+"linear, 1e9 N/m" of the literature.  The number depends on the size of the region (a larger one
+yields more) and on the load, and the modes count part of it again.  It is offered so that users
+can reproduce it; the consistent law (:mod:`klack.contact.local_law`) needs no such choice.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from klack.contact.statics import StaticContact, contact_compliance, static_contact
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError, require_positive
+
+__all__ = ["LocalStiffness", "local_stiffness"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LocalStiffness:
+    """Force against approach of the contact region alone, and a line through it.
+
+    Parameters
+    ----------
+    static : StaticContact
+        Of the region.
+    stiffness : float [N/m]
+        Slope of the least-squares line through the states within ``fit_range``.
+    fit_range : tuple of float [N]
+    size : float [m]
+        Distance from the contact up to which the bodies deform.
+    free_nodes : tuple of int
+        Number of nodes of a and b that deform.
+    """
+
+    static: StaticContact
+    stiffness: float
+    fit_range: tuple[float, float]
+    size: float
+    free_nodes: tuple[int, int]
+
+
+def local_stiffness(
+    static: StaticContact,
+    body_a: ElasticBody,
+    body_b: ElasticBody,
+    *,
+    size: float,
+    fit_share: tuple[float, float] = (0.5, 1.0),
+) -> LocalStiffness:
+    """Linear stiffness of the region within ``size`` of the contact, both bodies together.
+
+    Nodes farther than ``size`` from the contact points that carry at the end of the ladder are
+    held.
+
+    Parameters
+    ----------
+    static : StaticContact
+        Of the full bodies; it says where the contact is and up to which force.
+    body_a, body_b : ElasticBody
+    size : float [m]
+        Some half widths of the contact; the result depends on it.
+    fit_share : pair of float [-]
+        Range of the fit as shares of the highest force.
+    """
+    require_positive("contact submodel: size", size, "m")
+    low, high = fit_share
+    if not 0 <= low < high <= 1:
+        raise InputError(
+            "contact submodel: fit_share",
+            got=f"{low:g} to {high:g}",
+            expected="two shares between 0 and 1, the lower one first",
+            hint="0.5 to 1 fits the upper half of the force range.",
+        )
+    space = static.space
+    carrying = space.points[static.pressures[-1] > 0]
+    parts = [_region(body, carrying, size) for body in (body_a, body_b)]
+    with Flexibility(parts[0][0]) as first, Flexibility(parts[1][0]) as second:
+        C = contact_compliance(space, first, second)
+    yields = np.diag(C) > 1e-6 * np.max(np.diag(C))  # a held point has no compliance at all
+    space, C = space.restricted(yields), C[np.ix_(yields, yields)]
+    region = static_contact(space, C, static.max_force, count=len(static.force))
+    fit_range = (low * static.max_force, high * static.max_force)
+    # the ladder may end 1 % above the force that was asked for
+    inside = (region.force >= fit_range[0]) & (region.force <= 1.011 * fit_range[1])
+    if np.count_nonzero(inside) < 3:
+        raise InputError(
+            "contact submodel: fit_share",
+            got=f"{np.count_nonzero(inside)} states of the ladder within the fit range",
+            expected="three or more",
+            hint="widen the range, or use a ladder with more states.",
+        )
+    slope = np.polyfit(region.approach[inside], region.force[inside], 1)[0]
+    return LocalStiffness(
+        static=region,
+        stiffness=float(slope),
+        fit_range=fit_range,
+        size=size,
+        free_nodes=(parts[0][1], parts[1][1]),
+    )
+
+
+def _region(
+    body: ElasticBody, carrying: NDArray[np.float64], size: float
+) -> tuple[ElasticBody, int]:
+    """Return the body with everything beyond ``size`` held, and its number of free nodes."""
+    distance, _ = cKDTree(carrying).query(body.mesh.points)
+    beyond = np.flatnonzero(distance > size)
+    free = body.mesh.node_count - len(beyond)
+    if not len(beyond) or free < 10:
+        raise InputError(
+            "contact submodel: size",
+            got=f"{size * 1e3:.4g} mm, which lets {free} of {body.mesh.node_count} nodes of "
+            f"'{body.name}' deform",
+            expected="a region larger than a few elements and smaller than the body",
+            hint="some half widths of the contact are usual, for example 0.2 to 1 mm.",
+        )
+    d = body.mesh.dimension
+    held = (d * beyond[:, None] + np.arange(d)).ravel()
+    return replace(body, fixed=np.union1d(body.fixed, held)), free
