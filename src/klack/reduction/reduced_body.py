@@ -1,9 +1,8 @@
 """An elastic body reduced to modal form: the object that every simulation works with."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,14 +213,12 @@ class ReducedBody:
         required = (*_ARRAYS, *_NAMES, *_SCALARS)
         arrays = read_arrays(Path(path), FORMAT, VERSION, required)
         recovery = None
-        if "recovery_nodes" in arrays:
+        if all(f"recovery_{key}" in arrays for key in _RECOVERY):
             recovery = Recovery(**{key: arrays[f"recovery_{key}"] for key in _RECOVERY})
-        return cls(
-            **{key: arrays[key] for key in _ARRAYS},
-            **{key: _names(arrays[key]) for key in _NAMES},
-            **{key: arrays[key].item() for key in _SCALARS},
-            recovery=recovery,
-        )
+        values: dict[str, Any] = {key: arrays[key] for key in _ARRAYS}
+        values |= {key: tuple(str(name) for name in arrays[key]) for key in _NAMES}
+        values |= {key: arrays[key].item() for key in _SCALARS}
+        return cls(**values, recovery=recovery)
 
 
 _ARRAYS = (
@@ -231,7 +228,3 @@ _ARRAYS = (
 _NAMES = ("port_names", "observer_names")
 _SCALARS = ("name", "mass", "rigid_count", "dof_count", "correction", "attachment_count")
 _RECOVERY = ("nodes", "points", "shapes", "faces")
-
-
-def _names(values: Sequence[str] | NDArray[np.str_]) -> tuple[str, ...]:
-    return tuple(str(value) for value in values)

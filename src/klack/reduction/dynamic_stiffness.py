@@ -1,0 +1,42 @@
+"""One solution with the dynamic stiffness ``K - w^2 M``: symmetric, but not definite.
+
+Above the first eigenfrequency the Cholesky factorisation of the statics does not exist.  PARDISO
+(symmetric indefinite, Bunch-Kaufman pivots) does it where it is installed, SuperLU elsewhere.
+"""
+
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, csr_matrix, triu
+from scipy.sparse.linalg import splu
+
+__all__ = ["solve_symmetric"]
+
+_SYMMETRIC_INDEFINITE = -2
+
+
+def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve ``A X = B`` once for a sparse symmetric matrix, definite or not.
+
+    Parameters
+    ----------
+    A : csr_array, shape (n, n)
+        Full storage.
+    B : array, shape (n, m)
+
+    Examples
+    --------
+    >>> A = csr_array([[1.0, 2.0], [2.0, 1.0]])  # eigenvalues -1 and 3
+    >>> bool(np.allclose(solve_symmetric(A, np.array([[3.0], [3.0]])), 1.0))
+    True
+    """
+    if find_spec("pypardiso") is None:
+        return splu(A.tocsc()).solve(B)
+    from pypardiso import PyPardisoSolver
+
+    solver = PyPardisoSolver(mtype=_SYMMETRIC_INDEFINITE)
+    try:
+        return solver.solve(csr_matrix(triu(A, format="csr")), np.asfortranarray(B))
+    finally:
+        solver.free_memory(everything=True)

@@ -1,0 +1,196 @@
+"""Reduction against the exact rod: residual flexibility, receptance, attachment modes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.elasticity.body import ElasticBody, elastic_body
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.statics import Flexibility
+from klack.materials import Material
+from klack.reduction.damping import LossFactor
+from klack.reduction.full_order import full_order_receptance
+from klack.reduction.ports import Port, surface_port
+from klack.reduction.receptance import reduced_receptance
+from klack.reduction.reduce import reduce_body
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.selection import ByCount
+from klack.verification.check import Check, compare
+from klack.verification.lattice import lattice_mesh
+
+__all__ = ["LENGTH", "RADIUS", "STEEL_WITHOUT_POISSON", "checks", "rod"]
+
+LENGTH, RADIUS = 30e-3, 0.2e-3
+"""So slender that all modes below 5 MHz are longitudinal [m]."""
+STEEL_WITHOUT_POISSON = Material(name="bar", young=210e9, poisson=0.0, density=7850.0)
+_GROUP = "reduction"
+_LOSS = 1e-2
+_DAMPING = LossFactor(eta=_LOSS)
+_SPRING = STEEL_WITHOUT_POISSON.young * np.pi * RADIUS**2 / LENGTH  # EA / L
+
+
+def rod(*, elements: int, clamped: bool) -> tuple[ElasticBody, Port, Port]:
+    """One-dimensional rod as a body of revolution without Poisson's ratio, and its two end ports.
+
+    Parameters
+    ----------
+    elements : int
+        Along the length, eight nodes each.
+    clamped : bool
+        Hold the upper end.
+
+    Returns
+    -------
+    body : ElasticBody
+    lower, upper : Port
+        Axial, uniform over the end faces.
+    """
+    lines = [np.array([0.0, RADIUS]), np.linspace(0.0, LENGTH, elements + 1)]
+    mesh = lattice_mesh("quad8", lines, solid="rod")
+    held = mesh.surface("top").nodes if clamped else ()
+    body = elastic_body("rod", mesh, {"rod": STEEL_WITHOUT_POISSON}, fixed_nodes=held)
+    lower, upper = (surface_port(mesh, end, "z", name=end) for end in ("bottom", "top"))
+    return body, lower, upper
+
+
+def checks() -> list[Check]:
+    """Run all checks of this group."""
+    free, lower, upper = rod(elements=80, clamped=False)
+    clamped, tip, _ = rod(elements=80, clamped=True)
+    pool, flexibility = eigenmodes(free, count=12), Flexibility(free)
+    pool_clamped, flexibility_clamped = eigenmodes(clamped, count=12), Flexibility(clamped)
+
+    def reduced(count: int, correction: str) -> ReducedBody:
+        return reduce_body(
+            free,
+            [lower, upper],
+            modes=ByCount(count),
+            correction=correction,  # type: ignore[arg-type]
+            damping=_DAMPING,
+            modes_pool=pool,
+            flexibility=flexibility,
+        )
+
+    held = reduce_body(
+        clamped,
+        [tip],
+        modes=ByCount(10),
+        correction="consistent",
+        damping=_DAMPING,
+        modes_pool=pool_clamped,
+        flexibility=flexibility_clamped,
+    )
+    plain, corrected = reduced(5, "consistent"), reduced(5, "attachment")
+    return [
+        *_static_checks(plain, corrected, held),
+        *_receptance_checks(free, lower, upper, flexibility, pool),
+        _correction_check(reduced(10, "attachment")),
+    ]
+
+
+def _static_checks(plain: ReducedBody, corrected: ReducedBody, held: ReducedBody) -> list[Check]:
+    n = np.arange(1, 6)
+    odd = 2 * np.arange(1, 11) - 1
+    missing_free = 1 / 3 - 2 / np.pi**2 * np.sum(1 / n**2)
+    missing_held = 1 - 8 / np.pi**2 * np.sum(1 / odd**2)
+    series = "series over the modes of a rod, Craig & Kurdila 2006, ch. 17"
+    return [
+        compare(
+            _GROUP,
+            "free rod: elastic compliance at the end, inertia relief (L/EA)",
+            expected=1 / 3,
+            computed=plain.static_compliance[0, 0] * _SPRING,
+            tolerance=1e-8,
+            source="L / (3 E A), free-free rod",
+        ),
+        compare(
+            _GROUP,
+            "free rod: compliance that 5 modes miss (L/EA)",
+            expected=missing_free,
+            computed=plain.residual_compliance[0, 0] * _SPRING,
+            tolerance=1e-4,
+            source=series,
+        ),
+        compare(
+            _GROUP,
+            "clamped rod: compliance that 10 modes miss (L/EA)",
+            expected=missing_held,
+            computed=held.residual_compliance[0, 0] * _SPRING,
+            tolerance=1e-3,
+            source=series,
+        ),
+        compare(
+            _GROUP,
+            "free rod: compliance that 5 modes and attachment modes miss (L/EA)",
+            expected=0.0,
+            computed=corrected.residual_compliance[0, 0] * _SPRING,
+            tolerance=1e-8,
+            source="MacNeal 1971: residual modes make the static response exact",
+        ),
+        compare(
+            _GROUP,
+            "free rod: mass seen by a unit axial velocity (kg)",
+            expected=STEEL_WITHOUT_POISSON.density * np.pi * RADIUS**2 * LENGTH,
+            computed=float(plain.rigid_axial @ plain.rigid_axial),
+            tolerance=1e-9,
+            source="rho A L",
+        ),
+    ]
+
+
+def exact_receptance(frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Free-free rod with ``E (1 + i eta)``: drive-point and end-to-end, shape (n, 2) [m/N]."""
+    E = STEEL_WITHOUT_POISSON.young * (1 + 1j * _LOSS)
+    k = 2 * np.pi * frequencies / np.sqrt(E / STEEL_WITHOUT_POISSON.density)
+    scale = -1 / (E * np.pi * RADIUS**2 * k)
+    return np.stack([scale / np.tan(k * LENGTH), scale / np.sin(k * LENGTH)], axis=1)
+
+
+def _receptance_checks(
+    body: ElasticBody, lower: Port, upper: Port, flexibility: Flexibility, pool: Modes
+) -> list[Check]:
+    axis = np.geomspace(1e3, 800e3, 400)
+    full = full_order_receptance(
+        body, [lower, upper], axis, loss_factor=_LOSS, flexibility=flexibility, checks=2
+    )
+    exact = exact_receptance(axis)
+    source = "-cot(kL)/(EAk), -1/(sin(kL) EAk), k = w sqrt(rho/E(1+i eta)); eta 0.01"
+    computed = full.receptance.values[:, 0, :]
+    names = ("drive-point", "end-to-end")
+    worst = np.max(np.abs(computed / exact - 1), axis=0)
+    checks = [
+        compare(
+            _GROUP,
+            f"free rod, 1 to 800 kHz: largest relative deviation, {name}",
+            expected=0.0,
+            computed=float(deviation),
+            tolerance=5e-3,
+            source=source,
+        )
+        for name, deviation in zip(names, worst, strict=True)
+    ]
+    checks.append(
+        compare(
+            _GROUP,
+            "Krylov receptance against direct solutions, largest relative deviation",
+            expected=0.0,
+            computed=float(full.checked_deviations.max()),
+            tolerance=1e-6,
+            source="K - w^2 M factorised at two frequencies",
+        )
+    )
+    return checks
+
+
+def _correction_check(reduced: ReducedBody) -> Check:
+    axis = np.linspace(5e3, 400e3, 400)
+    computed = reduced_receptance(reduced, axis, with_residual=False, loss_factor=_LOSS)
+    exact = exact_receptance(axis)[:, 0]
+    deviation = np.max(np.abs(computed.values[:, 0, 0] / exact - 1))
+    return compare(
+        _GROUP,
+        "10 modes and attachment modes, 5 to 400 kHz: largest relative deviation",
+        expected=0.0,
+        computed=float(deviation),
+        tolerance=2e-2,
+        source="-cot(kL)/(EAk)",
+    )
