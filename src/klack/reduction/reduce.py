@@ -66,7 +66,7 @@ def reduce_body(
         Elastic modes computed before, lowest first without gaps; saves the eigenvalue solution.
         With :class:`ByFrequency` it must reach that frequency.
     flexibility : Flexibility, optional
-        Of the same body; saves a factorisation.
+        Of the same body; saves the only factorisation that statics and modes need.
     shifts : sequence of float [(rad/s)^2], optional
         With ``correction="attachment"``: shifted instead of residual attachment modes, for example
         ``(default_shift(pool.omega),)``.
@@ -83,7 +83,7 @@ def reduce_body(
     """
     patterns = _patterns(body, ports)
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
-    pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, backend, threads)
+    pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, flexibility)
     picked = select(modes, pool.omega, pool.shapes.T @ patterns)
     kept = Modes(omega=pool.omega[picked], shapes=pool.shapes[:, picked])
     deflections = flexibility.solve(patterns)
@@ -122,15 +122,13 @@ def reduce_body(
     )
 
 
-def _compute_pool(
-    body: ElasticBody, modes: ModeSelection, backend: Backend, threads: int | None
-) -> Modes:
+def _compute_pool(body: ElasticBody, modes: ModeSelection, flexibility: Flexibility) -> Modes:
     if isinstance(modes, ByFrequency):
-        return eigenmodes(body, max_frequency=modes.maximum, backend=backend, threads=threads)
+        return eigenmodes(body, max_frequency=modes.maximum, flexibility=flexibility)
     count = modes.count if isinstance(modes, ByCount) else modes.pool
     if count == 0:
         return _no_modes(body)
-    return eigenmodes(body, count=count, backend=backend, threads=threads)
+    return eigenmodes(body, count=count, flexibility=flexibility)
 
 
 def _no_modes(body: ElasticBody) -> Modes:
