@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class FaceTable:
         )
 
     def find(self, corners: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Find the row of the (first) face with these corners, shape (m, 2..4); -1: no such face."""
+        """Find the row of the face with these corners, shape (m, 2..4); -1 where there is none."""
         wanted = _corner_keys(corners)
         void = np.dtype((np.void, 4 * 8))
         # big-endian without sign sorts as bytes like the numbers themselves
@@ -72,6 +73,21 @@ class FaceTable:
         found = rows < len(table)
         found[found] = table[rows[found]] == keys[found]
         return np.where(found, rows, -1)
+
+    def rows_of(self, block: int, element: int) -> NDArray[np.int64]:
+        """Rows of all faces of one element, in the order of its sides."""
+        return self._place[block][element]
+
+    @cached_property
+    def _place(self) -> tuple[NDArray[np.int64], ...]:
+        """Row of every face, by block: shape (n_elements, n_sides)."""
+        tables = []
+        for number, part in enumerate(self.blocks):
+            table = np.empty((len(part.connectivity), len(part.topology.faces)), dtype=np.int64)
+            own = np.flatnonzero(self.block == number)
+            table[self.element[own], self.side[own]] = own
+            tables.append(table)
+        return tuple(tables)
 
     def surface(self, name: str, rows: NDArray[np.int64]) -> Surface:
         """Surface of the faces in ``rows``, in the order and sense of their elements."""

@@ -7,6 +7,7 @@ edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (linear: :math:`x_1 - x_0`), so this 
 family.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -210,7 +211,12 @@ def mesh_summary(mesh: Mesh) -> MeshSummary:
     )
 
 
-def require_positive_jacobians(where: str, mesh: Mesh, smallest: float = 0.0) -> None:
+def require_positive_jacobians(
+    where: str,
+    mesh: Mesh,
+    smallest: float = 0.0,
+    numbers: Sequence[NDArray[np.int64]] | None = None,
+) -> None:
     """Raise :class:`InputError` if an element is inverted or worse than ``smallest``.
 
     Parameters
@@ -220,8 +226,12 @@ def require_positive_jacobians(where: str, mesh: Mesh, smallest: float = 0.0) ->
     mesh : Mesh
     smallest : float [-]
         Every scaled Jacobian must be above it.
+    numbers : sequence of int arrays, or None
+        Element numbers for the text, one array per block; None counts from 0.
     """
     quality, number, block, place = _worst(mesh)
+    if numbers is not None:
+        number = int(np.concatenate(list(numbers))[number])
     if not quality > smallest:
         raise InputError(
             f"{where}: element {number} ({block.family}, solid '{block.solid}') at {_place(place)}",
