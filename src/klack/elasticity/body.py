@@ -1,0 +1,212 @@
+r"""An elastic body: its mesh, its matrices, its supports and its rigid-body modes.
+
+Rigid modes are built exactly from the coordinates (translations, rotations about the centre of
+mass) and then made orthonormal in the mass, :math:`R^T M R = 1`.  A body of revolution can only
+move along its axis.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from klack.elasticity.assembly import assemble
+from klack.errors import InputError
+from klack.materials import Material
+from klack.mesh.mesh import Mesh
+
+__all__ = ["ElasticBody", "elastic_body"]
+
+_AXIS = 1e-9
+_SUPPORT = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticBody:
+    """A body ready for statics and vibration; made by :func:`elastic_body`.
+
+    Parameters
+    ----------
+    name : str
+    mesh : Mesh
+    K : csr_array, shape (n_dof, n_dof) [N/m]
+        Stiffness of all degrees of freedom, supports not applied.
+    M : csr_array, shape (n_dof, n_dof) [kg]
+    fixed : int array
+        Sorted degrees of freedom that are held at zero.
+    """
+
+    name: str
+    mesh: Mesh
+    K: csr_array
+    M: csr_array
+    fixed: NDArray[np.int64]
+
+    @property
+    def dimension(self) -> int:
+        """3 for a solid, 2 for a body of revolution."""
+        return self.mesh.dimension
+
+    @property
+    def dof_count(self) -> int:
+        """Number of degrees of freedom, fixed ones included."""
+        return self.mesh.dof_count
+
+    @cached_property
+    def free(self) -> NDArray[np.int64]:
+        """Sorted degrees of freedom that are not fixed."""
+        moving = np.ones(self.dof_count, dtype=bool)
+        moving[self.fixed] = False
+        return np.flatnonzero(moving)
+
+    @cached_property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]; they add up to the mass."""
+        along = np.zeros(self.dof_count)
+        along[self.dimension - 1 :: self.dimension] = 1.0
+        return (self.M @ along)[self.dimension - 1 :: self.dimension]
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass of the whole body (full circle) [kg]."""
+        return float(self.nodal_mass.sum())
+
+    @cached_property
+    def centre_of_mass(self) -> NDArray[np.float64]:
+        """Centre of mass, shape (dimension,) [m]; r = 0 for a body of revolution."""
+        centre = self.nodal_mass @ self.mesh.points / self.mass
+        if self.dimension == 2:
+            centre[0] = 0.0
+        return centre
+
+    @cached_property
+    def inertia(self) -> NDArray[np.float64]:
+        """Tensor of inertia about the centre of mass, shape (3, 3) [kg m^2]; the axis is z."""
+        x = self.mesh.points - self.centre_of_mass
+        d = self.dimension
+        moments = x.T @ (self.M[::d, ::d] @ x)
+        if d == 2:  # integral of r^2 dm is shared equally by x and y
+            moments = np.diag([moments[0, 0] / 2, moments[0, 0] / 2, moments[1, 1]])
+        return np.trace(moments) * np.eye(3) - moments
+
+    @cached_property
+    def is_fixed(self) -> bool:
+        """True when the supports hold the body (it has no rigid modes)."""
+        return bool(np.any(_rigid_motions(self)[self.fixed]))
+
+    @cached_property
+    def rigid_modes(self) -> NDArray[np.float64]:
+        """Rigid modes, shape (n_dof, 6 | 1 | 0) [1/sqrt(kg)], orthonormal in the mass."""
+        if self.is_fixed:
+            return np.zeros((self.dof_count, 0))
+        R = _rigid_motions(self)
+        for _ in range(2):  # the second pass removes the round-off of the first
+            L = np.linalg.cholesky(R.T @ (self.M @ R))
+            R = np.linalg.solve(L, R.T).T.astype(np.float64)
+        return np.ascontiguousarray(R)
+
+
+def elastic_body(
+    name: str,
+    mesh: Mesh,
+    materials: Mapping[str, Material],
+    *,
+    fixed_nodes: Iterable[int] = (),
+) -> ElasticBody:
+    """Assemble a body and check its supports.
+
+    Parameters
+    ----------
+    name : str
+    mesh : Mesh
+    materials : mapping of str to Material
+        By name of the solid.
+    fixed_nodes : node numbers
+        Held in all directions.  None: the body is free.  On the axis of a body of revolution
+        the radial displacement is always fixed.
+
+    Raises
+    ------
+    InputError
+        If the mesh is not in one piece, or the supports leave a rigid motion free.
+    """
+    _check_one_piece(name, mesh)
+    nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
+    _check_nodes(name, mesh, nodes)
+    d = mesh.dimension
+    fixed = (d * nodes[:, None] + np.arange(d)).ravel()
+    if d == 2:
+        on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= _AXIS * np.ptp(mesh.points))
+        fixed = np.union1d(fixed, 2 * on_axis)
+    K, M = assemble(mesh, materials)
+    body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=fixed)
+    if nodes.size:
+        _check_support(body)
+    return body
+
+
+def _rigid_motions(body: ElasticBody) -> NDArray[np.float64]:
+    """Build translations and rotations about the centre of mass, of length 1 at the rim."""
+    x = body.mesh.points - body.centre_of_mass
+    if body.dimension == 2:
+        motion = np.zeros((len(x), 2, 1))
+        motion[:, 1, 0] = 1.0
+        return motion.reshape(-1, 1)
+    motion = np.zeros((len(x), 3, 6))
+    motion[:, :, :3] = np.eye(3)
+    for k in range(3):
+        motion[:, :, 3 + k] = np.cross(np.eye(3)[k], x)
+    motion[:, :, 3:] /= np.linalg.norm(x, axis=1).max()
+    return motion.reshape(-1, 6)
+
+
+def _check_nodes(name: str, mesh: Mesh, nodes: NDArray[np.int64]) -> None:
+    if nodes.size and not (nodes[0] >= 0 and nodes[-1] < mesh.node_count):
+        raise InputError(
+            f"body '{name}': fixed_nodes",
+            got=f"node numbers from {nodes[0]} to {nodes[-1]}",
+            expected=f"numbers from 0 to {mesh.node_count - 1}",
+            hint="node numbers count from zero in the order of mesh.points.",
+        )
+
+
+def _check_support(body: ElasticBody) -> None:
+    motions = _rigid_motions(body)
+    held = np.linalg.svd(motions[body.fixed], compute_uv=False)
+    left = motions.shape[1] - int(np.sum(held > _SUPPORT * held[0]))
+    if left:
+        raise InputError(
+            f"body '{body.name}': fixed_nodes",
+            got=f"supports that leave {left} of {motions.shape[1]} rigid motions free",
+            expected="a support that holds the body, or none (a free body)",
+            hint="fix nodes that do not lie on one line, for example those of a whole surface.",
+        )
+
+
+def _check_one_piece(name: str, mesh: Mesh) -> None:
+    """Every node must be tied to every other one through elements."""
+    pairs = [
+        np.stack([np.repeat(b.connectivity[:, 0], b.connectivity.shape[1]), b.connectivity.ravel()])
+        for b in mesh.blocks
+    ]
+    rows, columns = np.concatenate(pairs, axis=1)
+    graph = coo_array(
+        (np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(mesh.node_count,) * 2
+    )
+    count, label = connected_components(graph, directed=False)
+    if count == 1:
+        return
+    smallest = np.flatnonzero(label == np.argmin(np.bincount(label)))
+    where = ", ".join(f"{1e3 * c:.4f}" for c in mesh.points[smallest].mean(axis=0))
+    raise InputError(
+        f"body '{name}': mesh",
+        got=f"{count} parts that share no nodes; the smallest has {len(smallest)} nodes "
+        f"around ({where}) mm",
+        expected="one connected body",
+        hint="glue the solids before meshing, merge coincident nodes, or drop nodes that belong "
+        "to no element.",
+    )

@@ -1,0 +1,182 @@
+r"""Elastic eigenmodes of a fixed or of a free body, mass-normalised.
+
+.. math:: K \varphi = \omega^2 M \varphi, \qquad \varphi_i^T M \varphi_j = \delta_{ij}
+
+The inverse iteration runs on the static flexibility of the body: of a free body that is
+:math:`P^T K^+ P`, in which rigid motions have the eigenvalue zero.  They can therefore not mix
+with the elastic modes, no shift has to be chosen, and statics and modes share one factorisation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.factorization import Backend
+from klack.elasticity.lanczos import block_lanczos
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError, require_positive
+
+__all__ = ["Modes", "eigenmodes", "rigid_frequencies"]
+
+_LARGEST_DENSE = 600
+_RIGID_LIMIT = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Elastic modes, in ascending order.
+
+    Parameters
+    ----------
+    omega : array, shape (m,) [rad/s]
+    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+        Mass-normalised, zero at fixed degrees of freedom, free of rigid motion.  The first
+        component of (nearly) the largest magnitude is positive.
+    """
+
+    omega: NDArray[np.float64]
+    shapes: NDArray[np.float64]
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Eigenfrequencies [Hz]."""
+        return self.omega / (2.0 * np.pi)
+
+
+def eigenmodes(
+    body: ElasticBody,
+    *,
+    count: int | None = None,
+    max_frequency: float | None = None,
+    flexibility: Flexibility | None = None,
+    backend: Backend = "auto",
+    threads: int | None = None,
+) -> Modes:
+    """Lowest elastic eigenmodes; the rigid ones are ``body.rigid_modes``.
+
+    Parameters
+    ----------
+    body : ElasticBody
+    count : int, optional
+        Number of modes.
+    max_frequency : float, optional [Hz]
+        All modes up to this frequency; with ``count`` as well, at most so many.
+    flexibility : Flexibility, optional
+        That of this body, if it is there already: saves its factorisation.
+    backend, threads
+        See :func:`klack.elasticity.factorization.factorize`; unused with ``flexibility``.
+
+    Raises
+    ------
+    InputError
+        If neither number is given, if there are fewer modes than asked for, or if the rigid
+        modes of a free body do not lie below 0.1 Hz.
+    """
+    _check_request(body, count, max_frequency)
+    rigid_frequencies(body)
+    if len(body.free) <= _LARGEST_DENSE:
+        shapes = _dense(body)
+    elif flexibility is not None:
+        shapes = _iterated(flexibility, count, max_frequency)
+    else:
+        with Flexibility(body, backend=backend, threads=threads) as own:
+            shapes = _iterated(own, count, max_frequency)
+    modes = _rayleigh_ritz(body, shapes)
+    keep = len(modes.omega) if count is None else count
+    if max_frequency is not None:
+        keep = min(keep, int(np.searchsorted(modes.frequency, max_frequency, side="right")))
+    return Modes(modes.omega[:keep], np.asfortranarray(modes.shapes[:, :keep]))
+
+
+def rigid_frequencies(body: ElasticBody) -> NDArray[np.float64]:
+    """Frequencies of the rigid modes [Hz]: zero but for round-off.
+
+    Raises
+    ------
+    InputError
+        If one is not below 0.1 Hz: the stiffness matrix does not belong to a free body.
+    """
+    R = body.rigid_modes
+    if not R.shape[1]:
+        return np.zeros(0)
+    squares = np.abs(np.linalg.eigvalsh(R.T @ (body.K @ R)))
+    frequency = np.sqrt(squares) / (2.0 * np.pi)
+    if not frequency.max() < _RIGID_LIMIT:
+        raise InputError(
+            f"eigenmodes of body '{body.name}'",
+            got=f"a rigid motion with a frequency of {frequency.max():.3g} Hz",
+            expected=f"below {_RIGID_LIMIT:g} Hz for a free body",
+            hint="the stiffness matrix holds the body somewhere; name these supports as "
+            "fixed_nodes, or take them out of the matrix.",
+        )
+    return frequency
+
+
+def _check_request(body: ElasticBody, count: int | None, max_frequency: float | None) -> None:
+    if count is None and max_frequency is None:
+        raise InputError(
+            f"eigenmodes of body '{body.name}'",
+            got="neither count nor max_frequency",
+            expected="at least one of them",
+            hint="ask for count=50, or for max_frequency=300e3 (Hz).",
+        )
+    if max_frequency is not None:
+        require_positive("eigenmodes: max_frequency", max_frequency, "Hz")
+    available = len(body.free) - body.rigid_modes.shape[1]
+    if count is not None and not 0 < count <= available:
+        raise InputError(
+            f"eigenmodes of body '{body.name}': count",
+            got=f"{count}",
+            expected=f"between 1 and {available}",
+            hint="ask for fewer modes, or refine the mesh.",
+        )
+
+
+def _dense(body: ElasticBody) -> NDArray[np.float64]:
+    """All elastic modes of a small body."""
+    free = body.free
+    K = body.K[free][:, free].toarray()
+    M = body.M[free][:, free].toarray()
+    _, X = scipy.linalg.eigh(K, M)
+    shapes = np.zeros((body.dof_count, len(free) - body.rigid_modes.shape[1]))
+    shapes[free] = X[:, body.rigid_modes.shape[1] :]
+    return shapes
+
+
+def _iterated(
+    flexibility: Flexibility, count: int | None, max_frequency: float | None
+) -> NDArray[np.float64]:
+    body = flexibility.body
+
+    def operator(X: NDArray[np.float64]) -> NDArray[np.float64]:
+        return flexibility.solve(body.M @ X)
+
+    def enough(values: NDArray[np.float64]) -> bool:
+        if count is not None and len(values) >= count:
+            return True
+        if max_frequency is None or not len(values):
+            return False
+        return bool(values[-1] * (2.0 * np.pi * max_frequency) ** 2 < 1.0)
+
+    block = 8 if count is not None and count < 12 else 16
+    start = np.random.default_rng(2024).standard_normal((body.dof_count, block))
+    most = len(body.free) - body.rigid_modes.shape[1]
+    _, shapes = block_lanczos(operator, body.M, operator(start), enough, most)
+    return shapes
+
+
+def _rayleigh_ritz(body: ElasticBody, shapes: NDArray[np.float64]) -> Modes:
+    """Clean the shapes of rigid motion, and take frequencies from K and M themselves."""
+    R = body.rigid_modes
+    shapes = shapes - R @ (R.T @ (body.M @ shapes))
+    K = shapes.T @ (body.K @ shapes)
+    M = shapes.T @ (body.M @ shapes)
+    squares, X = scipy.linalg.eigh((K + K.T) / 2, (M + M.T) / 2)
+    shapes = shapes @ X
+    size = np.abs(shapes)
+    first = np.argmax(size > 0.999 * size.max(axis=0), axis=0)
+    shapes *= np.sign(shapes[first, np.arange(shapes.shape[1])])
+    return Modes(np.sqrt(np.maximum(squares, 0.0)), shapes)

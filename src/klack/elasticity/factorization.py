@@ -1,0 +1,185 @@
+"""Factorisation of a symmetric positive definite matrix, by whichever solver is installed.
+
+===========  =====================================  ==================================
+backend      what it is                             installed by
+===========  =====================================  ==================================
+pardiso      Cholesky of Intel MKL (fastest)        klack itself on x86-64
+ngsolve      sparse Cholesky of NGSolve             the extra ``ngsolve``
+superlu      LU of SuperLU in scipy (slow, large)   klack itself
+===========  =====================================  ==================================
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from types import TracebackType
+from typing import Any, Literal, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["Backend", "Factorization", "available_backends", "factorize"]
+
+Backend = Literal["auto", "pardiso", "ngsolve", "superlu"]
+
+_LARGEST_CONDITION = 1e14
+
+
+class Factorization(Protocol):
+    """A factorised matrix A, ready to solve A X = B many times.
+
+    Holds memory outside Python until :meth:`close`; it is also a context manager.  One object must
+    not be used by two threads at once; two objects may.
+    """
+
+    @property
+    def backend(self) -> str:
+        """Name of the solver."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        ...
+
+    @property
+    def nonzeros(self) -> int | None:
+        """Entries of the factor, where the solver tells."""
+        ...
+
+    @property
+    def memory(self) -> int | None:
+        """Peak memory of the factorisation [byte], where the solver tells."""
+        ...
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve A X = B; B has shape (n,) or (n, m), X the same; 2-D results are column-major."""
+        ...
+
+    def close(self) -> None:
+        """Give the memory back; a second call does nothing."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None: ...
+
+
+def available_backends() -> tuple[str, ...]:
+    """Names of the solvers that can be loaded here, the fastest first."""
+    return tuple(name for name in _BACKENDS if _loadable(name))
+
+
+def factorize(A: Any, *, backend: Backend = "auto", threads: int | None = None) -> Factorization:
+    """Factorise a sparse symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    A : sparse matrix or array, shape (n, n)
+        Full symmetric storage.
+    backend : {"auto", "pardiso", "ngsolve", "superlu"}
+        ``"auto"`` takes the first of these that is installed.
+    threads : int, optional
+        Threads of the factorisation and of each solve (pardiso only); the default is that of MKL.
+        One thread is best for many single solves, two for the factorisation.
+
+    Raises
+    ------
+    InputError
+        If the matrix is not positive definite, or singular to working precision.
+
+    Examples
+    --------
+    >>> from scipy.sparse import csr_array
+    >>> with factorize(csr_array([[2.0, -1.0], [-1.0, 2.0]])) as factor:
+    ...     x = factor.solve(np.array([1.0, 0.0]))
+    >>> bool(np.allclose(x, [2 / 3, 1 / 3]))
+    True
+    """
+    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
+        raise InputError(
+            "factorize: A",
+            got=f"a matrix of shape {A.shape}",
+            expected="a square matrix with at least one row",
+            hint="at least one degree of freedom must stay free.",
+        )
+    A = A.tocsr()
+    if not (A.diagonal() > 0).all():
+        raise not_positive_definite(
+            f"diagonal entry {int(np.argmin(A.diagonal()))} is not positive"
+        )
+    factor = _load(_chosen(backend))(A, threads)
+    try:
+        _check_condition(A, factor)
+    except BaseException:
+        factor.close()
+        raise
+    return factor
+
+
+def not_positive_definite(symptom: str) -> InputError:
+    """Build the one text for every solver that meets a singular or indefinite matrix."""
+    return InputError(
+        "factorize: A",
+        got=f"a matrix that is not positive definite ({symptom})",
+        expected="the stiffness of a supported body, or a positive combination of K and M",
+        hint="fix the body well enough that it can neither move nor turn, and check that the mesh "
+        "is in one piece.",
+    )
+
+
+_BACKENDS: dict[str, tuple[str, str, str]] = {
+    "pardiso": ("pypardiso", "klack.elasticity.pardiso", "PardisoFactorization"),
+    "ngsolve": ("ngsolve", "klack.elasticity.ngsolve_cholesky", "NgsolveFactorization"),
+    "superlu": ("scipy", "klack.elasticity.superlu", "SuperluFactorization"),
+}
+
+
+def _loadable(name: str) -> bool:
+    try:
+        return find_spec(_BACKENDS[name][0]) is not None
+    except ValueError:  # sys.modules[name] is None: an import that somebody blocked
+        return False
+
+
+def _load(name: str) -> Callable[[Any, int | None], Factorization]:
+    _, module, class_name = _BACKENDS[name]
+    return getattr(import_module(module), class_name)
+
+
+def _chosen(backend: str) -> str:
+    names = available_backends()
+    if backend == "auto":
+        return names[0]
+    if backend not in names:
+        raise InputError(
+            "factorize: backend",
+            got=f"'{backend}'",
+            expected=f"'auto' or one that is installed here: {', '.join(names)}",
+            hint="use 'auto', or install the package of that solver.",
+        )
+    return backend
+
+
+def _check_condition(A: Any, factor: Factorization) -> None:
+    """Two inverse iterations: a lower bound of the condition number, and the residual."""
+    x = np.random.default_rng(1).standard_normal(A.shape[0])
+    scale = abs(A).sum(axis=1).max()
+    for _ in range(2):
+        b = x / np.linalg.norm(x)
+        x = factor.solve(b)
+        # not (a < b) also catches nan
+        if not scale * np.linalg.norm(x) < _LARGEST_CONDITION:
+            raise not_positive_definite("it is singular to working precision")
+        if not b @ x > 0:
+            raise not_positive_definite("it has a negative eigenvalue")
+    residual = np.linalg.norm(A @ x - b) / (scale * np.linalg.norm(x))
+    if not residual < 1e-10:
+        raise not_positive_definite(f"solutions leave a residual of {residual:.1e}")

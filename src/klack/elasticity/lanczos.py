@@ -1,0 +1,131 @@
+r"""Block Lanczos iteration for the largest eigenvalues of a mass-symmetric operator.
+
+Full reorthogonalisation, no restart.  A block of 16 vectors costs only a few times one vector in
+the triangular solves, and finds double modes (bending) without luck.  Grimes, Lewis & Simon 1994.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.errors import ConvergenceError
+
+__all__ = ["block_lanczos"]
+
+Array = NDArray[np.float64]
+
+_TOLERANCE = 1e-10
+_RANK = 1e-10
+
+
+@dataclass(slots=True)
+class _Subspace:
+    """Mass-orthonormal basis V and the projection T = V^T M A V."""
+
+    M: csr_array
+    V: Array
+    T: Array
+    size: int = 0
+
+    @property
+    def basis(self) -> Array:
+        return self.V[:, : self.size]
+
+    def append(self, block: Array) -> None:
+        needed = self.size + block.shape[1]
+        if needed > self.V.shape[1]:
+            V = np.empty((len(self.V), max(needed, self.V.shape[1] * 3 // 2)), order="F")
+            V[:, : self.size] = self.basis
+            self.V = V
+        self.V[:, self.size : needed] = block
+        self.size = needed
+
+    def orthonormalised(self, W: Array) -> tuple[Array, Array, Array]:
+        """W = V C + Q B with Q mass-orthonormal and orthogonal to V; Q may have fewer columns."""
+        C = np.zeros((self.size, W.shape[1]))
+        length = np.sqrt(np.einsum("ij,ij->j", W, self.M @ W))
+        for _ in range(2):
+            part = self.basis.T @ (self.M @ W)
+            W = W - self.basis @ part
+            C += part
+        Q, B = _orthonormal(self.M, W, length.max())
+        Q = Q - self.basis @ (self.basis.T @ (self.M @ Q))
+        Q, B2 = _orthonormal(self.M, Q, 1.0)
+        return Q, C, B2 @ B
+
+
+def block_lanczos(
+    operator: Callable[[Array], Array],
+    M: csr_array,
+    start: Array,
+    enough: Callable[[Array], bool],
+    largest_subspace: int,
+) -> tuple[Array, Array]:
+    """Largest eigenvalues and vectors of an operator A that is symmetric in M.
+
+    Parameters
+    ----------
+    operator : callable
+        X (n, b) to A X (n, b).
+    M : csr_array, shape (n, n)
+    start : array, shape (n, b)
+        Start block, in the range of A.
+    enough : callable
+        Told the converged leading eigenvalues, descending; says whether they suffice.
+    largest_subspace : int
+        Most basis vectors.
+
+    Returns
+    -------
+    values : array, shape (m,)
+        Descending.
+    vectors : array, shape (n, m)
+        Orthonormal in M.
+    """
+    b = start.shape[1]
+    space = _Subspace(M, np.empty((len(start), 12 * b), order="F"), np.zeros((0, 0)))
+    Q, _, _ = space.orthonormalised(start)
+    T = np.zeros((0, 0))
+    while True:
+        space.append(Q)
+        Q, C, B = space.orthonormalised(operator(space.V[:, space.size - Q.shape[1] : space.size]))
+        T = _bordered(T, C)
+        values, S = scipy.linalg.eigh(T)
+        values, S = values[::-1], S[:, ::-1]
+        residual = np.linalg.norm(B @ S[-C.shape[1] :], axis=0)
+        converged = residual <= _TOLERANCE * np.abs(values)
+        leading = len(values) if converged.all() else int(np.argmin(converged))
+        exhausted = Q.shape[1] == 0
+        if exhausted or enough(values[:leading]):
+            return values[:leading], space.basis @ S[:, :leading]
+        if space.size + Q.shape[1] > largest_subspace:
+            raise ConvergenceError(
+                f"block Lanczos: {leading} modes settled in {space.size} vectors, which is not "
+                "enough.\nTry: fewer modes or a lower max_frequency."
+            )
+
+
+def _bordered(T: Array, C: Array) -> Array:
+    """Projection with its new last columns, made symmetric."""
+    size, b = C.shape
+    grown = np.zeros((size, size))
+    grown[: size - b, : size - b] = T
+    grown[:, size - b :] = C
+    grown[size - b :, : size - b] = C[: size - b].T
+    grown[size - b :, size - b :] = (C[size - b :] + C[size - b :].T) / 2
+    return grown
+
+
+def _orthonormal(M: csr_array, W: Array, scale: float) -> tuple[Array, Array]:
+    """W = Q B with Q^T M Q = 1; directions below round-off of ``scale`` are dropped."""
+    if W.shape[1] == 0:
+        return W, np.zeros((0, 0))
+    gram = W.T @ (M @ W)
+    squares, X = np.linalg.eigh((gram + gram.T) / 2)
+    keep = squares > (_RANK * scale) ** 2
+    root = np.sqrt(squares[keep])
+    return W @ (X[:, keep] / root), root[:, None] * X[:, keep].T

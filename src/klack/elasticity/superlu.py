@@ -1,0 +1,56 @@
+"""SuperLU as it comes with scipy: always there, slow and large for 3-D meshes."""
+
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from klack.elasticity.factorization import not_positive_definite
+
+__all__ = ["SuperluFactorization"]
+
+
+class SuperluFactorization:
+    """LU factor; see :class:`klack.elasticity.factorization.Factorization`."""
+
+    backend = "superlu"
+
+    def __init__(self, A: Any, threads: int | None = None) -> None:
+        self.size = A.shape[0]
+        try:
+            # symmetric mode pivots on the diagonal, so that the fill of the ordering is kept
+            factor = splu(
+                A.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise not_positive_definite("a pivot is zero") from error
+        self._factor: Any = factor
+        self.nonzeros: int | None = int(factor.nnz)
+        self.memory: int | None = 12 * self.nonzeros
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve A X = B for one or several columns."""
+        if self._factor is None:
+            raise RuntimeError("this factorisation has been closed")
+        B = np.asfortranarray(B, dtype=np.float64)
+        return self._factor.solve(B) if B.size else B.copy(order="F")
+
+    def close(self) -> None:
+        """Drop the factor."""
+        self._factor = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
