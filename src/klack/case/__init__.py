@@ -1,1 +1,18 @@
-"""Case files: one YAML document that describes bodies, contact and what to run."""
+"""The case file: what a user writes, checked and in SI."""
+
+from klack.case.problem import CaseProblem
+from klack.case.reader import case_schema, load_case, read_case
+from klack.case.schema import LEVELS, Case, SurfaceName
+from klack.case.shipped import find_case, shipped_cases
+
+__all__ = [
+    "LEVELS",
+    "Case",
+    "CaseProblem",
+    "SurfaceName",
+    "case_schema",
+    "find_case",
+    "load_case",
+    "read_case",
+    "shipped_cases",
+]

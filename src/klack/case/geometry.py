@@ -1,0 +1,288 @@
+"""Where the shape of a body comes from: a drawn outline, a STEP file, or a finished mesh."""
+
+from collections.abc import Mapping
+from math import tau
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+
+from klack.case.problem import CaseProblem
+from klack.case.section import Count, Name, Number, Section
+from klack.errors import InputError
+from klack.mesh.profile import Arc, Line, Profile
+from klack.units import Angle, Length, LengthUnit, format_si
+
+__all__ = [
+    "ContactRefinement",
+    "Edge",
+    "Geometry",
+    "InputPath",
+    "MeshFile",
+    "MeshSettings",
+    "Outline",
+    "ProfileGeometry",
+    "Sectors",
+    "StepFile",
+    "Support",
+]
+
+
+def _existing_file(value: Any, info: ValidationInfo) -> Path:
+    """Resolve a path relative to the folder of the case; it must be a file."""
+    if isinstance(value, Path):
+        value = str(value)
+    if not isinstance(value, str) or not value.strip():
+        got, hint = f"'{value}'", "write the name of a file, relative to the case file."
+        raise CaseProblem((), got=got, expected="a file name", hint=hint)
+    folder = info.context.get("folder", Path()) if info.context else Path()
+    path = (folder / Path(value).expanduser()).resolve()
+    if not path.is_file():
+        kind = "a folder" if path.is_dir() else "a file that does not exist"
+        raise CaseProblem(
+            (),
+            got=f"'{value}', {kind} ({path})",
+            expected="an existing file, relative to the folder of the case",
+            hint="check the spelling and the folder.",
+        )
+    return path
+
+
+InputPath = Annotated[
+    Path, BeforeValidator(_existing_file), WithJsonSchema({"type": "string", "format": "path"})
+]
+Point = tuple[Number, Number]
+
+
+class Edge(Section):
+    """One edge of an outline, from the end of the edge before to its own end."""
+
+    line: Point | None = Field(default=None, description="Straight edge to this point (r, z).")
+    arc: Point | None = Field(default=None, description="Circular arc to this point (r, z).")
+    close: Literal[True] | None = Field(
+        default=None, description="Straight edge back to the start; last."
+    )
+    centre: Point | None = Field(default=None, description="Centre (r, z) of an arc.")
+    clockwise: bool | None = Field(
+        default=None,
+        strict=True,
+        description="Sense of an arc; the shorter way if it is not given.",
+    )
+    name: Name | None = Field(
+        default=None, description="Name of the surface that the edge sweeps; edges may share one."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        kind = self._exactly_one(("line", "arc", "close"), "where the edge goes")
+        if kind != "arc":
+            return self._refuse_with(("centre", "clockwise"), kind, "only an arc is curved")
+        if self.centre is None:
+            hint = "add the point (r, z) with the same distance to both ends."
+            raise CaseProblem((), got="an arc without centre", expected="centre", hint=hint)
+        return self
+
+
+class Outline(Section):
+    """Closed outline of one solid in the half plane (r, z); r is the distance from the axis."""
+
+    start: Point = Field(description="First corner (r, z), in the unit of the profile.")
+    edges: tuple[Edge, ...] = Field(
+        min_length=2, description="Edges in turn; the last one ends at the start again."
+    )
+
+    @model_validator(mode="after")
+    def _close_is_last(self) -> Self:
+        for i, edge in enumerate(self.edges[:-1]):
+            if edge.close:
+                raise CaseProblem(
+                    ("edges", i, "close"),
+                    got=f"close at edge {i + 1} of {len(self.edges)}",
+                    expected="close at the last edge only",
+                    hint="move it to the end, or remove the edges after it.",
+                )
+        return self
+
+    def profile(self, unit: float) -> Profile:
+        """Build the meridian; ``unit`` is the length of one drawing unit [m]."""
+
+        def metres(point: Point) -> tuple[float, float]:
+            # 15 digits: 0.3 mm must be the same number here as 0.0003 m elsewhere
+            r, z = (float(f"{x * unit:.15g}") for x in point)
+            return r, z
+
+        edges: list[Line | Arc] = []
+        for edge in self.edges:
+            name = edge.name or ""
+            if edge.arc is not None and edge.centre is not None:
+                edges.append(Arc(metres(edge.arc), metres(edge.centre), name, edge.clockwise))
+            else:
+                edges.append(Line(metres(edge.line or self.start), name))
+        return Profile(metres(self.start), tuple(edges))
+
+
+class ProfileGeometry(Section):
+    """A body of revolution, drawn as its half section."""
+
+    unit: LengthUnit = Field(description="Unit of all coordinates, e.g. mm.")
+    parts: dict[Name, Outline] = Field(
+        min_length=1,
+        description="One closed outline for each solid; solids are glued where they share edges.",
+    )
+
+    @model_validator(mode="after")
+    def _drawable(self) -> Self:
+        for name, part in self.parts.items():
+            try:
+                part.profile(self.unit)
+            except InputError as error:
+                raise CaseProblem(
+                    ("parts", name),
+                    got=f"({error.where.removeprefix('Profile: ')}) {error.got}",
+                    expected=error.expected,
+                    hint=error.hint,
+                ) from error
+        return self
+
+    def profiles(self) -> dict[str, Profile]:
+        """Meridian of each solid, in metres."""
+        return {name: part.profile(self.unit) for name, part in self.parts.items()}
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names of the surfaces, in the order of drawing."""
+        names = [name for profile in self.profiles().values() for name in profile.names]
+        return tuple(dict.fromkeys(names))
+
+
+class StepFile(Section):
+    """A body from a STEP file; its faces and solids carry their names there."""
+
+    file: InputPath = Field(description="STEP file, relative to the case; axis of motion = z.")
+
+
+class MeshFile(Section):
+    """A finished finite-element mesh."""
+
+    file: InputPath = Field(description="Abaqus or CalculiX input (.inp), relative to the case.")
+    unit: LengthUnit = Field(description="Unit of its coordinates, e.g. mm.")
+
+
+Model = Literal["axisymmetric", "swept", "solid"]
+
+
+class Geometry(Section):
+    """Shape of a body: exactly one of profile, step and mesh."""
+
+    profile: ProfileGeometry | None = Field(
+        default=None, description="Half section of a turned part."
+    )
+    step: StepFile | None = Field(default=None, description="CAD file.")
+    mesh: MeshFile | None = Field(default=None, description="Finished mesh.")
+    model: Model | None = Field(
+        default=None,
+        description="axisymmetric: the half section alone (fastest); swept: three-dimensional, the "
+        "meshed half section turned in layers; solid: three-dimensional, unstructured. Needed for "
+        "a profile; a step file is always solid, a mesh solid unless said otherwise.",
+    )
+    layers: Count | None = Field(
+        default=None, ge=6, description="Layers round the circle of a swept mesh."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        kind = self._exactly_one(("profile", "step", "mesh"), "where the shape comes from")
+        if kind == "profile" and self.model is None:
+            raise CaseProblem(
+                (),
+                got="a profile without model",
+                expected="model: axisymmetric, swept or solid",
+                hint="take axisymmetric first; swept for bodies that are held in sectors.",
+            )
+        allowed = {
+            "profile": ("axisymmetric", "swept", "solid"),
+            "step": ("solid",),
+            "mesh": ("solid", "axisymmetric"),
+        }[kind]
+        if self.model is not None and self.model not in allowed:
+            raise CaseProblem(
+                ("model",),
+                got=f"model {self.model} for a {kind}",
+                expected=f"one of: {', '.join(allowed)}",
+                hint="a profile can be turned into any of the three models.",
+            )
+        if self.model == "swept" and self.layers is None:
+            hint = "take 18: contact of turned parts needs few layers."
+            raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)
+        if self.model != "swept":
+            return self._refuse_with(("layers",), f"model {self.model}", "only swept has layers")
+        return self
+
+    @property
+    def dimension(self) -> int:
+        """2 for an axisymmetric body, else 3."""
+        return 2 if self.model == "axisymmetric" else 3
+
+
+class ContactRefinement(Section):
+    """Small elements around the ring or point of first touch."""
+
+    size: Length = Field(gt=0, description="Edge length there; half the contact width or less.")
+    extent: Length = Field(gt=0, description="Distance from the first touch up to which it holds.")
+
+
+class MeshSettings(Section):
+    """How fine klack meshes a profile or a STEP file."""
+
+    size: Length = Field(gt=0, description="Largest edge length anywhere.")
+    grading: Number = Field(
+        default=0.3,
+        gt=0,
+        le=1,
+        description="Growth of the edge length per distance: 0.15 smooth, 0.5 coarse.",
+    )
+    surfaces: Mapping[str, Annotated[Length, Field(gt=0)]] = Field(
+        default_factory=dict, description="Largest edge length on named surfaces."
+    )
+    contact: ContactRefinement | None = Field(
+        default=None, description="Refinement at the first touch."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.contact is not None and self.contact.size > self.size:
+            raise CaseProblem(
+                ("contact", "size"),
+                got="a contact size above the general size",
+                expected=f"{format_si(self.size, 'm')} or less",
+                hint="the contact needs the smallest elements of all.",
+            )
+        return self
+
+
+class Sectors(Section):
+    """Equal sectors of a surface round the axis, for a body that is clamped at some places."""
+
+    count: Count = Field(description="Number of sectors, evenly spaced.")
+    width: Angle = Field(gt=0, description="Angle of one sector.")
+    first: Angle = Field(default=0.0, description="Middle of the first sector, from x towards y.")
+
+    @model_validator(mode="after")
+    def _fit(self) -> Self:
+        if self.count * self.width > tau * (1 + 1e-12):
+            raise CaseProblem(
+                ("width",),
+                got=f"{self.count} sectors of {self.width * 360 / tau:g} deg",
+                expected="360 deg or less altogether",
+                hint="leave 'sectors' out to hold the whole surface.",
+            )
+        return self
+
+
+class Support(Section):
+    """A surface, or sectors of it, whose nodes are held in all directions."""
+
+    surface: Name = Field(description="Name of the surface.")
+    sectors: Sectors | None = Field(
+        default=None, description="Held sectors; the whole surface without."
+    )

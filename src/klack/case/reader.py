@@ -1,0 +1,326 @@
+"""Read a case file: YAML 1.2 in, a checked :class:`Case` or one clear error out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from klack.case.problem import CaseProblem, Key, key_text, nearest
+from klack.case.schema import Case
+from klack.errors import InputError
+
+__all__ = ["case_schema", "load_case", "read_case"]
+
+_LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
+_MOST_VALUES = 200_000
+_DEEPEST = 40
+
+
+@dataclass(slots=True)
+class _Lines:
+    """Line of each key and each value of a file, by key path (lines count from 1)."""
+
+    keys: dict[Key, int] = field(default_factory=dict)
+    values: dict[Key, int] = field(default_factory=dict)
+
+    def find(self, path: Key, *, on_key: bool) -> int:
+        """Line of a value or key; of the nearest section around it if it does not exist."""
+        while path:
+            for table in (self.keys, self.values) if on_key else (self.values, self.keys):
+                if path in table:
+                    return table[path]
+            path, on_key = path[:-1], True
+        return 1
+
+
+def load_case(path: str | Path) -> Case:
+    """Read and check a case file.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file.  Files that it names are looked for relative to its own folder.
+
+    Returns
+    -------
+    Case
+        In SI, with :attr:`Case.path` set.
+
+    Raises
+    ------
+    InputError
+        With file, line, key, what came, what was expected and what to try.
+    """
+    path = Path(path)
+    return read_case(_text_of(path), path)
+
+
+def read_case(text: str, path: Path) -> Case:
+    """Check the text of a case file that lies (or will lie) at ``path``."""
+    data, lines = _parse(text, path)
+    context = {"path": path, "folder": path.parent, "source": text}
+    try:
+        return Case.model_validate(data, context=context)
+    except ValidationError as error:
+        raise _first_error(error, data, lines, path) from None
+
+
+def case_schema() -> dict[str, Any]:
+    """JSON schema of a case file (draft 2020-12), for editors that check while one types."""
+    schema = Case.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _text_of(path: Path) -> str:
+    hint = "klack impact demo-valve runs a shipped case; its file is a good start."
+    if not path.is_file():
+        got = "a folder" if path.is_dir() else "a file that does not exist"
+        raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint)
+    try:
+        with path.open("rb") as file:
+            raw = file.read(_LARGEST + 1)
+        if len(raw) > _LARGEST:
+            hint = "is it a mesh or a result? A case names such files and stays small."
+            expected = f"a case file below {_LARGEST / 1e6:g} MB"
+            raise InputError(str(path), got="a larger file", expected=expected, hint=hint)
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{path}:{line}",
+            got=f"the byte 0x{raw[error.start]:02x}, which is no UTF-8",
+            expected="a text file in UTF-8",
+            hint="save the file as UTF-8; a binary file is no case.",
+        ) from None
+    except OSError as error:
+        got = f"a file that cannot be read ({error.strerror})"
+        raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint) from None
+
+
+def _parse(text: str, path: Path) -> tuple[Any, _Lines]:
+    """Plain data of a YAML text, and where each key and value stands."""
+    yaml = YAML(typ="rt")
+    try:
+        data = yaml.load(StringIO(text))
+    except DuplicateKeyError as error:
+        raise _duplicate(error, path) from None
+    except MarkedYAMLError as error:
+        raise _syntax_error(error, path) from None
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise InputError(
+            str(path),
+            got=f"text that is no YAML ({_reason(error)})",
+            expected="a case file (YAML 1.2)",
+            hint="compare with the output of klack schema or with a shipped case.",
+        ) from None
+    if not isinstance(data, CommentedMap):
+        kind = "an empty file" if data is None else "a list or a single value"
+        raise InputError(
+            f"{path}:1",
+            got=kind,
+            expected="a mapping that starts with 'klack: 1'",
+            hint="a case has the sections materials, bodies, contact, motion and run.",
+        )
+    lines = _Lines()
+    return _Plain(path, lines).of(data, ()), lines
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "brackets nested without end"
+    return (str(error).splitlines() or ["unreadable"])[0]
+
+
+class _Plain:
+    """Turn the nodes of ruamel.yaml into plain data and note their lines."""
+
+    def __init__(self, path: Path, lines: _Lines) -> None:
+        self.path, self.lines, self.count = path, lines, 0
+
+    def of(self, node: Any, key: Key) -> Any:
+        """Plain copy of a node."""
+        self.count += 1
+        if self.count > _MOST_VALUES or len(key) > _DEEPEST:
+            self._refuse(key, "aliases or nesting without end", "a plain tree of keys and values")
+        if isinstance(node, CommentedMap):
+            return {self._name(node, k, key): self.of(v, (*key, k)) for k, v in node.items()}
+        if isinstance(node, CommentedSeq):
+            result = []
+            for i, value in enumerate(node):
+                self.lines.values[(*key, i)] = node.lc.item(i)[0] + 1
+                result.append(self.of(value, (*key, i)))
+            return result
+        if node is None or isinstance(node, bool):
+            return node
+        for plain in (str, int, float):
+            if isinstance(node, plain):
+                return plain(node)
+        # a date, a set, or a value with a tag such as !!python/name
+        tag = getattr(getattr(node, "tag", None), "value", None) or type(node).__name__
+        self._refuse(key, f"a value of the kind {tag}", "text, a number, a list or a mapping")
+
+    def _name(self, node: CommentedMap, name: Any, key: Key) -> str:
+        where = node.lc.data.get(name) if node.lc.data else None
+        path = (*key, str(name))
+        if where is not None:
+            self.lines.keys[path] = where[0] + 1
+            self.lines.values[path] = where[2] + 1
+        if not isinstance(name, str):
+            self._refuse(path, f"the key {name}", "text as a key")
+        return str(name)
+
+    def _refuse(self, key: Key, got: str, expected: str) -> None:
+        line = self.lines.find(key, on_key=False)
+        where = f"{self.path}:{line}: {key_text(key)}"
+        hint = 'put text into quotes: "...".'
+        raise InputError(where, got=got, expected=expected, hint=hint)
+
+
+def _duplicate(error: DuplicateKeyError, path: Path) -> InputError:
+    line = error.problem_mark.line + 1 if error.problem_mark else 1
+    name = str(error.problem).split('"')[1] if '"' in str(error.problem) else "?"
+    first = f" (first in line {error.context_mark.line + 1})" if error.context_mark else ""
+    return InputError(
+        f"{path}:{line}: {name}",
+        got=f"the key '{name}' a second time in one mapping{first}",
+        expected="each key once",
+        hint="remove or rename one of them.",
+    )
+
+
+def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
+    mark = error.problem_mark or error.context_mark
+    where = f"{path}:{mark.line + 1}" if mark else str(path)
+    column = f" at column {mark.column + 1}" if mark else ""
+    context = f" {error.context}" if error.context else ""
+    return InputError(
+        where,
+        got=f"text that is no YAML{column}: {error.problem or 'unreadable'}{context}",
+        expected="a case file (YAML 1.2)",
+        hint="look at this line and the one before: indentation by spaces, 'key: value', brackets.",
+    )
+
+
+def _first_error(error: ValidationError, data: Any, lines: _Lines, path: Path) -> InputError:
+    """Turn the first of pydantic's complaints into ours; say how many more there are."""
+    details = error.errors(include_url=False)
+    first, more = details[0], len(details) - 1
+    problem = _problem(first, data)
+    key = _existing(data, first["loc"]) + problem.key
+    line = lines.find(key, on_key=problem.on_key)
+    name = key_text(key)
+    hint = problem.hint
+    if more:
+        hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
+    where = f"{path}:{line}: {name}" if name else f"{path}:{line}"
+    return InputError(where, got=problem.got, expected=problem.expected, hint=hint)
+
+
+def _existing(data: Any, location: Sequence[str | int]) -> Key:
+    """Drop from a location of pydantic the parts that are not in the file (tags of unions)."""
+    key: list[str | int] = []
+    for part in location:
+        if isinstance(data, dict) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            continue
+        key.append(part)
+    return tuple(key)
+
+
+def _problem(details: ErrorDetails, data: Any) -> CaseProblem:
+    """Our words for one complaint."""
+    own = details.get("ctx", {}).get("error")
+    if isinstance(own, CaseProblem):
+        return own
+    if isinstance(own, InputError):
+        return CaseProblem((), got=own.got, expected=own.expected, hint=own.hint)
+    value = _value_at(data, _existing(data, details["loc"]))
+    kind, context = details["type"], details.get("ctx", {})
+    key: Key = ()
+    if kind == "union_tag_invalid" and isinstance(value, dict):
+        key, value = ("kind",), value.get("kind")
+    expected, hint = _words(kind, context, value)
+    if not expected:
+        expected, hint = details["msg"], "klack schema describes every key."
+    return CaseProblem(key, got=_shown(value), expected=expected, hint=hint)
+
+
+_BOUNDS = {
+    "greater_than": ("gt", "above {}"),
+    "greater_than_equal": ("ge", "{} or more"),
+    "less_than": ("lt", "below {}"),
+    "less_than_equal": ("le", "{} or less"),
+}
+_TYPES = {
+    "int_type": ("a whole number", "write it without quotes and without a point."),
+    "int_from_float": ("a whole number", "write it without a point."),
+    "float_type": ("a number without unit", "write it without quotes."),
+    "finite_number": ("a finite number", "write plain digits."),
+    "string_type": ("text", 'put it into quotes: "...".'),
+    "bool_type": ("true or false", "write it without quotes."),
+    "tuple_type": ("a list", "write it in brackets: [value, value]."),
+    "model_attributes_type": ("a mapping", "write {kind: ...}."),
+    "mapping_type": ("a mapping", "write {name: value, ...}."),
+    "dict_type": ("a mapping", "write {name: value, ...}."),
+    "string_pattern_mismatch": (
+        "a name of letters, digits, _ and -, not starting with a digit",
+        "rename it here and where it is used.",
+    ),
+}
+
+
+def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
+    """Say what was expected and what to try, for the complaints that pydantic makes itself."""
+    if kind in _TYPES:
+        return _TYPES[kind]
+    if kind in _BOUNDS:
+        name, form = _BOUNDS[kind]
+        return (
+            f"a value {form.format(f'{context[name]:g}')}",
+            "check the sign, the unit and the size.",
+        )
+    if kind in ("literal_error", "union_tag_invalid"):
+        allowed = str(context.get("expected") or context.get("expected_tags"))
+        names = [
+            part for part in allowed.replace(" or ", ", ").replace("'", "").split(", ") if part
+        ]
+        return f"one of: {', '.join(names)}", nearest(str(value), names, f"write {names[0]}.")
+    if kind == "union_tag_not_found":
+        return "a mapping with the key 'kind'", "write {kind: consistent}."
+    if kind == "too_short":
+        return f"at least {context['min_length']} of them", "add what is missing."
+    if kind == "too_long":
+        return f"at most {context['max_length']} of them", "remove what is too much."
+    if kind == "missing":
+        return "a list with one more value", "a point is [r, z], a pair is [first, second]."
+    if kind == "string_too_short":
+        return "some text", "write one line."
+    return "", ""
+
+
+def _value_at(data: Any, key: Key) -> Any:
+    for part in key:
+        data = data[part]
+    return data
+
+
+def _shown(value: Any) -> str:
+    """Show what came, briefly."""
+    if isinstance(value, dict):
+        return f"a mapping with the keys: {', '.join(map(str, value)) or 'none'}"[:100]
+    if isinstance(value, list):
+        return f"the list {value}"[:80]
+    if value is None:
+        return "nothing"
+    return f"'{value}'"[:80] if isinstance(value, str) else str(value).lower()

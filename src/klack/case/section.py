@@ -1,0 +1,81 @@
+"""What all sections of a case have in common: frozen, documented, and strict about their keys."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, StringConstraints, model_validator
+
+from klack.case.problem import CaseProblem, nearest, one_of
+
+__all__ = ["Count", "Name", "Number", "Section", "Text"]
+
+Number = Annotated[float, Strict()]
+Count = Annotated[int, Strict(), Field(ge=1)]
+Text = Annotated[str, Strict()]
+Name = Annotated[str, Strict(), StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+
+
+class Section(BaseModel):
+    """A mapping of known keys; nothing else is accepted, nothing can be changed later."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value: Any) -> Any:
+        if isinstance(value, cls):
+            return value
+        known = {info.alias or name: info for name, info in cls.model_fields.items()}
+        if not isinstance(value, Mapping):
+            raise CaseProblem(
+                (),
+                got="nothing" if value is None else f"'{value}'"[:80],
+                expected=f"a mapping with the keys: {one_of(known)}",
+                hint="indent the keys below this one, or write {key: value, ...}.",
+            )
+        for key in value:
+            if key not in known:
+                otherwise = "remove it, or check its indentation."
+                if str(key)[:1].isdigit():
+                    otherwise = "a comma separates keys: use a point as decimal sign."
+                raise CaseProblem(
+                    (key,),
+                    got=f"the unknown key '{key}'",
+                    expected=f"one of: {one_of(known)}",
+                    hint=nearest(str(key), known, otherwise),
+                    on_key=True,
+                )
+        for key, info in known.items():
+            if info.is_required() and key not in value:
+                raise CaseProblem(
+                    (),
+                    got=f"no key '{key}'",
+                    expected=f"{key}: {(info.description or '').rstrip('.')}",
+                    hint=f"add '{key}' here; klack schema describes every key.",
+                )
+        return value
+
+    def _exactly_one(self, names: tuple[str, ...], what: str) -> str:
+        """Name of the only one of these keys that is given; raise if none or several are."""
+        given = [name for name in names if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise CaseProblem(
+                (),
+                got=f"{' and '.join(given)} together" if given else "none of them",
+                expected=f"exactly one of {one_of(names)} ({what})",
+                hint=f"keep one of {one_of(given)}." if given else f"add one, e.g. {names[0]}.",
+            )
+        return given[0]
+
+    def _refuse_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
+        """Raise if one of the keys ``names`` is given although ``chosen`` has no use for it."""
+        for name in names:
+            if getattr(self, name) is not None:
+                raise CaseProblem(
+                    (name,),
+                    got=f"{name} together with {chosen}",
+                    expected=f"no {name}: {why}",
+                    hint=f"remove {name}.",
+                    on_key=True,
+                )
+        return self

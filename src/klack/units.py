@@ -1,0 +1,301 @@
+"""Quantities with units at the door: text such as ``80 um`` in, SI numbers inside.
+
+Inside klack every number is SI; only case files and tables meet units.  A number without a unit is
+refused where a unit matters, because a wrong guess there is a factor of a thousand that nobody
+sees.  Units that differ by 2 pi (rad/s and Hz) or are all "without dimension" (deg, rad, %) are
+taken from short tables instead of by dimension, so that one cannot pass for the other.
+"""
+
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from math import isfinite, pi
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, WithJsonSchema
+
+from klack.errors import InputError
+
+__all__ = [
+    "KINDS",
+    "Angle",
+    "Damping",
+    "Density",
+    "Force",
+    "Frequency",
+    "Kind",
+    "Length",
+    "LengthUnit",
+    "Pressure",
+    "Rate",
+    "Ratio",
+    "Speed",
+    "Stiffness",
+    "Time",
+    "format_si",
+    "parse_quantity",
+]
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_ATOM = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)-?\d(?:\.\d)?)?"
+# no brackets and no powers of powers: the unit is evaluated, and 9**9**9 would take for ever
+_UNIT = rf"(?:1 ?/ ?)?{_ATOM}(?: ?[*/·] ?{_ATOM}| {_ATOM})*"
+_QUANTITY = re.compile(rf"(?P<number>{_NUMBER}) ?(?P<unit>{_UNIT})?")
+_LONGEST = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A physical kind of quantity.
+
+    Parameters
+    ----------
+    name : str
+        With its article, as an error says it: ``"a length"``.
+    unit : str
+        SI unit of the number that klack computes with.
+    example : str
+    common : tuple of str
+        Units that an error proposes.
+    factors : mapping of str to float
+        Complete list of accepted units, for kinds that their dimension does not tell apart.
+    bare : bool
+        True if a number without a unit is meant.
+    """
+
+    name: str
+    unit: str
+    example: str
+    common: tuple[str, ...]
+    factors: dict[str, float] = field(default_factory=dict)
+    bare: bool = False
+
+
+LENGTH = Kind("a length", "m", "80 um", ("m", "cm", "mm", "um", "nm", "inch"))
+SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"))
+TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"))
+FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
+STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"))
+PRESSURE = Kind("a pressure", "Pa", "210 GPa", ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"))
+DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3", ("kg/m^3", "g/cm^3", "kg/dm^3"))
+DAMPING = Kind("a viscous damping", "N s/m", "20 N s/m", ("N s/m", "N s/mm", "kg/s"))
+ANGLE = Kind(
+    "an angle",
+    "rad",
+    "40 deg",
+    ("deg", "rad"),
+    {"deg": pi / 180, "degree": pi / 180, "°": pi / 180, "rad": 1.0, "mrad": 1e-3},
+)
+FREQUENCY = Kind(
+    "a frequency",
+    "Hz",
+    "900 kHz",
+    ("Hz", "kHz", "MHz"),
+    {"mHz": 1e-3, "Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "GHz": 1e9},
+)
+RATE = Kind(
+    "a rate",
+    "1/s",
+    "50 1/s",
+    ("1/s", "1/ms"),
+    {"1/s": 1.0, "s^-1": 1.0, "1/ms": 1e3, "1/us": 1e6},
+)
+RATIO = Kind(
+    "a number without unit",
+    "-",
+    "0.3",
+    ("%",),
+    {"%": 0.01, "percent": 0.01, "ppm": 1e-6},
+    bare=True,
+)
+
+KINDS = (
+    LENGTH,
+    SPEED,
+    TIME,
+    FORCE,
+    STIFFNESS,
+    PRESSURE,
+    DENSITY,
+    DAMPING,
+    ANGLE,
+    FREQUENCY,
+    RATE,
+    RATIO,
+)
+
+
+def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
+    """Turn ``"80 um"`` into SI; a bare 0 passes, any other bare number needs a unit.
+
+    Parameters
+    ----------
+    value : str, int or float
+        What the user wrote.
+    kind : Kind
+    where : str
+        Key or argument, for the error.
+
+    Returns
+    -------
+    float [``kind.unit``]
+
+    Examples
+    --------
+    >>> parse_quantity("80 um", LENGTH)
+    8e-05
+    >>> parse_quantity("7.85 g/cm^3", DENSITY)
+    7850.0
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise _refuse(where, value, kind, f"write a number and its unit, e.g. {kind.example}.")
+    if not isinstance(value, str):
+        number, unit = float(value), ""
+    else:
+        number, unit = _split(value, kind, where)
+    if not isfinite(number):
+        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+    if not unit:
+        if number != 0 and not kind.bare:
+            raise _refuse(
+                where, value, kind, f'add a unit, e.g. "{kind.example}".', " without unit"
+            )
+        return number
+    result = number * _factor(value, unit, kind, where)
+    if not isfinite(result):
+        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+    # a decimal input stays decimal: 80 * 1e-6 must read 8e-05, not 7.999999999999999e-05
+    return result if kind.factors else float(f"{result:.15g}")
+
+
+def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
+    squeezed = " ".join(text.split())
+    match = _QUANTITY.fullmatch(squeezed) if len(squeezed) <= _LONGEST else None
+    if match is None:
+        hint = f'write one number and one unit, e.g. "{kind.example}".'
+        if re.match(r"[+-]?\d+,\d", squeezed):
+            hint = f'use a point as decimal sign: "{squeezed.replace(",", ".", 1)}".'
+        elif re.search(r"[A-Za-z][23]$", squeezed):
+            hint = f"write a power with ^: {squeezed[:-1]}^{squeezed[-1]}."
+        raise _refuse(where, text, kind, hint)
+    return float(match["number"]), match["unit"] or ""
+
+
+def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
+    """SI value of one ``unit``."""
+    if kind.factors:
+        known = {name.replace(" ", ""): factor for name, factor in kind.factors.items()}
+        plain = unit.replace(" ", "").replace("**", "^")
+        if plain in known:
+            return known[plain]
+        raise _refuse(where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit))
+    import pint
+
+    registry = _registry()
+    try:
+        return float(registry.Quantity(1.0, unit).to(kind.unit).magnitude)
+    except pint.DimensionalityError:
+        hint = f"use one of: {', '.join(kind.common)}."
+        raise _refuse(where, value, kind, hint, _came(unit)) from None
+    except Exception:  # pint evaluates the text and lets errors of tokenize and others through
+        hint = f"use one of: {', '.join(kind.common)} (upper and lower case matter)."
+        raise _refuse(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
+
+
+def _came(unit: str) -> str:
+    """Name the kind that ``unit`` belongs to, as `` (a pressure)``."""
+    plain = unit.replace(" ", "")
+    for kind in KINDS:
+        if plain in kind.factors:
+            return f" ({kind.name})"
+    registry = _registry()
+    try:
+        dimension = registry.parse_units(unit).dimensionality
+    except Exception:  # pint evaluates the text and lets errors of tokenize and others through
+        return f" with the unknown unit '{unit}'"
+    for kind in KINDS:
+        if not kind.factors and registry.parse_units(kind.unit).dimensionality == dimension:
+            return f" ({kind.name})"
+    return ""
+
+
+@cache
+def _registry() -> Any:
+    """Build the unit registry of pint when the first unit is read (0.4 s with its import)."""
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _refuse(where: str, value: object, kind: Kind, hint: str, came: str = "") -> InputError:
+    shown = f"'{value}'" if isinstance(value, str) else str(value)
+    if len(shown) > _LONGEST + 20:
+        shown = shown[:_LONGEST] + "...'"
+    with_unit = kind.name if kind.bare else f"{kind.name} with its unit"
+    return InputError(where, got=f"{shown}{came}", expected=with_unit, hint=hint)
+
+
+def format_si(value: float, unit: str, digits: int = 4) -> str:
+    """Write a number with a decimal prefix, as people read it.
+
+    Parameters
+    ----------
+    value : float
+        In ``unit``.
+    unit : str
+        SI unit without prefix; ``"-"`` or ``""`` writes the plain number.
+    digits : int
+        Significant digits.
+
+    Examples
+    --------
+    >>> format_si(3.6e-6, "m"), format_si(1.25e9, "N/m"), format_si(0.0, "N")
+    ('3.6 um', '1.25 GN/m', '0 N')
+    """
+    if unit in ("", "-"):
+        return f"{value:.{digits}g}"
+    if value == 0 or not isfinite(value):
+        return f"{value:g} {unit}"
+    rounded = abs(float(f"{value:.{digits}g}"))
+    prefixes = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+    if unit.startswith("kg") or "^" in unit.split("/")[0]:
+        return f"{value:.{digits}g} {unit}"
+    power = next((p for p in sorted(prefixes, reverse=True) if rounded >= 10.0**p), -15)
+    return f"{value / 10.0**power:.{digits}g} {prefixes[power]}{unit}"
+
+
+def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
+    """Pydantic metadata of a field that takes this kind and holds SI."""
+    schema = {
+        "type": ["string", "number"],
+        "description": f"{kind.name}, e.g. {kind.example}",
+        "examples": [kind.example],
+    }
+    return BeforeValidator(lambda value: parse_quantity(value, kind)), WithJsonSchema(schema)
+
+
+def _length_unit(value: object) -> float:
+    """Metres in one of the unit that a file or an outline is drawn in: ``mm`` -> 0.001."""
+    if not isinstance(value, str) or not re.fullmatch(_ATOM, value):
+        hint = "write the unit alone: mm."
+        raise InputError("unit", got=f"'{value}'", expected="a unit of length", hint=hint)
+    return parse_quantity(f"1 {value}", LENGTH)
+
+
+Length = Annotated[float, *_typed(LENGTH)]
+Speed = Annotated[float, *_typed(SPEED)]
+Time = Annotated[float, *_typed(TIME)]
+Force = Annotated[float, *_typed(FORCE)]
+Stiffness = Annotated[float, *_typed(STIFFNESS)]
+Pressure = Annotated[float, *_typed(PRESSURE)]
+Density = Annotated[float, *_typed(DENSITY)]
+Damping = Annotated[float, *_typed(DAMPING)]
+Angle = Annotated[float, *_typed(ANGLE)]
+Frequency = Annotated[float, *_typed(FREQUENCY)]
+Rate = Annotated[float, *_typed(RATE)]
+Ratio = Annotated[float, *_typed(RATIO)]
+LengthUnit = Annotated[
+    float,
+    BeforeValidator(_length_unit),
+    WithJsonSchema({"type": "string", "examples": ["mm", "m", "inch"]}),
+]
