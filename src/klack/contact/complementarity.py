@@ -114,7 +114,7 @@ class ComplementaritySolver:
         )
 
     def _forces(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the forces that close exactly the active gaps, in the order of the active points."""
+        """Return the forces that close the active gaps, in the order of the active points."""
         if not np.array_equal(active, self._set):
             self._factorise(active)
         if not len(self._active):
