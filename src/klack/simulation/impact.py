@@ -1,0 +1,317 @@
+"""Integrate a system of reduced bodies and keep the books of its energy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.errors import ConvergenceError, InputError, require_positive
+from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
+from klack.simulation.contact_step import law_potential
+from klack.simulation.kernel import STATUS_FINE, run_steps
+from klack.simulation.system import ReducedSystem
+
+__all__ = ["SystemRecord", "simulate", "simulate_impact"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SystemRecord:
+    """Records of all contacts and bodies on ``n`` uniform intervals.
+
+    Parameters
+    ----------
+    system : ReducedSystem
+    integration_step, step : float [s]
+        Of the integration, and of the records.
+    force, peak_force, gap : array, shape (n, contacts) [N], [N], [m]
+        Mean force, largest force of a step, mean gap of each interval.
+    displacement : array, shape (n + 1, contacts, 2) [m]
+        Of port a and port b of each contact, from the start.
+    velocity : array, shape (n + 1, bodies) [m/s]
+        Centre of mass along z; zero for a supported body.
+    external_force : array, shape (n, bodies) [N]
+        Mean axial force of constant forces and springs, + in z.
+    final_position, final_velocity : tuple of array
+        Modal coordinates of each body at the end, in its own modes.
+    ledger : EnergyLedger
+    """
+
+    system: ReducedSystem
+    integration_step: float
+    step: float
+    force: NDArray[np.float64]
+    peak_force: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    external_force: NDArray[np.float64]
+    final_position: tuple[NDArray[np.float64], ...]
+    final_velocity: tuple[NDArray[np.float64], ...]
+    ledger: EnergyLedger
+
+    def impact(self, contact: int = 0) -> ImpactHistory:
+        """Return the history of one contact.
+
+        Parameters
+        ----------
+        contact : int
+            Its place among ``system.contacts``.
+        """
+        pair = self.system.contacts[contact]
+        names = [body.name for body in self.system.bodies]
+        a, b = names.index(pair.body_a), names.index(pair.body_b)
+        body_a, body_b = self.system.bodies[a], self.system.bodies[b]
+        elastic = body_a.omega[body_a.rigid_count :]
+        return ImpactHistory(
+            step=self.step,
+            force=self.force[:, contact],
+            peak_force=self.peak_force[:, contact],
+            gap=self.gap[:, contact],
+            velocity_a=self.velocity[:, a],
+            velocity_b=self.velocity[:, b],
+            displacement_a=self.displacement[:, contact, 0],
+            displacement_b=self.displacement[:, contact, 1],
+            external_force=self.external_force[:, a],
+            speed=float(self.velocity[0, b] - self.velocity[0, a]),
+            mass_a=body_a.mass,
+            mass_b=body_b.mass if body_b.rigid_count else np.inf,
+            longest_period=2.0 * pi / float(elastic.min()) if elastic.size else 0.0,
+            ledger=self.ledger,
+            solver=f"modal, discrete gradient, {self.integration_step * 1e9:g} ns",
+        )
+
+
+def simulate(
+    system: ReducedSystem,
+    *,
+    velocities: Mapping[str, float],
+    step: float,
+    duration: float,
+    steps_per_record: int = 1,
+) -> SystemRecord:
+    """Integrate a system from its gaps at the start.
+
+    Parameters
+    ----------
+    system : ReducedSystem
+    velocities : mapping of body name to float [m/s]
+        Axial velocity at the start, + in z; bodies not named are at rest.
+    step : float [s]
+        Of the integration, see :func:`klack.simulation.compile.propose_step`.
+    duration : float [s]
+        Rounded up to whole records.
+    steps_per_record : int
+        Records keep the mean force (the impulse is exact) and the largest force of a step.
+
+    Raises
+    ------
+    ConvergenceError
+        When the forces of several contacts do not settle.
+    """
+    require_positive("simulate: step", step, "s")
+    require_positive("simulate: duration", duration, "s")
+    require_positive("simulate: steps_per_record", steps_per_record, "steps")
+    for name in velocities:
+        if system.body(name).rigid_count == 0:
+            raise InputError(
+                f"simulate: velocity of '{name}'",
+                got="a supported body",
+                expected="a free body",
+                hint="only bodies without support can move as a whole.",
+            )
+    flat = flatten(system, velocities, step)
+    records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
+    contacts, bodies = len(system.contacts), len(system.bodies)
+    q, v = np.zeros(flat.v.size), flat.v.copy()
+    force, peak, gap = (np.zeros((records, contacts)) for _ in range(3))
+    out_q, out_v = np.zeros((records + 1, 2 * contacts)), np.zeros((records + 1, bodies))
+    out_v[0] = flat.watch_v @ v
+    books = np.zeros(3 + 2 * contacts)
+    status = run_steps(
+        float(step),
+        int(steps_per_record),
+        q,
+        v,
+        flat.A,
+        flat.B,
+        flat.P,
+        flat.rows,
+        flat.gap_offset,
+        flat.G,
+        flat.push_index,
+        flat.push,
+        flat.push_gap,
+        flat.law_kind,
+        flat.law_data,
+        flat.law_start,
+        flat.alpha,
+        flat.series,
+        flat.damped,
+        flat.damped_weight,
+        flat.damped_loss,
+        flat.watch_q,
+        flat.watch_q_force,
+        flat.watch_v,
+        flat.watch_v_force,
+        force,
+        peak,
+        gap,
+        out_q,
+        out_v,
+        books,
+    )
+    if status != STATUS_FINE:
+        raise ConvergenceError(
+            f"simulate: the forces of {contacts} contacts did not settle within a step of "
+            f"{step:g} s.\nTry: a tenth of the step."
+        )
+    if not np.all(np.isfinite(out_v[-1])):
+        raise ConvergenceError(
+            "simulate: the motion is not finite.\nTry: check the bodies and laws for nan and inf."
+        )
+    positions, speeds = [], []
+    for block in flat.blocks:
+        own = slice(block.first, block.last)
+        positions.append(block.basis @ (q[own] + block.rest))
+        speeds.append(block.basis @ v[own])
+    return SystemRecord(
+        system=system,
+        integration_step=float(step),
+        step=float(step) * steps_per_record,
+        force=force,
+        peak_force=peak,
+        gap=gap,
+        displacement=out_q.reshape(records + 1, contacts, 2),
+        velocity=out_v,
+        external_force=_external_forces(system, flat, records, step * steps_per_record, out_v),
+        final_position=tuple(positions),
+        final_velocity=tuple(speeds),
+        ledger=_ledger(flat, positions, speeds, books),
+    )
+
+
+def simulate_impact(
+    system: ReducedSystem,
+    *,
+    speed: float,
+    duration: float,
+    step: float | None = None,
+    steps_per_record: int = 1,
+    contact: int = 0,
+) -> ImpactHistory:
+    """Let the upper body of a contact fly onto the lower one.
+
+    Parameters
+    ----------
+    system : ReducedSystem
+    speed : float [m/s]
+        Of body a of the contact, in -z; everything else is at rest.
+    duration : float [s]
+    step : float [s] or None
+        ``None``: :func:`klack.simulation.compile.propose_step`.
+    steps_per_record : int
+    contact : int
+        Which contact is returned.
+
+    Examples
+    --------
+    A rigid mass on a linear spring leaves as fast as it came:
+
+    >>> from klack.contact.laws import LinearLaw
+    >>> from klack.simulation.bodies import fixed_body, rigid_mass_body
+    >>> from klack.simulation.system import ContactPair
+    >>> pair = ContactPair(
+    ...     body_a="needle", port_a="contact", body_b="seat", port_b="contact",
+    ...     law=LinearLaw(1e9), gap=1e-6,
+    ... )
+    >>> system = ReducedSystem(
+    ...     bodies=(rigid_mass_body("needle", 2e-3), fixed_body("seat")), contacts=(pair,)
+    ... )
+    >>> history = simulate_impact(system, speed=0.5, duration=20e-6)
+    >>> round(history.velocity_a[-1], 12)
+    np.float64(0.5)
+    """
+    require_positive("simulate_impact: speed", speed, "m/s")
+    record = simulate(
+        system,
+        velocities={system.contacts[contact].body_a: -speed},
+        step=propose_step(system, speed=speed) if step is None else step,
+        duration=duration,
+        steps_per_record=steps_per_record,
+    )
+    return record.impact(contact)
+
+
+def _ledger(
+    flat: FlatSystem,
+    positions: list[NDArray[np.float64]],
+    speeds: list[NDArray[np.float64]],
+    books: NDArray[np.float64],
+) -> EnergyLedger:
+    initial, work, spring, bodies = 0.0, 0.0, 0.0, []
+    for block, q, v in zip(flat.blocks, positions, speeds, strict=True):
+        q0, v0 = block.basis @ block.rest, block.basis @ flat.v[block.first : block.last]
+        initial += _body_energy(block, q0, v0).total
+        bodies.append(_body_energy(block, q, v))
+        work += float(block.constant @ (q - q0))
+        for phi, stiffness, preload in block.springs:
+            y0, y = float(phi @ q0), float(phi @ q)
+            spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
+    contact = 0.0
+    for c in range(flat.rows.shape[0]):
+        gap, e = books[3 + 2 * c], books[4 + 2 * c]
+        contact += law_potential(flat.law_kind[c], flat.law_data, flat.law_start[c], -gap - e)
+        contact += 0.5 * e**2 / flat.series[c] if e else 0.0
+    return EnergyLedger(
+        initial=initial,
+        bodies=tuple(bodies),
+        contact=float(contact),
+        contact_dissipation=float(books[0] + books[1]),
+        damping=float(books[2]),
+        work=work,
+        spring=spring,
+    )
+
+
+def _body_energy(
+    block: BodyBlock, q: NDArray[np.float64], v: NDArray[np.float64]
+) -> BodyEnergy:
+    body, rigid = block.body, block.body.rigid_count
+    strain = 0.5 * (body.omega * q) ** 2
+    translation = 0.5 * float(body.rigid_axial @ v[:rigid]) ** 2 / body.mass
+    modal = 0.5 * v[rigid:] ** 2 + strain[rigid:]
+    other_rigid = 0.5 * float(v[:rigid] @ v[:rigid]) - translation
+    return BodyEnergy(
+        name=body.name,
+        translation=translation,
+        vibration=float(modal.sum()) + other_rigid,
+        strain=float(strain.sum()),
+        frequency=body.omega[rigid:] / (2.0 * pi),
+        modal=modal,
+    )
+
+
+def _external_forces(
+    system: ReducedSystem,
+    flat: FlatSystem,
+    records: int,
+    step: float,
+    velocity: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Mean axial force on each body; the springs see the motion of the centre of mass."""
+    out = np.zeros((records, len(system.bodies)))
+    for k, block in enumerate(flat.blocks):
+        body, rigid = block.body, block.body.rigid_count
+        if not rigid:
+            continue
+        out[:, k] += float(block.constant[:rigid] @ body.rigid_axial)
+        for phi, stiffness, preload in block.springs:
+            lever = float(phi[:rigid] @ body.rigid_axial)
+            travel = np.concatenate(
+                ([0.0], np.cumsum(0.5 * (velocity[1:, k] + velocity[:-1, k]) * step))
+            )
+            out[:, k] -= lever * (preload + stiffness * lever * 0.5 * (travel[1:] + travel[:-1]))
+    return out

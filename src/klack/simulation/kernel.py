@@ -1,0 +1,336 @@
+"""The time loop: exact modes, discrete-gradient contacts, decimated records, energy books.
+
+Everything is a flat array; :mod:`klack.simulation.system` builds them.  One step is one pass over the
+modes (free motion, with the contact force of the step before folded in) and a scalar equation for each
+contact that is closed or closes.
+"""
+
+import numpy as np
+from numba import njit
+
+from klack.simulation.contact_step import solve_step
+
+__all__ = ["STATUS_CONTACTS", "STATUS_FINE", "run_steps"]
+
+STATUS_FINE, STATUS_CONTACTS = 0, 1
+_SWEEP_LIMIT = 500
+_SWEEP_ACCEPTED = 1e-17  # [m]
+_SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
+_FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
+
+
+@njit(cache=True, fastmath=_FAST)
+def _free(q, v, A, row):
+    """Free motion over a step, in place; returns ``row . q``."""
+    y = 0.0
+    for i in range(q.size):
+        qi = A[0, i] * q[i] + A[1, i] * v[i]
+        v[i] = A[2, i] * q[i] + A[3, i] * v[i]
+        q[i] = qi
+        y += row[i] * qi
+    return y
+
+
+@njit(cache=True, fastmath=_FAST)
+def _forced(q, v, A, row, P, F):
+    """Free motion after the modal force ``F P`` of the step before; returns ``row . q``."""
+    y = 0.0
+    for i in range(q.size):
+        qi = A[0, i] * q[i] + A[1, i] * v[i] + P[0, i] * F
+        v[i] = A[2, i] * q[i] + A[3, i] * v[i] + P[1, i] * F
+        q[i] = qi
+        y += row[i] * qi
+    return y
+
+
+@njit(cache=True, fastmath=_FAST)
+def _dot(a, b):
+    y = 0.0
+    for i in range(a.size):
+        y += a[i] * b[i]
+    return y
+
+
+@njit(cache=True, fastmath=_FAST)
+def _copy(q, v, q0, v0):
+    for i in range(q.size):
+        q0[i] = q[i]
+        v0[i] = v[i]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _modal_force(rows, F, f):
+    for i in range(f.size):
+        f[i] = rows[0, i] * F[0]
+    for c in range(1, F.size):
+        for i in range(f.size):
+            f[i] += rows[c, i] * F[c]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _damped_energy(q, v, B, f, W):
+    """Energy of the damped modes after the pending modal force ``f``."""
+    total = 0.0
+    for i in range(q.size):
+        qi = q[i] + B[0, i] * f[i]
+        vi = v[i] + B[1, i] * f[i]
+        total += W[0, i] * qi * qi + W[1, i] * vi * vi
+    return total
+
+
+@njit(cache=True, fastmath=_FAST)
+def _damping_loss(q, v, B, f_before, f, Q):
+    """Loss of one step that started after the pending ``f_before`` and had the modal force ``f``."""
+    total = 0.0
+    for i in range(q.size):
+        qi = q[i] + B[0, i] * f_before[i]
+        vi = v[i] + B[1, i] * f_before[i]
+        total += Q[0, i] * qi * qi + Q[1, i] * qi * vi + Q[2, i] * vi * vi
+        total += f[i] * (Q[3, i] * qi + Q[4, i] * vi + Q[5, i] * f[i])
+    return total
+
+
+@njit(cache=True)
+def run_steps(
+    h,
+    steps_per_record,
+    q,
+    v,
+    A,
+    B,
+    P,
+    rows,
+    gap_offset,
+    G,
+    push_index,
+    push,
+    push_gap,
+    law_kind,
+    law_data,
+    law_start,
+    alpha,
+    series,
+    damped,
+    damped_weight,
+    damped_loss,
+    watch_q,
+    watch_q_force,
+    watch_v,
+    watch_v_force,
+    out_force,
+    out_peak,
+    out_gap,
+    out_q,
+    out_v,
+    books,
+):
+    """Integrate ``out_force.shape[0]`` records of ``steps_per_record`` steps, in place.
+
+    Parameters
+    ----------
+    h : float [s]
+    q, v : array (m,)
+        Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
+        position under the constant forces.
+    A, B, P : array (4, m), (2, m), (2, m)
+        Step matrices ``A11, A12, A21, A22`` and ``B1, B2``; ``P = A B``.
+    rows : array (c, m)
+        ``gap = gap_offset + rows . q``; the modal force of contact ``c`` is ``rows[c] F[c]``.
+    gap_offset : array (c,)
+    G : array (c, c)
+        ``rows B1 rows^T``: gap at the end of a step from unit forces during the step.
+    push_index, push, push_gap : int array (p,), array (2, p), array (c,)
+        Modes with a constant force, what it adds to ``q, v`` in a step, and to the free gaps.
+    law_kind, law_data, law_start, alpha, series : arrays
+        One law per contact as flat numbers; dissipation factor; compliance in series [m/N].
+    damped : bool
+    damped_weight, damped_loss : array (2, m), (6, m)
+        Energy weights of the damped modes (zero for the others) and their loss forms.
+    watch_q, watch_v : array (k, m), (l, m)
+        What is recorded at the ends of records; ``watch_*_force`` (k, c), (l, c): effect of unit
+        contact forces of the last step.
+    out_force, out_peak, out_gap : array (n, c)
+        Mean force, largest step force, mean gap of each record.
+    out_q, out_v : array (n + 1, k), (n + 1, l)
+        Row 0 is filled in by the caller.
+    books : array (3 + 2 c,)
+        Out: contact dissipation, loss at release of a series spring, modal damping loss; then for
+        each contact the last gap and the last compression of its series spring.
+
+    Returns
+    -------
+    int
+        ``STATUS_FINE`` or ``STATUS_CONTACTS`` (the forces of several contacts did not settle).
+    """
+    contacts = rows.shape[0]
+    modes = q.size
+    F = np.zeros(contacts)
+    F_before = np.zeros(contacts)
+    f = np.zeros(modes)
+    f_before = np.zeros(modes)
+    q0 = np.zeros(modes)
+    v0 = np.zeros(modes)
+    pending_rows = np.zeros((2, modes))
+    hint = np.zeros(contacts, np.int64)
+    gap = np.zeros(contacts)
+    free = np.zeros(contacts)
+    e = np.zeros(contacts)
+    chi = np.zeros(contacts)
+    approaching = np.ones(contacts, np.bool_)
+    one = contacts == 1
+    if one:
+        for i in range(modes):
+            pending_rows[0, i] = P[0, i] * rows[0, i]
+            pending_rows[1, i] = P[1, i] * rows[0, i]
+    for c in range(contacts):
+        gap[c] = gap_offset[c] + _dot(rows[c], q)
+    pending = False
+    in_flight = True
+    flight_energy = _damped_energy(q, v, B, f, damped_weight) if damped else 0.0
+    contact_loss, release_loss, damping = 0.0, 0.0, 0.0
+
+    for record in range(out_force.shape[0]):
+        for c in range(contacts):
+            out_gap[record, c] = 0.0
+            out_force[record, c] = 0.0
+            out_peak[record, c] = 0.0
+        for _ in range(steps_per_record):
+            if damped:
+                _copy(q, v, q0, v0)
+            if not pending:
+                free[0] = _free(q, v, A, rows[0])
+            elif one:
+                free[0] = _forced(q, v, A, rows[0], pending_rows, F[0])
+            else:
+                for i in range(modes):
+                    pending_rows[0, i] = P[0, i] * f[i]
+                    pending_rows[1, i] = P[1, i] * f[i]
+                free[0] = _forced(q, v, A, rows[0], pending_rows, 1.0)
+            for k in range(push_index.size):
+                i = push_index[k]
+                q[i] += push[0, k]
+                v[i] += push[1, k]
+            free[0] += gap_offset[0] + push_gap[0]
+            for c in range(1, contacts):
+                free[c] = gap_offset[c] + _dot(rows[c], q)
+
+            near = False
+            for c in range(contacts):
+                F_before[c] = F[c]
+                if gap[c] + e[c] < 0.0 or free[c] - e[c] < 0.0:
+                    near = True
+            closed = False
+            if near:
+                for c in range(contacts):
+                    if alpha[c] > 0.0 and approaching[c] and free[c] < 0.0:
+                        # mean rate of the gap over the step of onset: no force has acted yet
+                        chi[c] = alpha[c] * h / max(gap[c] - free[c], 1e-30)
+                        approaching[c] = False
+                for sweep in range(_SWEEP_LIMIT):
+                    change = 0.0
+                    lost = 0.0
+                    for c in range(contacts):
+                        df = e[c] - free[c]
+                        for other in range(contacts):
+                            if other != c:
+                                df -= G[c, other] * F[other]
+                        d0 = -gap[c] - e[c]
+                        own = G[c, c] + 2.0 * series[c]
+                        force, hint[c], loss = solve_step(
+                            law_kind[c],
+                            law_data,
+                            law_start[c],
+                            chi[c] / h,
+                            own,
+                            d0,
+                            df,
+                            F[c],
+                            hint[c],
+                        )
+                        change = max(change, abs(force - F[c]) * own)
+                        lost += loss
+                        F[c] = force
+                    if one or change < _SWEEP_ACCEPTED:
+                        break
+                    if sweep == _SWEEP_LIMIT - 1:
+                        return STATUS_CONTACTS
+                contact_loss += lost
+                for c in range(contacts):
+                    if F[c] > 0.0:
+                        closed = True
+            else:
+                for c in range(contacts):
+                    F[c] = 0.0
+
+            if damped:
+                # flight: energy at its two ends; contact: the exact loss of each step
+                if closed:
+                    for i in range(modes):
+                        f_before[i] = f[i]
+                    if in_flight:
+                        damping += flight_energy - _damped_energy(
+                            q0, v0, B, f_before, damped_weight
+                        )
+                        in_flight = False
+                    _modal_force(rows, F, f)
+                    damping += _damping_loss(q0, v0, B, f_before, f, damped_loss)
+                elif not in_flight:
+                    # the step that has just gone was the first of the flight
+                    flight_energy = _damped_energy(q0, v0, B, f, damped_weight)
+                    in_flight = True
+                    f[:] = 0.0
+            elif closed and not one:
+                _modal_force(rows, F, f)
+            pending = closed
+
+            for c in range(contacts):
+                before = gap[c]
+                after = free[c]
+                if closed:
+                    for other in range(contacts):
+                        after += G[c, other] * F[other]
+                if F[c] > 0.0:
+                    e[c] = 2.0 * series[c] * F[c] - e[c]
+                    out_force[record, c] += F[c]
+                    if F[c] > out_peak[record, c]:
+                        out_peak[record, c] = F[c]
+                elif e[c] != 0.0:
+                    release_loss += 0.5 * e[c] * e[c] / series[c]
+                    e[c] = 0.0
+                if after > _SEPARATED:
+                    approaching[c] = True
+                    chi[c] = 0.0
+                gap[c] = after
+                out_gap[record, c] += 0.5 * (before + after)
+
+        for c in range(contacts):
+            out_force[record, c] /= steps_per_record
+            out_gap[record, c] /= steps_per_record
+        for k in range(watch_q.shape[0]):
+            y = _dot(watch_q[k], q)
+            if pending:
+                for c in range(contacts):
+                    y += watch_q_force[k, c] * F[c]
+            out_q[record + 1, k] = y
+        for k in range(watch_v.shape[0]):
+            y = _dot(watch_v[k], v)
+            if pending:
+                for c in range(contacts):
+                    y += watch_v_force[k, c] * F[c]
+            out_v[record + 1, k] = y
+
+    if pending:
+        _modal_force(rows, F, f)
+        for i in range(modes):
+            q[i] += B[0, i] * f[i]
+            v[i] += B[1, i] * f[i]
+    if damped and in_flight:
+        f[:] = 0.0
+        damping += flight_energy - _damped_energy(q, v, B, f, damped_weight)
+    books[0] = contact_loss
+    books[1] = release_loss
+    books[2] = damping
+    for c in range(contacts):
+        books[3 + 2 * c] = gap[c]
+        books[4 + 2 * c] = e[c]
+    return STATUS_FINE

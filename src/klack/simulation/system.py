@@ -1,0 +1,162 @@
+"""What takes part in an impact: reduced bodies, contacts, constant forces, springs to ground."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.laws import ContactLaw
+from klack.errors import InputError, require_nonnegative
+from klack.reduction.reduced_body import ReducedBody
+
+__all__ = ["AxialForce", "ContactPair", "ReducedSystem", "ReturnSpring"]
+
+_UNIT_TRANSLATION = 1e-6  # accepted deviation of a contact port from 1 under unit axial motion
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactPair:
+    """Contact between a port of an upper body ``a`` and a port of a lower body ``b``.
+
+    ``gap = gap_0 + y_a - y_b`` with ``y`` the port displacements along **+z**; the force, never
+    below zero, pushes a in +z and b in -z.
+
+    Parameters
+    ----------
+    body_a, port_a, body_b, port_b : str
+        Both ports point along +z (a contact port made of ``G_b^T lam`` must be turned round).
+    law : LinearLaw, HertzLaw, TableLaw or HuntCrossley
+        Of the compliance that neither the modes nor ``series_compliance`` carry.
+    gap : float [m]
+        At the start.
+    series_compliance : float [m/N]
+        Massless linear compliance in series with the law, with its own state.
+    """
+
+    body_a: str
+    port_a: str
+    body_b: str
+    port_b: str
+    law: ContactLaw
+    gap: float
+    series_compliance: float = 0.0
+
+    def __post_init__(self) -> None:
+        where = f"contact {self.body_a}.{self.port_a} on {self.body_b}.{self.port_b}"
+        require_nonnegative(f"{where}: gap", self.gap, "m")
+        require_nonnegative(f"{where}: series_compliance", self.series_compliance, "m/N")
+        if self.body_a == self.body_b:
+            raise InputError(
+                where,
+                got="the same body twice",
+                expected="two bodies",
+                hint="contacts join two different bodies.",
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AxialForce:
+    """Constant force along +z.
+
+    Parameters
+    ----------
+    body : str
+    force : float [N]
+        Negative presses a needle onto its seat.
+    port : str or None
+        Where it acts; ``None`` spreads it over the mass, like weight.
+    """
+
+    body: str
+    force: float
+    port: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReturnSpring:
+    """Spring between a port and the ground: force ``-(preload + stiffness * y)`` along +z.
+
+    Parameters
+    ----------
+    body, port : str
+    stiffness : float [N/m]
+    preload : float [N]
+        Force in -z at the start.
+    """
+
+    body: str
+    port: str
+    stiffness: float
+    preload: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_nonnegative(f"spring on '{self.body}': stiffness", self.stiffness, "N/m")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedSystem:
+    """Bodies with modes, and all that acts between and on them.
+
+    Parameters
+    ----------
+    bodies : tuple of ReducedBody
+        Distinct names.
+    contacts : tuple of ContactPair
+        At least one.
+    forces : tuple of AxialForce
+    springs : tuple of ReturnSpring
+    """
+
+    bodies: tuple[ReducedBody, ...]
+    contacts: tuple[ContactPair, ...]
+    forces: tuple[AxialForce, ...] = field(default=())
+    springs: tuple[ReturnSpring, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        if len(set(names)) != len(names) or not self.contacts:
+            raise InputError(
+                "ReducedSystem",
+                got=f"bodies {', '.join(names)} and {len(self.contacts)} contacts",
+                expected="distinct names and at least one contact",
+                hint="rename a body or add a ContactPair.",
+            )
+        for contact in self.contacts:
+            self._check_axial(contact.body_a, contact.port_a)
+            self._check_axial(contact.body_b, contact.port_b)
+        for spring in self.springs:
+            self.body(spring.body).port_index(spring.port)
+        for force in self.forces:
+            body = self.body(force.body)
+            if force.port is not None:
+                body.port_index(force.port)
+
+    def body(self, name: str) -> ReducedBody:
+        """Return the body of that name."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise InputError(
+            "ReducedSystem: body",
+            got=f"'{name}'",
+            expected=f"one of: {', '.join(body.name for body in self.bodies)}",
+            hint="contacts, forces and springs name a body of the system.",
+        )
+
+    def shape(self, body: str, port: str) -> NDArray[np.float64]:
+        """Return the modal amplitudes of a port, shape (m,)."""
+        owner = self.body(body)
+        return np.asarray(owner.port_shapes)[:, owner.port_index(port)]
+
+    def _check_axial(self, name: str, port: str) -> None:
+        body, phi = self.body(name), self.shape(name, port)
+        if body.rigid_count == 0:
+            return
+        unit = float(phi[: body.rigid_count] @ body.rigid_axial)
+        if abs(unit - 1.0) > _UNIT_TRANSLATION:
+            raise InputError(
+                f"contact port '{port}' of body '{name}'",
+                got=f"{unit:.6g} m of port displacement per metre of motion along +z",
+                expected="1",
+                hint="the load pattern of a contact port has a resultant of 1 N along +z.",
+            )
