@@ -17,7 +17,7 @@ from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, matching_curves, plane_face
 from klack.mesh.profile import Profile
-from klack.mesh.quality import require_positive_jacobians
+from klack.mesh.quality import require_connected, require_positive_jacobians
 from klack.mesh.sizing import MeshSizing, disc_points
 
 __all__ = ["mesh_meridian"]
@@ -90,6 +90,7 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
         surfaces=surfaces,
         node_sets=node_sets,
     )
+    require_connected("mesh_meridian", mesh)
     require_positive_jacobians("mesh_meridian", mesh)
     return mesh
 
@@ -104,7 +105,7 @@ def _triangulate(profiles: Mapping[str, Profile], sizing: MeshSizing) -> _Triang
         face.faces.name = str(i)
         faces.append(face)
     shape = glue(faces)
-    _require_one_piece(profiles, shape)
+    _require_no_overlap(profiles, shape)
     candidates = [curve for profile in profiles.values() for curve in profile.curves]
     curves = []
     for k, edge in enumerate(shape.edges):
@@ -122,11 +123,12 @@ def _triangulate(profiles: Mapping[str, Profile], sizing: MeshSizing) -> _Triang
     return _read_netgen(mesh, tuple(curves))
 
 
-def _require_one_piece(profiles: Mapping[str, Profile], shape: Any) -> None:
-    """Solids must neither overlap nor lie apart."""
+def _require_no_overlap(profiles: Mapping[str, Profile], shape: Any) -> None:
+    """Every profile must be one region, and no region be there twice."""
     expected = sum(profile.area for profile in profiles.values()) * MM**2
-    if len(shape.faces) != len(profiles) or abs(shape.mass - expected) > 1e-6 * expected:
-        regions = f"{len(shape.faces)} regions of {shape.mass:.6g} mm^2"
+    area = sum(face.mass for face in shape.faces)
+    if len(shape.faces) != len(profiles) or abs(area - expected) > 1e-6 * expected:
+        regions = f"{len(shape.faces)} regions of {area:.6g} mm^2"
         raise InputError(
             "mesh_meridian: profiles",
             got=f"{regions} from {len(profiles)} profiles",

@@ -106,11 +106,21 @@ class MeshSizing:
                 )
 
 
+# Spacing of the points at which netgen is told the size, per size: at 1 its octree leaves cells
+# out, and boundary edges of a ring vary by 30 %; at 0.5 by less than 1 %.
+_SPACING = 0.5
+
+
+def _steps(refinement: Refinement) -> NDArray[np.float64]:
+    h = _SPACING * refinement.size
+    count = int(np.ceil(refinement.radius / h))
+    return h * np.arange(-count, count + 1)
+
+
 def disc_points(refinement: Refinement) -> NDArray[np.float64]:
     """Lattice over the disc of a ring refinement in the meridian, shape (n, 2) [m]."""
-    h, radius = refinement.size, refinement.radius
-    count = int(np.ceil(radius / h))
-    steps = h * np.arange(-count, count + 1)
+    radius = refinement.radius
+    steps = _steps(refinement)
     offsets = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
     offsets = offsets[np.hypot(*offsets.T) <= radius * (1 + 1e-12)]
     return np.asarray(refinement.position) + offsets
@@ -118,7 +128,7 @@ def disc_points(refinement: Refinement) -> NDArray[np.float64]:
 
 def ball_points(refinement: Refinement) -> NDArray[np.float64]:
     """Lattice over the ball (point) or torus (ring) of a refinement, shape (n, 3) [m]."""
-    h, radius = refinement.size, refinement.radius
+    h, radius = _SPACING * refinement.size, refinement.radius
     if refinement.is_ring:
         disc = disc_points(refinement)
         rows = []
@@ -126,8 +136,7 @@ def ball_points(refinement: Refinement) -> NDArray[np.float64]:
             angle = np.linspace(0, 2 * np.pi, max(1, int(np.ceil(2 * np.pi * r / h))), False)
             rows.append(np.column_stack([r * np.cos(angle), r * np.sin(angle), 0 * angle + z]))
         return np.concatenate(rows)
-    count = int(np.ceil(radius / h))
-    steps = h * np.arange(-count, count + 1)
+    steps = _steps(refinement)
     offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     offsets = offsets[np.linalg.norm(offsets, axis=1) <= radius * (1 + 1e-12)]
     return np.asarray(refinement.position) + offsets
