@@ -1,0 +1,95 @@
+"""``klack impact``: one dry impact at one or several levels."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads
+from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.cli.progress import show_progress
+from klack.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from klack.workflow.study import ImpactStudy
+
+__all__ = ["impact", "run_case"]
+
+
+def impact(
+    case: CaseArgument,
+    /,
+    *,
+    level: Levels = None,
+    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    out: Out = None,
+    json: Json = None,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> int:
+    """Compute one impact; several levels are compared with each other."""
+    run_case(case, level, report=report, out=out, json=json, threads=threads, quiet=quiet)
+    return 0
+
+
+def run_case(
+    case: Path,
+    level: list[str] | None,
+    *,
+    report: bool,
+    out: Path | None,
+    json: Path | None,
+    threads: int | None,
+    quiet: bool,
+) -> Path:
+    """Run a case, write and print what came out; return the folder of the results."""
+    from klack.case import find_case, load_case
+    from klack.errors import require_positive
+
+    require_json_target(json)
+    if threads is not None:
+        require_positive("--threads", threads, "cores")
+    checked = load_case(find_case(case))
+    levels = checked.require_levels(level if level else checked.run.levels)
+    folder = out if out is not None else Path("klack-results") / checked.name
+    require_folder(folder)
+
+    from klack.workflow.impact import run_impact
+    from klack.workflow.store import save_study
+    from klack.workflow.summary import study_to_json
+
+    with show_progress(quiet) as progress:
+        study = run_impact(checked, levels=levels, progress=progress, threads=threads)
+        with staged_folder(folder) as stage:
+            progress("result", 0.0)
+            save_study(study, stage)
+            if report:
+                progress("report", 0.0)
+                write_reports(study, stage)
+    if not quiet:
+        _print_study(study, folder, report, to_stderr=str(json) == "-")
+    if json is not None:
+        write_json(json, study_to_json(study))
+    return folder
+
+
+def write_reports(study: "ImpactStudy", folder: Path) -> None:
+    """Write the report of a study as HTML and as PDF."""
+    from klack.report.html import write_report
+    from klack.report.pdf import write_pdf
+
+    write_report(study, folder / "report.html")
+    write_pdf(study, folder / "report.pdf")
+
+
+def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
+    import sys
+
+    from klack.workflow.summary import SUMMARY_COLUMNS, summary_rows
+
+    print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for warning in study.warnings:
+        print(f"Note: {warning}", file=stream)
+    made = "result.zarr" + (", report.html, report.pdf" if report else "")
+    print(f"Results in {folder}: {made}", file=stream)

@@ -1,0 +1,97 @@
+"""The command ``klack``: what can be asked, and the exit code of each answer.
+
+Nothing heavy is imported here or at the top of the command modules, so that ``--help`` is quick.
+
+===== =================================================================================
+code  meaning
+===== =================================================================================
+0     done
+1     a check failed, or an iteration did not converge
+2     bad input: one message that names file, line, key, what came, what was expected
+70    a mistake of klack itself; the traceback is printed
+130   stopped by Ctrl-C; nothing half written is left
+===== =================================================================================
+"""
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+from klack import __version__
+from klack.cli import demo, impact, reduce, report, schema, verify
+from klack.errors import ConvergenceError, KlackError
+
+__all__ = ["app", "main"]
+
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_BUG, EXIT_STOPPED = 0, 1, 2, 70, 130
+
+app = App(
+    name="klack",
+    help="Predict how a valve needle hits its end stops.",
+    version=f"klack {__version__}",
+    version_flags=["--version"],
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+app.command(demo.demo)
+app.command(impact.impact)
+app.command(reduce.reduce)
+app.command(report.report)
+app.command(verify.verify)
+app.command(schema.schema)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        Arguments after ``klack``; those of the process by default.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    name = " ".join(["klack", *(a for a in arguments[:1] if not a.startswith("-"))])
+    try:
+        code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
+        sys.stdout.flush()
+        return code if isinstance(code, int) else EXIT_OK
+    except CycloptsError as error:
+        return _complain(f"{name}: {_one_line(error)}\nTry: {_help_of(name)}", EXIT_BAD_INPUT)
+    except ConvergenceError as error:
+        return _complain(f"{name}: {error}", EXIT_FAILED)
+    except KlackError as error:
+        return _complain(f"{name}: {error}", EXIT_BAD_INPUT)
+    except MemoryError:
+        text = "the memory of this machine is used up.\nTry: larger elements, or fewer modes."
+        return _complain(f"{name}: {text}", EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain(f"{name}: stopped; nothing was written.", EXIT_STOPPED)
+    except BrokenPipeError:
+        # the reader of our output went away (klack schema | head); python would complain at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
+    except Exception:  # a bug: show all of it, but keep the code apart from the others
+        traceback.print_exc()
+        text = "this is a mistake of klack itself, not of your input; please report the text above."
+        return _complain(f"{name}: {text}", EXIT_BUG)
+
+
+def _complain(text: str, code: int) -> int:
+    print(text, file=sys.stderr)
+    return code
+
+
+def _one_line(error: CycloptsError) -> str:
+    return " ".join(str(error).split())
+
+
+def _help_of(name: str) -> str:
+    known = name.removeprefix("klack").strip() in app
+    return f"{name if known else 'klack'} --help"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

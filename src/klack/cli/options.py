@@ -1,0 +1,36 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+__all__ = ["CaseArgument", "Json", "Levels", "Out", "Quiet", "Threads"]
+
+CaseArgument = Annotated[
+    Path, Parameter(name="CASE", help="Case file (YAML), or the name of a shipped case.")
+]
+Json = Annotated[
+    Path | None,
+    Parameter(name="--json", help="Write plain numbers in SI to this file; - for the terminal."),
+]
+Out = Annotated[
+    Path | None,
+    Parameter(name="--out", help="Folder for the results. [default: klack-results/NAME]"),
+]
+Quiet = Annotated[
+    bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress and no tables.")
+]
+Threads = Annotated[
+    int | None, Parameter(name="--threads", help="Processor cores to use. [default: all]")
+]
+Levels = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--level",
+        consume_multiple=True,
+        negative="",
+        help="lumped, reduced, reduced-attachment, reduced-none, reduced-participation, full; "
+        "several are compared. [default: as in the case]",
+    ),
+]

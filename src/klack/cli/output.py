@@ -1,0 +1,95 @@
+"""Files that a command leaves behind: whole or not at all."""
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from klack.errors import InputError
+
+__all__ = ["require_folder", "require_json_target", "staged_folder", "write_json"]
+
+
+def require_json_target(path: Path | None) -> None:
+    """Refuse a target of ``--json`` that cannot be written, before the long work begins."""
+    if path is None or str(path) == "-":
+        return
+    if path.is_dir():
+        raise _refuse("--json", path, "a folder", "the name of a file")
+    if not path.absolute().parent.is_dir():
+        raise _refuse(
+            "--json", path, "a file in a folder that does not exist", "an existing folder"
+        )
+    target = path if path.exists() else path.absolute().parent
+    if not os.access(target, os.W_OK):
+        raise _refuse("--json", path, "a place that may not be written to", "a writable file")
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write plain numbers; ``-`` is the standard output."""
+    text = json.dumps(data, indent=2, allow_nan=False) + "\n"
+    if str(path) == "-":
+        sys.stdout.write(text)
+        return
+    if path.exists() and not path.is_file():  # /dev/stdout, a named pipe
+        path.write_text(text, encoding="utf-8")
+        return
+    new = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        new.write_text(text, encoding="utf-8")
+        os.replace(new, path)
+    except OSError as error:
+        raise _refuse("--json", path, f"an error: {error.strerror}", "a writable file") from None
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a target of ``--out`` that cannot be written, before the long work begins."""
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise _refuse("--out", folder, f"a path through the file {existing}", "a folder")
+    if not os.access(existing, os.W_OK):
+        raise _refuse("--out", folder, "a place that may not be written to", "a writable folder")
+
+
+@contextmanager
+def staged_folder(folder: Path) -> Iterator[Path]:
+    """Give a hidden folder whose contents move to ``folder`` when all of them are complete.
+
+    What stands in ``folder`` under the same names is replaced, everything else there stays.
+    """
+    made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
+    stage = folder / f".new.{os.getpid()}"
+    try:
+        stage.mkdir(parents=True)
+        yield stage
+        for item in sorted(stage.iterdir()):
+            _replace(item, folder / item.name)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise _refuse("--out", folder, f"an error: {reason}", "a folder to write to") from error
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        for path in made:  # innermost first; stays if the results are inside
+            try:
+                path.rmdir()
+            except OSError:
+                break
+
+
+def _replace(new: Path, target: Path) -> None:
+    """Move a file or folder to its place; a folder there is put aside first."""
+    aside = new.with_name(f"old.{target.name}")
+    if target.is_dir() and not target.is_symlink():
+        target.rename(aside)
+    os.replace(new, target)
+
+
+def _refuse(option: str, path: Path, got: str, expected: str) -> InputError:
+    hint = "check the path and the space that is left; '-' writes JSON to the terminal."
+    return InputError(f"{option} {path}", got=got, expected=expected, hint=hint)

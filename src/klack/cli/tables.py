@@ -1,0 +1,40 @@
+"""Tables on the terminal."""
+
+import sys
+from collections.abc import Iterable, Sequence
+
+__all__ = ["Colour", "print_table"]
+
+Colour = dict[str, str]
+_WIDE = 160  # where no terminal limits the width
+
+
+def print_table(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    left: int = 1,
+    to_stderr: bool = False,
+) -> None:
+    """Print rows of text; the first ``left`` columns are words, the others numbers.
+
+    The words ``ok`` and ``FAILED`` get their colours on a terminal that has some.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    stream = sys.stderr if to_stderr else sys.stdout
+    console = Console(file=stream, width=None if stream.isatty() else _WIDE)
+    table = Table(title=Text(title), box=SIMPLE_HEAD, title_justify="left")
+    for i, column in enumerate(columns):
+        words = i < left
+        table.add_column(column, justify="left" if words else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell, style=_STYLES.get(cell, "")) for cell in row))
+    console.print(table)
+
+
+_STYLES = {"ok": "green", "FAILED": "bold red"}
