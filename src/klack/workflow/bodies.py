@@ -1,0 +1,192 @@
+"""From a case to two meshed, placed and supported elastic bodies."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from klack.case.geometry import MeshSettings
+from klack.case.schema import Case, CaseBody
+from klack.contact.mortar import touching_shift
+from klack.contact.pairing import axial_distance
+from klack.elasticity.body import ElasticBody, elastic_body
+from klack.errors import InputError
+from klack.mesh.abaqus import read_abaqus
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.sizing import MeshSizing, Refinement
+from klack.mesh.solid import mesh_revolved, mesh_step
+from klack.mesh.supports import sector_nodes, surface_nodes
+from klack.mesh.swept import sweep
+from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.workflow.progress import Progress
+
+__all__ = ["BodyPair", "build_bodies"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyPair:
+    """The two bodies of a case, placed for the start of the motion.
+
+    Parameters
+    ----------
+    upper, lower : ElasticBody
+        The moving body and the one that it hits.
+    upper_surface, lower_surface : Surface
+        Where they meet.
+    shift : float [m]
+        Translation of the upper body along z from where it was drawn.
+    """
+
+    upper: ElasticBody
+    lower: ElasticBody
+    upper_surface: Surface
+    lower_surface: Surface
+    shift: float
+
+
+def build_bodies(case: Case, progress: Progress) -> BodyPair:
+    """Mesh both bodies, place the upper one and assemble stiffness and mass.
+
+    Raises
+    ------
+    InputError
+        For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
+        drawn.
+    """
+    progress("mesh", 0.0)
+    moving, stop = case.contact.moving, case.contact.stop
+    touch = _first_touch(case)
+    upper = _mesh(case.moving_body, moving.body, touch.upper if touch else ())
+    lower = _mesh(case.stop_body, stop.body, touch.lower if touch else ())
+    upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
+    progress("mesh", 0.6)
+    shift = _shift(case, upper, upper_surface, lower, lower_surface)
+    upper = upper.moved(np.array([0.0] * (upper.dimension - 1) + [shift]))
+    progress("mesh", 1.0)
+    progress("assemble", 0.0)
+    bodies = []
+    for i, (name, mesh) in enumerate(((moving.body, upper), (stop.body, lower))):
+        bodies.append(
+            elastic_body(
+                name,
+                mesh,
+                case.materials_of(name, mesh.solids),
+                fixed_nodes=_fixed_nodes(case.bodies[name], mesh),
+            )
+        )
+        progress("assemble", (i + 1) / 2)
+    return BodyPair(
+        upper=bodies[0],
+        lower=bodies[1],
+        upper_surface=upper_surface,
+        lower_surface=lower_surface,
+        shift=shift,
+    )
+
+
+def _first_touch(case: Case) -> Touch | None:
+    """Where to refine; None when no body asks for a refinement at the contact."""
+    extents = [b.mesh.contact.extent for b in case.bodies.values() if b.mesh and b.mesh.contact]
+    if not extents:
+        return None
+    moving, stop = case.contact.moving, case.contact.stop
+    upper, lower = case.moving_body.geometry.profile, case.stop_body.geometry.profile
+    if upper is not None and lower is not None:
+        return first_touch_of_profiles(
+            upper.profiles().values(), moving.surface, lower.profiles().values(), stop.surface
+        )
+    # a first mesh without refinement tells where to refine
+    meshes = [_mesh(case.bodies[name], name, ()) for name in (moving.body, stop.body)]
+    return first_touch_of_meshes(
+        meshes[0],
+        meshes[0].surface(moving.surface),
+        meshes[1],
+        meshes[1].surface(stop.surface),
+        tolerance=min(extents) / 5.0,
+    )
+
+
+def _mesh(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
+    """Mesh of one body, refined at the given places ((r, z) or (x, y, z))."""
+    geometry = body.geometry
+    if geometry.mesh is not None:
+        solids = tuple(body.material) if isinstance(body.material, dict) else None
+        mesh = read_abaqus(geometry.mesh.file, geometry.mesh.unit, solids=solids)
+        _require_dimension(geometry.mesh.file, mesh, geometry.dimension)
+        return mesh
+    if body.mesh is None:  # refused by the schema already
+        raise InputError(
+            f"bodies.{name}", got="no element sizes", expected="mesh", hint="add mesh: {size: ...}."
+        )
+    if geometry.step is not None:
+        return mesh_step(geometry.step.file, _sizing(body.mesh, places))
+    if geometry.profile is None:
+        raise InputError(
+            f"bodies.{name}.geometry", got="no shape", expected="a profile", hint="draw one."
+        )
+    sizing = _sizing(body.mesh, tuple(_ring(at) for at in places))
+    profiles = geometry.profile.profiles()
+    if geometry.model == "solid":
+        return mesh_revolved(profiles, sizing)
+    meridian = mesh_meridian(profiles, sizing)
+    return meridian if geometry.layers is None else sweep(meridian, geometry.layers)
+
+
+def _ring(place: tuple[float, ...]) -> tuple[float, ...]:
+    """Ring (r, z) through a place."""
+    return (float(np.hypot(place[0], place[1])), place[2]) if len(place) == 3 else place
+
+
+def _require_dimension(file: Path, mesh: Mesh, dimension: int) -> None:
+    if mesh.dimension != dimension:
+        kind = {2: "axisymmetric (CAX)", 3: "three-dimensional (C3D)"}
+        raise InputError(
+            str(file),
+            got=f"{kind[mesh.dimension]} elements",
+            expected=f"{kind[dimension]} elements",
+            hint="say 'model: axisymmetric' in the geometry of a CAX mesh.",
+        )
+
+
+def _sizing(settings: MeshSettings, places: tuple[tuple[float, ...], ...]) -> MeshSizing:
+    refinements: tuple[Refinement, ...] = ()
+    if settings.contact is not None:
+        refinements = tuple(
+            Refinement(position=at, size=settings.contact.size, radius=settings.contact.extent)
+            for at in places
+        )
+    return MeshSizing(
+        size=settings.size,
+        surfaces=settings.surfaces,
+        refinements=refinements,
+        grading=settings.grading,
+    )
+
+
+def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface) -> float:
+    """Find the translation of the upper body along z [m] that gives the gap of the case."""
+    if case.contact.gap is not None:
+        return touching_shift(upper, surface, lower, other) + case.contact.gap
+    distance = axial_distance(upper, surface, lower, other)
+    if distance < 0:
+        raise InputError(
+            f"{case.path or 'case'}: contact",
+            got=f"bodies that penetrate by {-distance * 1e6:.3g} um as drawn",
+            expected="a distance of 0 or more between the two surfaces",
+            hint="give contact.gap (for example 0 um): the upper body is then moved there.",
+        )
+    return 0.0
+
+
+def _fixed_nodes(body: CaseBody, mesh: Mesh) -> np.ndarray:
+    held = [np.empty(0, dtype=np.int64)]
+    for support in body.fixed or ():
+        if support.sectors is None:
+            held.append(surface_nodes(mesh, support.surface))
+        else:
+            sectors = support.sectors
+            held.append(
+                sector_nodes(mesh, support.surface, sectors.count, sectors.width, sectors.first)
+            )
+    return np.unique(np.concatenate(held))
