@@ -47,7 +47,7 @@ def test_a_study_comes_back_to_the_last_bit(impact_study: ImpactStudy, tmp_path:
 def test_numbers_that_json_lacks_and_odd_names_come_back(
     lonely_study: ImpactStudy, tmp_path: Path
 ) -> None:
-    """inf (mass of a held body), nan (no separation), names with slashes and empty arrays."""
+    """Infinity (mass of a held body), nan (no separation), names with slashes and empty arrays."""
     measures = replace(lonely_study.levels["reduced"].measures, restitution=float("nan"))
     result = replace(lonely_study.levels["reduced"], measures=measures)
     odd = replace(

@@ -7,8 +7,6 @@ these is cut exactly.  Lines are drawn only where the plane crosses a side of an
 the picture shows the elements and not their division.
 """
 
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -180,22 +178,22 @@ def _divide(
     tets = []
     for face in family.faces:
         corners = nodes[:, face.nodes]
-        for triangle, table in _face_triangles(table, face.family, corners):
-            tets.append(np.column_stack([triangle, centre]))
+        table, triangles = _face_triangles(table, face.family, corners)
+        tets += [np.column_stack([triangle, centre]) for triangle in triangles]
     # the side opposite the centre (corner 3) is the element side
     outer = np.zeros((len(nodes) * len(tets), 4), dtype=bool)
     outer[:, 3] = True
     return table, np.concatenate(tets), outer
 
 
-def _face_triangles(table: Floats, family: str, nodes: Ints) -> list[tuple[Ints, Floats]]:
+def _face_triangles(table: Floats, family: str, nodes: Ints) -> tuple[Floats, list[Ints]]:
     """Triangles (f, 3) of a side, the same ones seen from both elements that share it."""
     if family in ("tri3", "tri6"):
-        return [(nodes[:, list(triangle)], table) for triangle in _TRIANGLES_OF[family]]
+        return table, [nodes[:, list(triangle)] for triangle in _TRIANGLES_OF[family]]
     centre, table = _append(table, nodes, _middle_weights(FAMILIES[family]))
     ring = [0, 4, 1, 5, 2, 6, 3, 7] if family == "quad8" else [0, 1, 2, 3]
     pairs = zip(ring, ring[1:] + ring[:1], strict=True)
-    return [(np.column_stack([nodes[:, a], nodes[:, b], centre]), table) for a, b in pairs]
+    return table, [np.column_stack([nodes[:, a], nodes[:, b], centre]) for a, b in pairs]
 
 
 def _middle_weights(family: ElementFamily) -> Floats:
@@ -220,9 +218,7 @@ def _sides_on(tets: Ints, faces: list[frozenset[int]]) -> NDArray[np.bool_]:
     )
 
 
-def _cut(
-    table: Floats, tets: Ints, outer: NDArray[np.bool_]
-) -> tuple[Floats, Ints, Ints]:
+def _cut(table: Floats, tets: Ints, outer: NDArray[np.bool_]) -> tuple[Floats, Ints, Ints]:
     """Cut tetrahedra where column 2 of ``table`` changes sign.
 
     Returns the rows of the cut points, triangles and the segments on outer sides.

@@ -153,7 +153,7 @@ def _damaged(path: Path, got: str) -> InputError:
 def _write(parent: zarr.Group, name: str, value: Any) -> None:
     """Store a value that is or holds arrays or records as a child of ``parent``."""
     if isinstance(value, np.ndarray):
-        attributes = {"crc32": _checksum(value)}
+        attributes: dict[str, Any] = {"crc32": _checksum(value)}
         if name in _UNITS:
             attributes["unit"] = _UNITS[name]
         parent.create_array(name, data=np.ascontiguousarray(value), attributes=attributes)
@@ -271,7 +271,7 @@ def _is_mapping(hint: Any) -> bool:
 
 
 def _element(hint: Any, index: int) -> Any:
-    """Declared kind of the member ``index`` of a tuple or of a value of a mapping."""
+    """Kind declared for the member ``index`` of a tuple or of a value of a mapping."""
     arguments = get_args(hint)
     if not arguments:
         return Any

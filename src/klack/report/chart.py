@@ -1,0 +1,199 @@
+"""A chart described once, in the words of its reader, and drawn by any renderer.
+
+``klack.report.interactive`` draws it with plotly for the browser, ``klack.report.printed`` with
+matplotlib for paper.  Curves are told apart by line style as well as by colour, so that a black and
+white copy stays readable; the colours are those of Okabe & Ito (2008), safe for colour-blind eyes.
+"""
+
+from dataclasses import dataclass
+from math import ceil, floor, log10
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = [
+    "COLOURS",
+    "DASHES",
+    "AxisSpec",
+    "Band",
+    "BarChart",
+    "BarPart",
+    "Chart",
+    "Curve",
+    "Mark",
+    "Panel",
+    "stems",
+]
+
+Colour = Literal["black", "orange", "sky", "green", "yellow", "blue", "red", "pink", "grey"]
+Style = Literal["solid", "dashed", "dotted", "dashdot", "long"]
+
+COLOURS: dict[Colour, str] = {
+    "black": "#111111",
+    "orange": "#E69F00",
+    "sky": "#56B4E9",
+    "green": "#009E73",
+    "yellow": "#F0E442",
+    "blue": "#0072B2",
+    "red": "#D55E00",
+    "pink": "#CC79A7",
+    "grey": "#8A8F98",
+}
+
+DASHES: dict[Style, tuple[float, ...]] = {
+    "solid": (),
+    "dashed": (7, 3),
+    "dotted": (2, 2.5),
+    "dashdot": (9, 3, 2, 3),
+    "long": (14, 4),
+}
+"""Lengths in px of strokes and spaces."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisSpec:
+    """One axis: label, unit as printed, logarithmic or not, range in printed units."""
+
+    label: str
+    unit: str = ""
+    log: bool = False
+    range: tuple[float, float] | None = None
+
+    @property
+    def text(self) -> str:
+        """Label with its unit, for example ``time [us]``."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    @property
+    def ticks(self) -> tuple[float, ...]:
+        """Round values 1, 2, 5, 10 ... of a logarithmic axis with a range; else none.
+
+        >>> AxisSpec(label="frequency", log=True, range=(3.0, 60.0)).ticks
+        (5.0, 10.0, 20.0, 50.0)
+        """
+        if not self.log or self.range is None:
+            return ()
+        low, high = self.range
+        decades = range(floor(log10(low)), ceil(log10(high)) + 1)
+        steps = (1, 2, 5) if log10(high / low) < 3 else (1,)
+        # 1e-3 * 2 is not the float that 2e-3 is
+        values = [float(f"{step}e{power}") for power in decades for step in steps]
+        return tuple(value for value in values if low <= value <= high)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """One line: x and y in the units of the axes; nan breaks the line.
+
+    ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1) or ``points``.
+    A curve without ``label`` has no entry in the legend.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    label: str = ""
+    style: Style = "solid"
+    colour: Colour = "black"
+    width: float = 1.8
+    drawn: Literal["line", "steps", "points"] = "line"
+
+    def __post_init__(self) -> None:
+        if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:
+            raise InputError(
+                f"curve '{self.label}'",
+                got=f"x of shape {np.shape(self.x)}, y of shape {np.shape(self.y)}",
+                expected="two equally long rows of numbers",
+                hint="the result may be damaged; compute it again.",
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Shaded range of x with a word on it."""
+
+    low: float
+    high: float
+    label: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """Thin line across the panel at one value of x or y."""
+
+    value: float
+    label: str = ""
+    axis: Literal["x", "y"] = "x"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One plot area; ``share`` is its height relative to the other panels of the chart."""
+
+    y: AxisSpec
+    curves: tuple[Curve, ...]
+    bands: tuple[Band, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """Panels above each other over one common x axis.
+
+    Parameters
+    ----------
+    name : str
+        Word for links and file names.
+    title : str
+        What is shown.
+    x : AxisSpec
+    panels : tuple of Panel
+        From top to bottom.
+    note : str
+        What the reader has to know and to look for.
+    """
+
+    name: str
+    title: str
+    x: AxisSpec
+    panels: tuple[Panel, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BarPart:
+    r"""One share of every bar, in the unit of the axis; ``hatch`` is one of ``/ \ x . - | +``."""
+
+    label: str
+    values: tuple[float, ...]
+    colour: Colour
+    hatch: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BarChart:
+    """Lying stacked bars, one per row, from top to bottom."""
+
+    name: str
+    title: str
+    x: AxisSpec
+    rows: tuple[str, ...]
+    parts: tuple[BarPart, ...]
+    note: str = ""
+
+
+def stems(
+    x: NDArray[np.float64], y: NDArray[np.float64], floor: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Upright strokes from ``floor`` to each point, as the x and y of one broken line.
+
+    >>> x, y = stems(np.array([1.0, 2.0]), np.array([5.0, 6.0]), 0.0)
+    >>> [float(v) for v in y]
+    [0.0, 5.0, nan, 0.0, 6.0, nan]
+    """
+    gap = np.full_like(x, np.nan)
+    low = np.full_like(y, floor)
+    return np.column_stack([x, x, gap]).ravel(), np.column_stack([low, y, gap]).ravel()

@@ -1,0 +1,382 @@
+"""What an impact report says, before it is laid out: the same words for screen and paper.
+
+Everything here is plain text; each renderer escapes it in its own way, because titles, names and
+the text of the case come from the user.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from klack.report.chart import BarChart, Chart
+from klack.report.figures import charts
+from klack.report.section_figure import SectionFigure, section_figure
+from klack.report.wording import answer, count, listed, quantity, share, signed, signed_share
+from klack.workflow.study import BodySummary, ImpactStudy, LevelResult
+
+__all__ = ["Content", "Section", "Table", "report_content"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Header and rows of text; the first column names the row.
+
+    What follows a line break in a cell is printed smaller.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A heading with what belongs under it, in this order: text, picture, charts, tables."""
+
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    picture: SectionFigure | None = None
+    charts: tuple[Chart | BarChart, ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """All of a report.
+
+    Parameters
+    ----------
+    title, subtitle, description, answer : str
+    numbers : Table
+        The key numbers per level.
+    warnings : tuple of str
+    sections : tuple of Section
+    definitions, limits : tuple of (term, text)
+    case_text : str
+    versions : str
+    """
+
+    title: str
+    subtitle: str
+    description: str
+    answer: str
+    numbers: Table
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...]
+    definitions: tuple[tuple[str, str], ...]
+    limits: tuple[tuple[str, str], ...]
+    case_text: str
+    versions: str
+
+
+def report_content(study: ImpactStudy) -> Content:
+    """Put a study into words, tables and figures."""
+    found = charts(study)
+    by_name = {chart.name: chart for chart in found}
+    transfer = tuple(chart for chart in found if chart.name.startswith("transfer-"))
+
+    def named(*names: str) -> tuple[Chart | BarChart, ...]:
+        return tuple(by_name[name] for name in names if name in by_name)
+
+    sections = [_computed(study)]
+    if study.sections:
+        sections.append(Section(title="The bodies at peak force", picture=section_figure(study)))
+    sections.append(Section(title="Force over time", charts=named("force")))
+    sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
+    if transfer:
+        sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
+    sections.append(Section(title="Local contact law", charts=named("law", "approach")))
+    sections.append(
+        Section(title="Energy", charts=named("energy", "modes"), tables=(_energy_table(study),))
+    )
+    sections.append(Section(title="Motion", charts=named("motion")))
+    sections.append(Section(title="Computing time", tables=(_stage_table(study),)))
+    libraries = [f"{name} {version}" for name, version in study.versions.items()]
+    return Content(
+        title=study.title or study.case,
+        subtitle=f"Dry impact · case {study.case} · {_date(study.created)} · klack {study.version}",
+        description=study.description,
+        answer=answer(study),
+        numbers=_number_table(study),
+        warnings=tuple(study.warnings),
+        sections=tuple(section for section in sections if _has_something(section)),
+        definitions=_definitions(study),
+        limits=_limits(study),
+        case_text=study.case_text,
+        versions=", ".join([f"klack {study.version}", *libraries]),
+    )
+
+
+def _date(created: str) -> str:
+    """``2025-01-31T12:00:00+00:00`` as ``2025-01-31 12:00 UTC``; other text as it came."""
+    try:
+        moment = datetime.fromisoformat(created)
+    except ValueError:
+        return created
+    return f"{moment:%Y-%m-%d %H:%M} {moment.tzname() or ''}".strip()
+
+
+def _has_something(section: Section) -> bool:
+    return bool(section.paragraphs or section.picture or section.charts or section.tables)
+
+
+# --------------------------------------------------------------------------- tables
+
+
+def _number_table(study: ImpactStudy) -> Table:
+    """Quantities down, levels across; the deviation from the reference stands below the value."""
+    names = [study.reference, *(name for name in study.levels if name != study.reference)]
+    results = [study.levels[name] for name in names]
+    rows = []
+    for title, text, deviation in _KEY_NUMBERS:
+        cells = []
+        for name, result in zip(names, results, strict=True):
+            cell = text(result)
+            if deviation is not None and name in study.deviations:
+                attribute, form = deviation
+                cell += "\n" + form(getattr(study.deviations[name], attribute))
+            cells.append(cell)
+        rows.append((title, *cells))
+    rows += _comparison_rows(study, names)
+    heads = [
+        result.label + ("\n(reference)" if name == study.reference and len(names) > 1 else "")
+        for name, result in zip(names, results, strict=True)
+    ]
+    return Table(columns=("", *heads), rows=tuple(rows))
+
+
+_KEY_NUMBERS: tuple[
+    tuple[
+        str,
+        Callable[[LevelResult], str],
+        tuple[str, Callable[[float], str]] | None,
+    ],
+    ...,
+] = (
+    (
+        "peak force",
+        lambda r: quantity(r.measures.peak_force, "N"),
+        ("peak_force", signed_share),
+    ),
+    (
+        "contact time",
+        lambda r: quantity(r.measures.contact_time, "s"),
+        ("contact_time", signed_share),
+    ),
+    ("impulse", lambda r: quantity(r.measures.impulse, "N s"), ("impulse", signed_share)),
+    (
+        "restitution",
+        lambda r: f"{r.measures.restitution:.4f}" if np.isfinite(r.measures.restitution) else "–",
+        ("restitution", lambda value: signed(value, 4)),
+    ),
+    ("rebound speed", lambda r: quantity(r.measures.rebound_speed, "m/s"), None),
+    ("vibration left behind", lambda r: share(r.measures.vibration_share), None),
+    ("contacts in the impact", lambda r: str(r.measures.sub_contacts), None),
+    ("energy residual", lambda r: f"{r.energy_residual:.1e}".replace("-", "\N{MINUS SIGN}"), None),
+    ("degrees of freedom", lambda r: count(r.degrees_of_freedom), None),
+    ("time step", lambda r: f"{quantity(r.step, 's', 3)}\n{count(r.steps)} steps", None),
+    ("computing time", lambda r: quantity(r.wall_time, "s", 3), None),
+    ("preparation", lambda r: quantity(r.setup_time, "s", 3), None),
+)
+
+
+def _comparison_rows(study: ImpactStudy, names: list[str]) -> list[tuple[str, ...]]:
+    """Deviations that are no number of one level alone."""
+    if not study.deviations:
+        return []
+    force, bands = ["force over time, deviation"], ["third-octave levels, deviation"]
+    for name in names:
+        deviation = study.deviations.get(name)
+        if deviation is None:
+            force.append("–")
+            bands.append("–")
+            continue
+        force.append(share(deviation.history_l2, 2))
+        level = deviation.third_octave_max_dB
+        bands.append(
+            f"{level:.2f} dB\nup to {quantity(deviation.third_octave_up_to_Hz, 'Hz', 3)}"
+            if np.isfinite(level)
+            else "–"
+        )
+    return [tuple(force), tuple(bands)]
+
+
+def _computed(study: ImpactStudy) -> Section:
+    contact, law = study.contact, study.law
+    bodies = Table(
+        columns=("", *(body.name for body in study.bodies)),
+        rows=tuple((title, *(text(body) for body in study.bodies)) for title, text in _BODY_ROWS),
+    )
+    facts = [
+        ("surfaces", contact.surfaces),
+        ("closing speed", f"{study.speed:.4g} m/s"),
+        ("gap at the start", quantity(study.gap, "m", 3)),
+        ("contact points", count(contact.points)),
+        ("half width at peak force", quantity(contact.half_width, "m", 3)),
+        (
+            "element size over half width",
+            f"{contact.size_ratio:.2f} ({_size_verdict(contact.size_ratio)})",
+        ),
+        ("local law", law.kind),
+    ]
+    return Section(
+        title="What was computed from what",
+        tables=(bodies, Table(columns=("contact", ""), rows=tuple(facts))),
+    )
+
+
+def _size_verdict(ratio: float) -> str:
+    if not np.isfinite(ratio):
+        return "not known"
+    return "good" if ratio <= 1 else "coarse" if ratio <= 1.5 else "too coarse"
+
+
+def _modes(body: BodySummary) -> str:
+    if not body.frequencies.size:
+        return "none"
+    low, high = (quantity(value, "Hz", 3) for value in body.frequencies[[0, -1]])
+    return f"{body.frequencies.size}\n{low} to {high}"
+
+
+_BODY_ROWS: tuple[tuple[str, Callable[[BodySummary], str]], ...] = (
+    ("model", lambda body: body.model),
+    ("geometry", lambda body: body.source),
+    ("support", lambda body: body.support),
+    ("material", lambda body: body.material),
+    ("mass", lambda body: quantity(1e3 * body.mass, "g")),
+    (
+        "mesh",
+        lambda body: (
+            f"{count(body.elements)} elements, {count(body.nodes)} nodes\n"
+            f"{count(body.dofs)} degrees of freedom"
+        ),
+    ),
+    ("kept elastic modes", _modes),
+    ("contact compliance in these modes", lambda body: share(body.compliance_share)),
+)
+
+
+def _energy_table(study: ImpactStudy) -> Table:
+    results = [study.levels[study.reference]]
+    results += [result for name, result in study.levels.items() if name != study.reference]
+    names = dict.fromkeys(name for result in results for name in result.energies)
+    rows = []
+    for name in names:
+        cells = []
+        for result in results:
+            initial = next(iter(result.energies.values()))
+            value = result.energies.get(name)
+            text = "–" if value is None else quantity(value, "J")
+            if value is not None and initial > 0:
+                text += f"\n{share(value / initial, 2)}"
+            cells.append(text)
+        rows.append((name, *cells))
+    residual = [f"{result.energy_residual:.1e}".replace("-", "−") for result in results]
+    rows.append(("residual of the ledger", *residual))
+    return Table(columns=("", *(result.label for result in results)), rows=tuple(rows))
+
+
+def _stage_table(study: ImpactStudy) -> Table:
+    rows = [(name, quantity(value, "s", 3)) for name, value in study.stage_times.items()]
+    rows.append(("whole study", quantity(study.wall_time, "s", 3)))
+    return Table(columns=("stage", "time"), rows=tuple(rows))
+
+
+# --------------------------------------------------------------------------- words
+
+
+def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    return (
+        ("peak force", "Largest contact force of any time step of the first impact."),
+        (
+            "contact time",
+            "From first touch to the end of the first uninterrupted contact. Both instants are "
+            "located inside the time steps.",
+        ),
+        (
+            "impulse",
+            "Integral of the contact force over the impact, with all contacts that follow each "
+            "other closely.",
+        ),
+        (
+            "restitution",
+            "Velocity of the centre of mass after the impact over that before it (relative "
+            "velocity of both centres where both are free). It is a result of the waves that stay "
+            "in the bodies, never an input, and not the velocity of a point on the surface.",
+        ),
+        (
+            "energy residual",
+            "Sum of all energies at the end minus those at the start, over the initial kinetic "
+            "energy. For the full order this is the loss of its time scheme.",
+        ),
+        (
+            "force over time, deviation",
+            "Root mean square difference from the reference during the contact, first touch "
+            "aligned, over the peak force of the reference.",
+        ),
+        (
+            "spectrum",
+            "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "
+            "f t) dt| in N s, without a window (the force begins and ends at zero), as a level "
+            "relative to 1 µN s. A third-octave level is that of the root mean square magnitude in "
+            "its band (IEC 61260-1, base ten).",
+        ),
+        (
+            "third-octave levels, deviation",
+            "Largest level difference over all bands within 40 dB of the highest one.",
+        ),
+        (
+            "local law",
+            "Force over indentation of the reduced contact. The consistent law is the static "
+            "approach of the complete bodies minus what the kept modes already yield.",
+        ),
+        (
+            "degrees of freedom",
+            "Of the time integration: free displacements of the full order; modes and rigid "
+            "motions of the reduced level.",
+        ),
+    )
+
+
+def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    tops = [
+        f"{quantity(float(body.frequencies[-1]), 'Hz', 3)} ({body.name})"
+        for body in study.bodies
+        if body.frequencies.size
+    ]
+    limits = [
+        (
+            "Physics",
+            "Linear elastic, isotropic bodies with small deformations; frictionless contact of "
+            "smooth surfaces; no fluid, no roughness, no plastic flow. Motion along the axis.",
+        ),
+        (
+            "Reduced level",
+            "One force along the axis with one pressure pattern. Eccentric, tilted or partial "
+            "contact is outside its assumption, and no number of modes makes up for that.",
+        ),
+        (
+            "Resolution",
+            f"The elements across the contact are {study.contact.size_ratio:.2g} half widths long; "
+            "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: agreement "
+            "between them says nothing about the error of the meshes themselves.",
+        ),
+    ]
+    if tops:
+        limits.append(
+            (
+                "Frequency",
+                f"The highest kept modes lie at {listed(tops)}. Above the lower of them the "
+                "reduced level follows the bodies only through their static compliance.",
+            )
+        )
+    limits.append(
+        (
+            "Damping",
+            "Losses in joints, fluid and material are contained only as far as the case gives "
+            "modal damping; the energy left in vibration therefore rings longer than in a real "
+            "valve.",
+        )
+    )
+    return tuple(limits)

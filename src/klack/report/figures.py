@@ -1,0 +1,396 @@
+"""The figures of an impact report, each built from a study by one function.
+
+Units on the axes are those of the workshop: us, N, um, kHz.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.history import ImpactHistory
+from klack.reduction.transfer import TransferComparison
+from klack.report.chart import (
+    AxisSpec,
+    BarChart,
+    BarPart,
+    Chart,
+    Colour,
+    Curve,
+    Mark,
+    Panel,
+    Style,
+    stems,
+)
+from klack.report.wording import quantity
+from klack.workflow.study import ImpactStudy, LevelResult
+
+__all__ = [
+    "approach_chart",
+    "charts",
+    "energy_bars",
+    "force_chart",
+    "law_chart",
+    "modal_energy_chart",
+    "motion_chart",
+    "transfer_chart",
+]
+
+Floats = NDArray[np.float64]
+Look = tuple[Colour, Style, float]
+
+_LOOKS: dict[str, Look] = {
+    "full": ("black", "solid", 2.4),
+    "reduced": ("red", "dashed", 2.2),
+    "reduced-participation": ("green", "long", 1.9),
+    "reduced-attachment": ("blue", "dashdot", 1.9),
+    "reduced-none": ("orange", "dotted", 1.9),
+    "lumped": ("pink", "dotted", 1.9),
+}
+_MORE_LOOKS: tuple[Look, ...] = (
+    ("red", "dashed", 1.6),
+    ("blue", "dashdot", 1.6),
+    ("green", "long", 1.6),
+    ("pink", "dotted", 1.8),
+    ("orange", "dashed", 1.6),
+    ("sky", "dashdot", 1.6),
+)
+_TIME = AxisSpec(label="time since first touch", unit="µs")
+_BODY_COLOURS: tuple[Colour, ...] = ("blue", "red", "green", "pink")
+_PART_LOOKS: tuple[tuple[Colour, str], ...] = (
+    ("blue", ""),
+    ("sky", "/"),
+    ("red", ""),
+    ("orange", "\\"),
+    ("green", ""),
+    ("pink", "x"),
+    ("yellow", "."),
+    ("grey", "-"),
+)
+
+
+def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
+    """Every figure that the study has data for, in the order of the report."""
+    found: list[Chart | BarChart] = [force_chart(study), motion_chart(study)]
+    found += [transfer_chart(comparison) for comparison in study.transfer]
+    found += [law_chart(study), approach_chart(study), energy_bars(study)]
+    if any(result.modal_energy for result in study.levels.values()):
+        found.append(modal_energy_chart(study))
+    return tuple(found)
+
+
+def _ordered(study: ImpactStudy) -> list[LevelResult]:
+    """Levels with the reference first, so that the others are drawn on top of it."""
+    others = [result for name, result in study.levels.items() if name != study.reference]
+    return [study.levels[study.reference], *others]
+
+
+def _look(level: str) -> Look:
+    return _LOOKS.get(level, ("grey", "dashed", 1.9))
+
+
+def _level_curve(x: Floats, y: Floats, result: LevelResult, label: bool = True) -> Curve:
+    colour, style, width = _look(result.level)
+    name = result.label if label else ""
+    return Curve(x=x, y=y, label=name, colour=colour, style=style, width=width)
+
+
+def _since_touch(result: LevelResult, time: Floats) -> Floats:
+    return 1e6 * (time - result.measures.first_touch)
+
+
+# --------------------------------------------------------------------------- time
+
+
+def force_chart(study: ImpactStudy) -> Chart:
+    """Contact force of all levels, and their difference from the reference below."""
+    results = _ordered(study)
+    longest = max(result.measures.total_contact_time for result in results)
+    limits = (-0.08e6 * longest, 1.25e6 * longest)
+    curves, differences = [], []
+    reference = results[0]
+    peak = reference.measures.peak_force
+    for result in results:
+        time = _since_touch(result, result.history.time)
+        seen = (time >= limits[0]) & (time <= limits[1])
+        curves.append(_level_curve(time[seen], result.history.force[seen], result))
+        if result is not reference:
+            expected = np.interp(
+                time[seen], _since_touch(reference, reference.history.time), reference.history.force
+            )
+            apart = 100 * (result.history.force[seen] - expected) / peak
+            differences.append(_level_curve(time[seen], apart, result, label=False))
+    panels = [Panel(y=AxisSpec(label="contact force", unit="N"), curves=tuple(curves))]
+    note = "First touch of every level is placed at zero."
+    if differences:
+        panels.append(
+            Panel(
+                y=AxisSpec(label="difference", unit="%"),
+                curves=tuple(differences),
+                marks=(Mark(value=0.0, axis="y"),),
+                share=0.5,
+            )
+        )
+        note += f" Below: difference from '{reference.label}', in per cent of its peak force."
+    return Chart(
+        name="force",
+        title="Contact force over time",
+        x=AxisSpec(label=_TIME.label, unit=_TIME.unit, range=limits),
+        panels=tuple(panels),
+        note=note,
+    )
+
+
+def motion_chart(study: ImpactStudy) -> Chart:
+    """Velocity of the needle's centre of mass and the way it has gone."""
+    velocities, ways = [], []
+    for result in _ordered(study):
+        history = result.history
+        time = _since_touch(result, history.edges)
+        velocities.append(_level_curve(time, history.velocity_a, result))
+        ways.append(_level_curve(time, 1e6 * _way(history, time), result, label=False))
+    needle = study.bodies[0].name
+    return Chart(
+        name="motion",
+        title=f"Motion of the centre of mass of the {needle}",
+        x=_TIME,
+        panels=(
+            Panel(
+                y=AxisSpec(label="velocity", unit="m/s"),
+                curves=tuple(velocities),
+                marks=(Mark(value=0.0, axis="y"),),
+            ),
+            Panel(
+                y=AxisSpec(label="lift", unit="µm"),
+                curves=tuple(ways),
+                marks=(Mark(value=0.0, axis="y"),),
+                share=0.8,
+            ),
+        ),
+        note=(
+            f"Negative velocity: the {needle} moves down, towards the other body. Lift is counted "
+            "from the position at first touch; the ratio of the velocities after and before the "
+            "contact is the restitution."
+        ),
+    )
+
+
+def _way(history: ImpactHistory, time: Floats) -> Floats:
+    """Integral of the velocity, zero at first touch [m]."""
+    mean = 0.5 * (history.velocity_a[1:] + history.velocity_a[:-1])
+    way = np.concatenate([[0.0], np.cumsum(mean) * history.step])
+    return way - np.interp(0.0, time, way)
+
+
+# --------------------------------------------------------------------------- reduction
+
+
+def transfer_chart(comparison: TransferComparison) -> Chart:
+    """Receptance of the full and the reduced bodies, and their difference below."""
+    frequency = 1e-3 * comparison.frequencies
+    curves, differences, marks = [], [], []
+    for i, label in enumerate(comparison.labels):
+        colour, style, width = _MORE_LOOKS[(i - 1) % len(_MORE_LOOKS)] if i else _LOOKS["full"]
+        magnitude = 1e9 * np.abs(comparison.curves[i])
+        curves.append(
+            Curve(x=frequency, y=magnitude, label=label, colour=colour, style=style, width=width)
+        )
+        if i == 0:
+            continue
+        deviation = np.maximum(comparison.mean_deviations[i], 1e-3)
+        differences.append(Curve(x=frequency, y=deviation, colour=colour, style=style, width=width))
+        limit = 1e-3 * float(comparison.valid_up_to[i])
+        if frequency[0] < limit < frequency[-1]:
+            marks.append(Mark(value=limit, label=f"{limit:.3g} kHz"))
+    top = max(float(curve.y.max()) for curve in differences) if differences else 10.0
+    return Chart(
+        name=f"transfer-{comparison.body}-{comparison.port}",
+        title=f"Transfer function of the {comparison.body} at '{comparison.port}'",
+        x=AxisSpec(
+            label="frequency",
+            unit="kHz",
+            log=True,
+            range=(float(frequency[0]), float(frequency[-1])),
+        ),
+        panels=(
+            Panel(
+                y=AxisSpec(label="displacement per force", unit="nm/N", log=True),
+                curves=tuple(curves),
+            ),
+            Panel(
+                y=AxisSpec(
+                    label="deviation", unit="dB", log=True, range=(0.01, max(10.0, 1.5 * top))
+                ),
+                curves=tuple(differences),
+                marks=(Mark(value=comparison.tolerance, axis="y"), *marks),
+                share=0.6,
+            ),
+        ),
+        note=(
+            "Above: displacement of the contact per harmonic force on it. Below: magnitude of the "
+            "level difference from the full body, averaged over a sliding third octave; the level "
+            f"line is at {comparison.tolerance:g} dB, an upright line marks where a reduced body "
+            "first exceeds it. Structural damping with a loss factor of "
+            f"{comparison.loss_factor:g} in every curve. {comparison.reference_note}"
+        ),
+    )
+
+
+def law_chart(study: ImpactStudy) -> Chart:
+    """Local contact law with its straight line and the classical stiffness."""
+    law = study.law
+    indentation = 1e6 * law.indentation
+    curves = [
+        Curve(
+            x=indentation,
+            y=law.force,
+            label=f"local law ({law.kind})",
+            colour="black",
+            width=2.4,
+        )
+    ]
+    low, high = law.fit_range
+    if np.isfinite(law.linear_stiffness) and law.linear_stiffness > 0:
+        force = np.array([low, high])
+        near = float(np.interp(0.5 * (low + high), law.force, indentation))
+        along = near + 1e6 * (force - force.mean()) / law.linear_stiffness
+        curves.append(
+            Curve(
+                x=along,
+                y=force,
+                label=f"straight line, {quantity(law.linear_stiffness, 'N/m', 3)}",
+                colour="red",
+                style="dashed",
+                width=2.0,
+            )
+        )
+    if np.isfinite(law.classical_stiffness) and law.classical_stiffness > 0:
+        force = np.array([0.0, float(law.force[-1])])
+        curves.append(
+            Curve(
+                x=1e6 * force / law.classical_stiffness,
+                y=force,
+                label=f"classical submodel, {quantity(law.classical_stiffness, 'N/m', 3)}",
+                colour="blue",
+                style="dashdot",
+                width=1.8,
+            )
+        )
+    note = (
+        "The law carries exactly the compliance that the kept modes leave out. The straight line "
+        f"is fitted between {low:.3g} and {high:.3g} N."
+    )
+    if len(curves) == 3 or np.isfinite(law.classical_stiffness):
+        note += (
+            " The classical stiffness is that of a static submodel of the contact region alone "
+            f"(radius {quantity(law.classical_size, 'm', 3)}); it belongs to modes with static "
+            "correction, not to bare modes."
+        )
+    return Chart(
+        name="law",
+        title="Local contact law of the reduced model",
+        x=AxisSpec(label="indentation", unit="µm"),
+        panels=(Panel(y=AxisSpec(label="force", unit="N"), curves=tuple(curves)),),
+        note=note,
+    )
+
+
+def approach_chart(study: ImpactStudy) -> Chart:
+    """Approach of the bodies under a static force, split into law and kept modes."""
+    contact, law = study.contact, study.law
+    local = 1e6 * np.interp(contact.force, law.force, law.indentation)
+    local[contact.force > law.force[-1]] = np.nan
+    total = 1e6 * contact.approach
+    panels = [
+        Panel(
+            y=AxisSpec(label="approach", unit="µm"),
+            curves=(
+                Curve(x=contact.force, y=total, label="both bodies, static", width=2.4),
+                Curve(
+                    x=contact.force,
+                    y=local,
+                    label="of it in the local law",
+                    colour="red",
+                    style="dashed",
+                    width=2.0,
+                ),
+            ),
+        )
+    ]
+    if np.size(law.share):
+        panels.append(
+            Panel(
+                y=AxisSpec(label="share of the law", unit="%", range=(0.0, 100.0)),
+                curves=(
+                    Curve(x=law.force, y=100 * law.share, colour="red", style="dashed", width=2.0),
+                ),
+                share=0.5,
+            )
+        )
+    return Chart(
+        name="approach",
+        title="Static approach of the two bodies",
+        x=AxisSpec(label="contact force", unit="N"),
+        panels=tuple(panels),
+        note=(
+            "Frictionless static contact of the two complete bodies, counted from first touch. "
+            "What the local law does not carry, the kept modes carry; between 20 and 80 % for the "
+            "law is a good division."
+        ),
+    )
+
+
+# --------------------------------------------------------------------------- energy
+
+
+def energy_bars(study: ImpactStudy) -> BarChart:
+    """Shares of the initial kinetic energy after separation, one bar per level."""
+    results = _ordered(study)
+    initial = [next(iter(result.energies.values())) for result in results]
+    names = dict.fromkeys(name for result in results for name in list(result.energies)[1:])
+    parts: list[BarPart] = []
+    for name in names:
+        values = tuple(
+            100 * float(result.energies.get(name, 0.0)) / start
+            for result, start in zip(results, initial, strict=True)
+        )
+        if max(map(abs, values)) > 0.05:
+            colour, hatch = _PART_LOOKS[len(parts) % len(_PART_LOOKS)]
+            parts.append(BarPart(label=name, values=values, colour=colour, hatch=hatch))
+    return BarChart(
+        name="energy",
+        title="Where the energy went",
+        x=AxisSpec(label="share of the initial kinetic energy", unit="%"),
+        rows=tuple(result.label for result in results),
+        parts=tuple(parts),
+        note="After separation. Shares below 0.05 % are in the table only.",
+    )
+
+
+def modal_energy_chart(study: ImpactStudy) -> Chart:
+    """Energy left in each mode, for the first level that has modes."""
+    result = next(result for result in _ordered(study) if result.modal_energy)
+    initial = next(iter(result.energies.values()))
+    largest = max(float(np.max(item.energy, initial=0.0)) for item in result.modal_energy)
+    top = 100 * largest / initial if largest > 0 else 1.0
+    floor = 1e-4 * top
+    panels = []
+    for i, item in enumerate(result.modal_energy):
+        energy = np.maximum(100 * item.energy / initial, floor)
+        x, y = stems(1e-3 * item.frequency, energy, floor)
+        colour = _BODY_COLOURS[i % len(_BODY_COLOURS)]
+        tops = Curve(
+            x=1e-3 * item.frequency, y=energy, label=item.body, colour=colour, drawn="points"
+        )
+        panels.append(
+            Panel(
+                y=AxisSpec(label=item.body, unit="%", log=True, range=(floor, 2 * top)),
+                curves=(Curve(x=x, y=y, colour=colour, width=1.4), tops),
+                share=0.6,
+            )
+        )
+    return Chart(
+        name="modes",
+        title="Energy left in the modes",
+        x=AxisSpec(label="eigenfrequency", unit="kHz"),
+        panels=tuple(panels),
+        note=f"Share of the initial kinetic energy, '{result.label}', after separation.",
+    )

@@ -1,0 +1,43 @@
+"""One self-contained page: figures, plotly itself and the words in a single file.
+
+The page loads nothing from anywhere; its content security policy forbids it.
+"""
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from plotly.offline import get_plotlyjs
+
+from klack.report.chart import BarChart, Chart
+from klack.report.content import Content, report_content
+from klack.report.interactive import plotly_bars, plotly_chart
+from klack.report.output import write_whole
+from klack.workflow.study import ImpactStudy
+
+__all__ = ["render_html", "write_report"]
+
+
+def write_report(study: ImpactStudy, path: Path) -> None:
+    """Write the report of a study as one HTML file that opens in any browser, also offline."""
+    write_whole(path, render_html(report_content(study)).encode())
+
+
+def render_html(content: Content) -> str:
+    """Lay the content out as a page."""
+    environment = Environment(
+        loader=PackageLoader("klack.report", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["figure"] = _figure
+    environment.filters["base64"] = lambda data: b64encode(data).decode()
+    template = environment.get_template("template.html")
+    return template.render(content=content, plotly=get_plotlyjs())
+
+
+def _figure(chart: Chart | BarChart) -> dict[str, Any]:
+    return plotly_bars(chart) if isinstance(chart, BarChart) else plotly_chart(chart)

@@ -1,0 +1,213 @@
+"""Charts for the browser: the plain data that plotly.js draws.
+
+Only the JSON description is made here; the plotly library itself is copied into the page by
+:mod:`klack.report.html`.
+"""
+
+from html import escape
+from math import log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from klack.report.chart import COLOURS, DASHES, AxisSpec, BarChart, Chart, Curve, Panel
+
+__all__ = ["plotly_bars", "plotly_chart"]
+
+_GRID, _INK = "#e3e6ea", "#22262b"
+_LAYOUT: dict[str, Any] = {
+    "paper_bgcolor": "white",
+    "plot_bgcolor": "white",
+    "font": {"family": "system-ui, 'Segoe UI', Roboto, Helvetica, Arial, sans-serif", "size": 13},
+    "margin": {"l": 70, "r": 16, "t": 12, "b": 52},
+    "hoverlabel": {"namelength": -1},
+}
+_PANEL_HEIGHT = 330
+_PANEL_GAP = 0.06
+
+
+def plotly_chart(chart: Chart) -> dict[str, Any]:
+    """Figure with ``data`` and ``layout`` for ``Plotly.newPlot``."""
+    heights = np.array([panel.share for panel in chart.panels])
+    free = 1.0 - _PANEL_GAP * (len(heights) - 1)
+    heights = free * heights / heights.sum()
+    layout: dict[str, Any] = _LAYOUT | {
+        "height": int(70 + _PANEL_HEIGHT * sum(panel.share for panel in chart.panels)),
+        "showlegend": True,
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        "hovermode": "x unified",
+        "shapes": [],
+        "annotations": [],
+        "xaxis": _axis(chart.x) | {"anchor": f"y{_suffix(len(heights) - 1)}"},
+    }
+    data: list[dict[str, Any]] = []
+    named: set[str] = set()
+    top = 1.0
+    for i, panel in enumerate(chart.panels):
+        bottom = max(0.0, top - float(heights[i]))
+        layout[f"yaxis{_suffix(i)}"] = _axis(panel.y) | {"domain": [bottom, top]}
+        top = bottom - _PANEL_GAP
+        data += [_curve(curve, i, chart.x.unit, panel.y.unit, named) for curve in panel.curves]
+        _add_marks(layout, panel, i, chart.x.log)
+    return {"data": data, "layout": layout}
+
+
+def plotly_bars(chart: BarChart) -> dict[str, Any]:
+    """Figure of lying stacked bars for ``Plotly.newPlot``."""
+    rows = [escape(row) for row in chart.rows]
+    data = [
+        {
+            "type": "bar",
+            "orientation": "h",
+            "y": rows,
+            "x": _numbers(part.values),
+            "name": escape(part.label),
+            "marker": {
+                "color": COLOURS[part.colour],
+                "line": {"color": "white", "width": 1},
+                "pattern": {
+                    "shape": part.hatch,
+                    "fgcolor": "white",
+                    "fgopacity": 0.6,
+                    "size": 7,
+                    "fillmode": "overlay",
+                },
+            },
+            "hovertemplate": f"%{{y}}: %{{x:.3g}} {escape(chart.x.unit)}<extra>%{{fullData.name}}"
+            "</extra>",
+        }
+        for part in chart.parts
+    ]
+    layout = _LAYOUT | {
+        "height": 150 + 46 * len(rows),
+        "barmode": "stack",
+        "bargap": 0.35,
+        "legend": {
+            "orientation": "h",
+            "x": 0,
+            "y": 1.02,
+            "yanchor": "bottom",
+            "traceorder": "normal",
+        },
+        "xaxis": _axis(chart.x),
+        "yaxis": {"autorange": "reversed", "automargin": True, "ticksuffix": "  "},
+    }
+    return {"data": data, "layout": layout}
+
+
+def _suffix(panel: int) -> str:
+    return "" if panel == 0 else str(panel + 1)
+
+
+def _numbers(values: ArrayLike) -> list[float | None]:
+    """Six digits are more than a picture can show; gaps become null."""
+    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(values)]
+
+
+def _axis(axis: AxisSpec) -> dict[str, Any]:
+    spec: dict[str, Any] = {
+        "title": {"text": escape(axis.text)},
+        "gridcolor": _GRID,
+        "zerolinecolor": "#b7bcc4",
+        "linecolor": _INK,
+        "showline": True,
+        "ticks": "outside",
+        "ticklen": 4,
+        "automargin": True,
+        "exponentformat": "power",
+    }
+    if axis.log:
+        spec |= {"type": "log", "dtick": 1}
+    if axis.ticks:
+        spec |= {"tickvals": list(axis.ticks), "ticktext": [f"{tick:g}" for tick in axis.ticks]}
+    if axis.range is not None:
+        spec["range"] = [log10(v) if axis.log else v for v in axis.range]
+    return spec
+
+
+def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) -> dict[str, Any]:
+    trace: dict[str, Any] = {
+        "type": "scatter",
+        "x": _numbers(curve.x),
+        "y": _numbers(curve.y),
+        "yaxis": f"y{_suffix(panel)}",
+        "name": escape(curve.label),
+        "legendgroup": escape(curve.label),
+        "showlegend": bool(curve.label) and curve.label not in named,
+        "hovertemplate": f"%{{y:.4g}} {escape(y_unit)}",
+        "xhoverformat": ".4g",
+    }
+    if not curve.label:
+        trace["hoverinfo"] = "skip"
+        del trace["hovertemplate"]
+    colour = COLOURS[curve.colour]
+    if curve.drawn == "points":
+        trace |= {"mode": "markers", "marker": {"color": colour, "size": 4 * curve.width}}
+    else:
+        dash = ",".join(f"{length:g}px" for length in DASHES[curve.style])
+        trace |= {
+            "mode": "lines",
+            "line": {
+                "color": colour,
+                "width": curve.width,
+                "dash": dash or "solid",
+                "shape": "hv" if curve.drawn == "steps" else "linear",
+            },
+        }
+    named.add(curve.label)
+    return trace
+
+
+def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) -> None:
+    y_axis = f"y{_suffix(index)} domain"
+    for band in panel.bands:
+        layout["shapes"].append(
+            {
+                "type": "rect",
+                "xref": "x",
+                "yref": y_axis,
+                "x0": band.low,
+                "x1": band.high,
+                "y0": 0,
+                "y1": 1,
+                "fillcolor": "#dbe9f6",
+                "opacity": 0.45,
+                "line": {"width": 0},
+                "layer": "below",
+            }
+        )
+        layout["annotations"].append(_label(band.label, band.high, 0.02, y_axis, log_x, "right"))
+    for mark in panel.marks:
+        across = mark.axis == "y"
+        layout["shapes"].append(
+            {
+                "type": "line",
+                "xref": "x domain" if across else "x",
+                "yref": f"y{_suffix(index)}" if across else y_axis,
+                "x0": 0 if across else mark.value,
+                "x1": 1 if across else mark.value,
+                "y0": mark.value if across else 0,
+                "y1": mark.value if across else 1,
+                "line": {"color": "#5b626b", "width": 1, "dash": "3px,3px"},
+            }
+        )
+        if mark.label and not across:
+            layout["annotations"].append(
+                _label(mark.label, mark.value, 0.98, y_axis, log_x, "left")
+            )
+
+
+def _label(text: str, x: float, y: float, y_axis: str, log_x: bool, anchor: str) -> dict[str, Any]:
+    return {
+        "text": escape(text),
+        "x": log10(x) if log_x and x > 0 else x,
+        "y": y,
+        "xref": "x",
+        "yref": y_axis,
+        "xanchor": anchor,
+        "yanchor": "bottom" if y < 0.5 else "top",
+        "showarrow": False,
+        "font": {"size": 11, "color": "#444a52"},
+        "bgcolor": "rgba(255,255,255,0.75)",
+    }

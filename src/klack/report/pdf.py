@@ -1,0 +1,85 @@
+"""The report on paper, set by typst from the same content as the page.
+
+All words travel as JSON and are printed as strings: typst never reads them as markup.
+"""
+
+import json
+from dataclasses import asdict
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import matplotlib
+import typst
+
+from klack.report.chart import BarChart, Chart
+from klack.report.content import Content, Section, report_content
+from klack.report.output import write_whole
+from klack.report.printed import svg_bars, svg_chart
+from klack.workflow.study import ImpactStudy
+
+__all__ = ["render_pdf", "write_pdf"]
+
+
+def write_pdf(study: ImpactStudy, path: Path) -> None:
+    """Write the report of a study as a PDF file (A4)."""
+    write_whole(path, render_pdf(report_content(study)))
+
+
+def render_pdf(content: Content) -> bytes:
+    """Set the content as pages."""
+    template = files("klack.report").joinpath("template.typ").read_bytes()
+    # the letters of the figures, so that the pages look the same on every machine
+    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    with TemporaryDirectory(prefix="klack-report-") as folder:
+        work = Path(folder)
+        (work / "template.typ").write_bytes(template)
+        words = _words(content) | {
+            "sections": [
+                _section(section, f"{i}", work) for i, section in enumerate(content.sections)
+            ]
+        }
+        (work / "content.json").write_text(json.dumps(words), encoding="utf-8")
+        pages = typst.compile(
+            str(work / "template.typ"),
+            root=str(work),
+            font_paths=[str(fonts)],
+            ignore_system_fonts=True,
+        )
+    return bytes(pages)
+
+
+def _words(content: Content) -> dict[str, Any]:
+    return {
+        "title": content.title,
+        "subtitle": content.subtitle,
+        "description": content.description,
+        "answer": content.answer,
+        "numbers": asdict(content.numbers),
+        "warnings": content.warnings,
+        "definitions": content.definitions,
+        "limits": content.limits,
+        "case_text": content.case_text,
+        "versions": content.versions,
+    }
+
+
+def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
+    figures = []
+    if section.picture is not None:
+        figures.append({"title": "", "note": section.picture.note, "image": f"{name}-picture.svg"})
+        (work / figures[-1]["image"]).write_bytes(section.picture.image)
+    for i, chart in enumerate(section.charts):
+        figures.append({"title": chart.title, "note": chart.note, "image": f"{name}-{i}.svg"})
+        (work / figures[-1]["image"]).write_bytes(_drawn(chart))
+    return {
+        "title": section.title,
+        "paragraphs": section.paragraphs,
+        "figures": figures,
+        "tables": [asdict(table) for table in section.tables],
+    }
+
+
+def _drawn(chart: Chart | BarChart) -> bytes:
+    return svg_bars(chart) if isinstance(chart, BarChart) else svg_chart(chart)

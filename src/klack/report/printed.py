@@ -1,0 +1,165 @@
+"""Charts for paper: matplotlib without its state machine, as SVG with letters as outlines."""
+
+from io import BytesIO
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from klack.report.chart import COLOURS, DASHES, AxisSpec, BarChart, Chart, Curve, Panel
+
+__all__ = ["STYLE", "plain", "svg", "svg_bars", "svg_chart"]
+
+_WIDTH = 6.7
+"""Width of the text of an A4 page [in]."""
+
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e6ea",
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 3.2,
+    "lines.scale_dashes": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "klack",
+    "hatch.color": "white",
+    "hatch.linewidth": 0.6,
+}
+
+
+def plain(text: str) -> str:
+    """Text that matplotlib does not read as mathematics."""
+    return text.replace("$", r"\$")
+
+
+def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
+    """Write a figure as SVG; rasterised parts with ``dpi`` dots per inch."""
+    FigureCanvasSVG(figure)
+    stream = BytesIO()
+    figure.savefig(stream, format="svg", dpi=dpi, metadata={"Date": None, "Creator": "klack"})
+    return stream.getvalue()
+
+
+def svg_chart(chart: Chart) -> bytes:
+    """Draw a chart with its legend above it."""
+    shares = [panel.share for panel in chart.panels]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(_WIDTH, 0.7 + 1.9 * sum(shares)), layout="constrained")
+        grid = figure.subplots(
+            len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
+        )[:, 0]
+        for panel, axes in zip(chart.panels, grid, strict=True):
+            _draw_panel(axes, panel, chart.x)
+        _scale(grid[-1], chart.x, "x")
+        _legend(figure, grid)
+        return svg(figure)
+
+
+def svg_bars(chart: BarChart) -> bytes:
+    """Draw lying stacked bars; shares that are wide enough carry their number."""
+    with rc_context(STYLE | {"axes.grid.axis": "x"}):
+        figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
+        axes = figure.subplots()
+        left = [0.0] * len(chart.rows)
+        whole = max(sum(part.values[i] for part in chart.parts) for i in range(len(left)))
+        for part in chart.parts:
+            bars = axes.barh(
+                range(len(left)),
+                part.values,
+                left=left,
+                height=0.62,
+                color=COLOURS[part.colour],
+                edgecolor="white",
+                linewidth=0.6,
+                hatch=2 * part.hatch or None,
+                label=plain(part.label),
+            )
+            texts = [f"{v:.3g}" if v > 0.06 * whole else "" for v in part.values]
+            light = part.colour in ("yellow", "sky", "orange")
+            axes.bar_label(
+                bars, texts, label_type="center", fontsize=7, color="black" if light else "white"
+            )
+            left = [a + b for a, b in zip(left, part.values, strict=True)]
+        axes.set_yticks(range(len(left)), [plain(row) for row in chart.rows])
+        axes.invert_yaxis()
+        _scale(axes, chart.x, "x")
+        _legend(figure, [axes])
+        return svg(figure)
+
+
+def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
+    for band in panel.bands:
+        axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
+        _note(axes, band.high, 0.02, band.label, "right", "bottom")
+    for mark in panel.marks:
+        draw = axes.axvline if mark.axis == "x" else axes.axhline
+        draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
+        if mark.label and mark.axis == "x":
+            _note(axes, mark.value, 0.98, " " + mark.label, "left", "top")
+    for curve in panel.curves:
+        _draw_curve(axes, curve)
+    _scale(axes, panel.y, "y")
+
+
+def _draw_curve(axes: Any, curve: Curve) -> None:
+    colour, label = COLOURS[curve.colour], plain(curve.label) or "_nolegend_"
+    if curve.drawn == "points":
+        size = 2.0 * curve.width
+        axes.plot(curve.x, curve.y, "o", color=colour, markersize=size, label=label)
+        return
+    line = axes.plot(
+        curve.x,
+        curve.y,
+        color=colour,
+        linewidth=0.72 * curve.width,
+        drawstyle="steps-post" if curve.drawn == "steps" else "default",
+        label=label,
+        clip_on=True,
+    )[0]
+    if DASHES[curve.style]:
+        line.set_dashes([0.6 * length for length in DASHES[curve.style]])
+
+
+def _note(axes: Any, x: float, y: float, text: str, side: str, height: str) -> None:
+    axes.text(
+        x,
+        y,
+        plain(text),
+        transform=axes.get_xaxis_transform(),
+        ha=side,
+        va=height,
+        fontsize=6.5,
+        color="#444a52",
+        clip_on=True,
+    )
+
+
+def _scale(axes: Any, spec: AxisSpec, which: str) -> None:
+    getattr(axes, f"set_{which}label")(plain(spec.text))
+    if spec.log:
+        getattr(axes, f"set_{which}scale")("log")
+    if spec.ticks:
+        getattr(axes, f"set_{which}ticks")(spec.ticks, [f"{tick:g}" for tick in spec.ticks])
+        getattr(axes, f"{which}axis").set_minor_locator(NullLocator())
+    if spec.range is not None:
+        getattr(axes, f"set_{which}lim")(*spec.range)
+
+
+def _legend(figure: Figure, grid: Any) -> None:
+    entries: dict[str, Any] = {}
+    for axes in grid:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if not entries:
+        return
+    columns = 3 if max(map(len, entries)) < 30 else 2
+    figure.legend(
+        entries.values(), entries.keys(), loc="outside upper left", ncols=min(columns, len(entries))
+    )

@@ -1,0 +1,122 @@
+"""Numbers as engineers write them, and the answer of a study in one paragraph."""
+
+from math import floor, isfinite, log10
+
+from klack.contact.restitution import Deviation
+from klack.workflow.study import ImpactStudy, LevelResult
+
+__all__ = ["answer", "count", "listed", "quantity", "share", "signed", "signed_share", "verdict"]
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_MINUS, _NONE, _THIN = "\N{MINUS SIGN}", "–", "\N{NARROW NO-BREAK SPACE}"
+
+
+def quantity(value: float, unit: str, digits: int = 4) -> str:
+    """Value with a prefix that keeps the number between 1 and 1000.
+
+    >>> quantity(1.4823e-5, "s"), quantity(255.31, "N"), quantity(float("nan"), "-")
+    ('14.82 µs', '255.3 N', '–')
+    >>> quantity(0.99996e3, "N")
+    '1.000 kN'
+    """
+    if not isfinite(value):
+        return _NONE if value != value else "∞"
+    if value == 0.0:
+        return f"0{_space(unit)}"
+    rounded = float(f"{value:.{digits - 1}e}")
+    power = min(max(3 * floor(log10(abs(rounded)) / 3 + 1e-12), -15), 9)
+    scaled = rounded / 10.0**power
+    decimals = max(0, digits - 1 - floor(log10(abs(scaled)) + 1e-12))
+    return f"{scaled:.{decimals}f}".replace("-", _MINUS) + _space(_PREFIXES[power] + unit)
+
+
+def _space(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def signed(value: float, decimals: int, unit: str = "") -> str:
+    """With sign, also a plus.
+
+    >>> signed(0.00114, 4), signed(-0.31, 2, "dB")
+    ('+0.0011', '−0.31 dB')
+    """
+    if not isfinite(value):
+        return _NONE
+    return f"{value:+.{decimals}f}".replace("-", _MINUS) + _space(unit)
+
+
+def share(value: float, decimals: int = 1) -> str:
+    """Fraction as a percentage.
+
+    >>> share(0.653)
+    '65.3 %'
+    """
+    return f"{100 * value:.{decimals}f} %".replace("-", _MINUS) if isfinite(value) else _NONE
+
+
+def signed_share(value: float, decimals: int = 2) -> str:
+    """Relative difference as a percentage with its sign.
+
+    >>> signed_share(-0.0067)
+    '−0.67 %'
+    """
+    return signed(100 * value, decimals, "%")
+
+
+def count(value: int) -> str:
+    """Whole number in groups of three digits."""
+    return f"{value:,}".replace(",", _THIN)
+
+
+def listed(words: list[str]) -> str:
+    """Words with commas and a last 'and'.
+
+    >>> listed(["a", "b", "c"]), listed(["a"])
+    ('a, b and c', 'a')
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def answer(study: ImpactStudy) -> str:
+    """Say what happened in plain words, and how close the reduced level comes to the reference."""
+    needle, partner = study.bodies[0], study.bodies[1]
+    reference = study.levels[study.reference]
+    numbers = reference.measures
+    text = (
+        f"The {needle.name} ({quantity(1e3 * needle.mass, 'g', 3)}, "
+        f"{study.speed:.3g} m/s) hits the {partner.name} with a peak force of "
+        f"{quantity(numbers.peak_force, 'N', 3)}, stays in contact for "
+        f"{quantity(numbers.contact_time, 's', 3)}"
+    )
+    if numbers.sub_contacts > 1:
+        text += f" (the first of {numbers.sub_contacts} contacts in quick succession)"
+    if isfinite(numbers.restitution):
+        text += (
+            f" and rebounds with {numbers.restitution:.3g} of its speed; "
+            f"{share(numbers.vibration_share)} of the impact energy is left behind as vibration. "
+        )
+    else:
+        text += "; the record ends before it has left. "
+    text += f"These numbers come from the {_called(study.reference)} run"
+    if study.reference == "full":
+        text += ", which follows every degree of freedom and every contact point"
+    text += "."
+    if "reduced" in study.deviations:
+        text += f" {verdict(study.levels['reduced'], study.deviations['reduced'])}"
+    return text
+
+
+def verdict(result: LevelResult, deviation: Deviation) -> str:
+    """How far one level is from the reference, in one sentence."""
+    return (
+        f"The {_called(result.level)} model ({count(result.degrees_of_freedom)} degrees of "
+        f"freedom, computed in {quantity(result.wall_time, 's', 2)}) deviates from them by "
+        f"{signed_share(deviation.peak_force)} in peak force, "
+        f"{signed_share(deviation.contact_time)} in contact time and "
+        f"{signed(deviation.restitution, 4)} in restitution; its force over time by "
+        f"{share(deviation.history_l2, 2)} (root mean square)."
+    )
+
+
+def _called(level: str) -> str:
+    return {"full": "full-order"}.get(level, level)
