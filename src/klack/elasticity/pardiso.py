@@ -21,7 +21,7 @@ from klack.errors import ConvergenceError
 __all__ = ["PardisoFactorization"]
 
 _SPD = 2
-_ANALYSE_AND_FACTOR, _SOLVE, _RELEASE = 12, 33, -1
+_ANALYSE_AND_FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 12, 33, 331, 333, -1
 _ERRORS = {
     -2: "not enough memory",
     -3: "reordering failed",
@@ -60,12 +60,23 @@ class PardisoFactorization:
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B for one or several columns."""
+        return self._substitute(_SOLVE, B)
+
+    def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """First half of a solve, L Y = B with A = L L^T (rows of Y in an order of its own)."""
+        return self._substitute(_FORWARD, B)
+
+    def backward(self, Y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Second half of a solve, L^T X = Y."""
+        return self._substitute(_BACKWARD, Y)
+
+    def _substitute(self, phase: int, B: NDArray[np.float64]) -> NDArray[np.float64]:
         if not self._release.alive:
             raise RuntimeError("this factorisation has been closed")
         right = np.array(B, dtype=np.float64, order="F", ndmin=1)
         X = np.empty_like(right)
         if right.size:
-            error = self._call(_SOLVE, right, X, 1 if right.ndim == 1 else right.shape[1])
+            error = self._call(phase, right, X, 1 if right.ndim == 1 else right.shape[1])
             if error:
                 raise _failure(error)
         return X
