@@ -104,9 +104,12 @@ def _mean_axial(points: Floats, axial: Floats, triangles: Ints) -> float:
     """Mean axial displacement of the body of revolution under the section [m]."""
     corner = points[triangles]
     (ax, ay), (bx, by) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
-    volume = np.abs(ax * by - ay * bx) * corner[:, :, 0].mean(axis=1)
-    total = volume.sum()
-    return float(volume @ axial[triangles].mean(axis=1) / total) if total > 0 else 0.0
+    area = 0.5 * np.abs(ax * by - ay * bx)
+    r, u = corner[:, :, 0], axial[triangles]
+    # integral of a product of linear functions: A/12 (sum r sum u + sum r u)
+    moment = area / 12 * (r.sum(axis=1) * u.sum(axis=1) + (r * u).sum(axis=1))
+    volume = area * r.mean(axis=1)
+    return float(moment.sum() / volume.sum()) if volume.sum() > 0 else 0.0
 
 
 # --------------------------------------------------------------------------- axisymmetric
