@@ -22,6 +22,7 @@ from klack.errors import InputError, require_positive
 __all__ = ["Modes", "eigenmodes", "rigid_frequencies"]
 
 _LARGEST_DENSE = 600
+_BLOCK = 8
 _RIGID_LIMIT = 0.1
 
 
@@ -161,8 +162,7 @@ def _iterated(
             return False
         return bool(values[-1] * (2.0 * np.pi * max_frequency) ** 2 < 1.0)
 
-    block = 8 if count is not None and count < 12 else 16
-    start = np.random.default_rng(2024).standard_normal((body.dof_count, block))
+    start = np.random.default_rng(2024).standard_normal((body.dof_count, _BLOCK))
     most = len(body.free) - body.rigid_modes.shape[1]
     _, shapes = block_lanczos(operator, body.M, operator(start), enough, most)
     return shapes

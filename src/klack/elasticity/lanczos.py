@@ -1,6 +1,6 @@
 r"""Block Lanczos iteration for the largest eigenvalues of a mass-symmetric operator.
 
-Full reorthogonalisation, no restart.  A block of 16 vectors costs only a few times one vector in
+Full reorthogonalisation, no restart.  A block of 8 vectors costs only 2-3 times one vector in
 the triangular solves, and finds double modes (bending) without luck.  Grimes, Lewis & Simon 1994.
 """
 
@@ -18,7 +18,7 @@ __all__ = ["block_lanczos"]
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-10
+_TOLERANCE = 1e-9
 _RANK = 1e-10
 
 
