@@ -25,7 +25,14 @@ from klack.contact.mortar import ContactSpace
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 
-__all__ = ["StaticContact", "check_resolution", "check_rim", "contact_compliance", "static_contact"]
+__all__ = [
+    "ReachError",
+    "StaticContact",
+    "check_resolution",
+    "check_rim",
+    "contact_compliance",
+    "static_contact",
+]
 
 _CHUNK = 64
 """Right-hand sides solved at once."""
@@ -57,6 +64,10 @@ def contact_compliance(
             columns = slice(start, start + _CHUNK)
             C[:, columns] += G @ flexibility.solve(G[columns].T.toarray())
     return (C + C.T) / 2.0
+
+
+class ReachError(InputError):
+    """The contact grew to the border of the candidate points: their reach is too small."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -266,7 +277,7 @@ def check_rim(static: StaticContact) -> None:
         return
     first = int(np.argmax(touched))
     below = static.force[first - 1] if first else 0.0
-    raise InputError(
+    raise ReachError(
         "contact: reach",
         got=f"contact at the rim of the candidate points above {below:.4g} N "
         f"(reach {static.space.reach * 1e6:.4g} um)",

@@ -1,0 +1,330 @@
+"""``klack impact``: one dry impact at the levels asked for, laid over each other."""
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib.metadata import version
+from time import perf_counter
+
+import numpy as np
+
+from klack import __version__
+from klack.acoustics.comparison import compare_histories
+from klack.case.schema import Case
+from klack.contact.restitution import Deviation
+from klack.contact.statics import check_resolution
+from klack.contact.submodel import LocalStiffness
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.errors import AccuracyWarning, InputError
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.transfer import TransferComparison
+from klack.transient.result import FullOrderResult
+from klack.workflow.levels import (
+    ReducedPair,
+    Variant,
+    classical_stiffness,
+    elastic_count,
+    mode_pools,
+    participating,
+    reduce_pair,
+    run_full,
+    run_lumped,
+    run_reduced,
+    selection_of,
+    static_curve,
+)
+from klack.workflow.problem import ContactProblem, build_problem
+from klack.workflow.progress import Progress, silent
+from klack.workflow.section import section_picture
+from klack.workflow.study import (
+    BodySummary,
+    ContactSummary,
+    ImpactStudy,
+    LawSummary,
+    LevelResult,
+    SectionPicture,
+)
+from klack.workflow.transfer import compare_transfer
+
+__all__ = ["run_impact"]
+
+_LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
+# Modes of the transfer functions that are compared, beside those of the case.
+_TRANSFER_MODES = 50
+_REDUCED_LABELS: Mapping[str, tuple[Variant, str]] = {
+    "reduced": ("consistent", "consistent law"),
+    "reduced-participation": ("consistent", "consistent law, modes by participation"),
+    "reduced-attachment": ("attachment", "attachment modes, linear contact"),
+    "reduced-none": ("none", "no correction, linear contact"),
+}
+
+
+def run_impact(
+    case: Case,
+    *,
+    levels: Sequence[str],
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> ImpactStudy:
+    """Compute one impact at several levels and compare them.
+
+    Parameters
+    ----------
+    case : Case
+    levels : sequence of str
+        Among :data:`klack.case.schema.LEVELS`.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations; the full order moves two bodies side by side on two cores.
+
+    Returns
+    -------
+    ImpactStudy
+    """
+    begin = perf_counter()
+    wanted = case.require_levels(levels)
+    _require_time_to_touch(case)
+    clock = _Clock(progress)
+    with _collected_warnings() as notes:
+        problem = build_problem(case, clock, threads=threads)
+        with_transfer = case.run.transfer is not None
+        pools = mode_pools(
+            problem, at_least=_TRANSFER_MODES if with_transfer else 1, progress=clock
+        )
+        clock("reduced", 0.0)
+        preview = _own_pair(problem, pools, stiffness=_first_stiffness(problem))
+        peak = min(preview.pattern_force, problem.static.max_force)
+        classical = classical_stiffness(problem, peak)
+        own = _own_pair(problem, pools, stiffness=classical.stiffness)
+        results: dict[str, LevelResult] = {}
+        for level in wanted:
+            if level == "lumped":
+                results[level] = run_lumped(problem)
+            elif level != "full":
+                pair = own if level == "reduced" else _variant(level, problem, pools, classical)
+                results[level] = _run_variant(case, level, pair)
+        clock("reduced", 1.0)
+        transfer: tuple[TransferComparison, ...] = ()
+        if case.run.transfer is not None:
+            transfer = compare_transfer(problem, pools, own.ports, progress=clock)
+        ratio = check_resolution(problem.static, peak)
+        problem.close()
+        sections: tuple[SectionPicture, ...] = ()
+        if "full" in wanted:
+            results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
+            sections = _sections(problem, run)
+    reference = "full" if "full" in results else next(iter(results))
+    return ImpactStudy(
+        case=case.name,
+        title=case.title,
+        description=case.description.strip(),
+        case_text=case.source,
+        speed=case.motion.speed,
+        gap=case.contact.gap or 0.0,
+        version=__version__,
+        versions={name: version(name) for name in _LIBRARIES},
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        wall_time=perf_counter() - begin,
+        stage_times=clock.times(),
+        bodies=_summaries(problem, own),
+        contact=_contact_summary(problem, peak, ratio),
+        law=_law_summary(own, classical, peak),
+        levels=results,
+        reference=reference,
+        deviations=_deviations(results, reference),
+        transfer=transfer,
+        sections=sections,
+        warnings=tuple(notes),
+    )
+
+
+def _require_time_to_touch(case: Case) -> None:
+    flight = (case.contact.gap or 0.0) / case.motion.speed
+    if flight >= case.run.duration:
+        raise InputError(
+            f"{case.path or 'case'}: run.duration",
+            got=f"{case.run.duration * 1e6:.4g} us, but first touch at {flight * 1e6:.4g} us",
+            expected="a time that holds the impact",
+            hint="enlarge run.duration or make contact.gap smaller.",
+        )
+
+
+class _Clock:
+    """Passes progress on and measures how long each stage takes."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._stage, self._since = "", perf_counter()
+        self._times: dict[str, float] = {}
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        if stage != self._stage:
+            self._book()
+            self._stage = stage
+        self._progress(stage, fraction)
+
+    def _book(self) -> None:
+        now = perf_counter()
+        if self._stage:
+            self._times[self._stage] = self._times.get(self._stage, 0.0) + now - self._since
+        self._since = now
+
+    def times(self) -> dict[str, float]:
+        """Seconds per stage."""
+        self._book()
+        return dict(self._times)
+
+
+@contextmanager
+def _collected_warnings() -> Iterator[list[str]]:
+    """Collect accuracy warnings as notes of the study, each once; show all others as usual."""
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield notes
+    for item in caught:
+        if issubclass(item.category, AccuracyWarning):
+            text = str(item.message)
+            if text not in notes:
+                notes.append(text)
+        else:
+            warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def _first_stiffness(problem: ContactProblem) -> float:
+    """Secant of the static contact, to find the force at which the rest is computed [N/m]."""
+    return problem.static.max_force / float(problem.static.approach[-1])
+
+
+def _own_pair(
+    problem: ContactProblem, pools: Mapping[str, Modes], *, stiffness: float
+) -> ReducedPair:
+    """Reduction that the case asks for."""
+    case = problem.case
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    return reduce_pair(
+        problem,
+        pools,
+        correction=case.reduction.correction,
+        selection={name: selection_of(case.reduction.choice(name)) for name in names},
+        stiffness=stiffness,
+    )
+
+
+def _variant(
+    level: str, problem: ContactProblem, pools: Mapping[str, Modes], classical: LocalStiffness
+) -> ReducedPair:
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    selection = {name: selection_of(problem.case.reduction.choice(name)) for name in names}
+    if level == "reduced-participation":
+        selection = participating(names)
+    return reduce_pair(
+        problem,
+        pools,
+        correction=_REDUCED_LABELS[level][0],
+        selection=selection,
+        stiffness=classical.stiffness,
+    )
+
+
+def _run_variant(case: Case, level: str, pair: ReducedPair) -> LevelResult:
+    counts = f"{elastic_count(pair.upper)} + {elastic_count(pair.lower)} modes"
+    words = _REDUCED_LABELS[level][1]
+    if level == "reduced" and pair.local is None:
+        words = f"{case.contact.local_law.kind} law, correction {case.reduction.correction}"
+    return run_reduced(case, pair, level=level, label=f"reduced, {counts}, {words}", setup_time=0.0)
+
+
+def _deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
+    return {
+        name: compare_histories(results[reference].history, result.history)
+        for name, result in results.items()
+        if name != reference
+    }
+
+
+def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPicture, ...]:
+    time = float(run.history.edges[run.peak_index + 1])
+    bodies = (problem.pair.upper, problem.pair.lower)
+    return tuple(
+        section_picture(body.mesh, fields.peak_displacement, time, body.name)
+        for body, fields in zip(bodies, run.fields, strict=True)
+    )
+
+
+def _summaries(problem: ContactProblem, own: ReducedPair) -> tuple[BodySummary, ...]:
+    return tuple(
+        _body_summary(problem.case, body, reduced)
+        for body, reduced in (
+            (problem.pair.upper, own.upper),
+            (problem.pair.lower, own.lower),
+        )
+    )
+
+
+def _body_summary(case: Case, body: ElasticBody, reduced: ReducedBody) -> BodySummary:
+    given = case.bodies[body.name]
+    geometry = given.geometry
+    if geometry.mesh is not None:
+        source = f"mesh file {geometry.mesh.file.name}"
+    elif geometry.step is not None:
+        source = f"STEP file {geometry.step.file.name}"
+    else:
+        layers = f" in {geometry.layers} layers" if geometry.layers else ""
+        source = f"profile, {geometry.model}{layers}"
+    supports = []
+    for support in given.fixed or ():
+        sectors = support.sectors
+        where = f"surface '{support.surface}'"
+        if sectors is not None:
+            where += f" in {sectors.count} sectors of {np.degrees(sectors.width):.4g} deg"
+        supports.append(where)
+    materials = case.materials_of(body.name, body.mesh.solids)
+    first, last = reduced.rigid_count, reduced.rigid_count + elastic_count(reduced)
+    return BodySummary(
+        name=body.name,
+        model="axisymmetric" if body.dimension == 2 else "3-D",
+        source=source,
+        support="held at " + " and ".join(supports) if supports else "free",
+        material=", ".join(dict.fromkeys(m.name for m in materials.values())),
+        mass=body.mass,
+        nodes=body.mesh.node_count,
+        elements=body.mesh.element_count,
+        dofs=body.dof_count,
+        frequencies=reduced.frequencies[first:last],
+        compliance_share=float(reduced.compliance_share[0]),
+    )
+
+
+def _contact_summary(problem: ContactProblem, peak: float, ratio: float) -> ContactSummary:
+    static, contact = problem.static, problem.case.contact
+    return ContactSummary(
+        surfaces=f"{contact.moving} on {contact.stop}",
+        points=static.space.count,
+        half_width=static.half_width_at(peak),
+        size_ratio=ratio,
+        approach=static.approach,
+        force=static.force,
+        area=static.area,
+    )
+
+
+def _law_summary(pair: ReducedPair, classical: LocalStiffness, peak: float) -> LawSummary:
+    indentation, force = static_curve(pair)
+    fit_range = (0.5 * peak, peak)
+    load = np.linspace(*fit_range, 50)
+    slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
+    share = np.append(np.nan, pair.local.share) if pair.local else np.full(len(force), np.nan)
+    return LawSummary(
+        kind="consistent" if pair.local is not None else "given",
+        indentation=indentation,
+        force=force,
+        share=share,
+        linear_stiffness=float(slope),
+        fit_range=fit_range,
+        classical_stiffness=classical.stiffness,
+        classical_size=classical.size,
+    )

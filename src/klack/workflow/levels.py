@@ -1,0 +1,460 @@
+"""One impact at one level: lumped, reduced in its variants, or full order."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.case.schema import (
+    BodyDamping,
+    Case,
+    HertzLocalLaw,
+    LinearLocalLaw,
+    ModeChoice,
+    SubmodelLocalLaw,
+)
+from klack.contact.history import BodyEnergy, ImpactHistory
+from klack.contact.laws import (
+    ContactLaw,
+    HertzLaw,
+    HuntCrossley,
+    LinearLaw,
+    gonthier_coefficient,
+)
+from klack.contact.local_law import LocalLaw, consistent_law
+from klack.contact.restitution import measure_impact
+from klack.contact.submodel import LocalStiffness, local_stiffness
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
+from klack.reduction.ports import Port
+from klack.reduction.reduce import Correction, reduce_body
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.transient.full_order import simulate_full_order
+from klack.transient.result import FullOrderResult
+from klack.workflow.problem import ContactProblem
+from klack.workflow.progress import Progress
+from klack.workflow.study import LevelResult, ModalEnergy
+
+__all__ = [
+    "PORT",
+    "ReducedPair",
+    "Variant",
+    "classical_stiffness",
+    "mode_pools",
+    "reduce_pair",
+    "run_full",
+    "run_lumped",
+    "run_reduced",
+    "selection_of",
+]
+
+PORT = "contact"
+"""Name of the contact port of both bodies."""
+
+Variant = Literal["consistent", "attachment", "none"]
+
+# The pattern of the port is taken at the peak force, which depends on it weakly.
+_PATTERN_ROUNDS = 3
+_CLASSICAL_SIZE = 8.0  # radius of the contact submodel over the half width of the contact
+_PARTICIPATION = {"pool": 100, "upper": 8, "lower": 20}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedPair:
+    """Both bodies reduced for one contact, and the local law that goes with them.
+
+    Parameters
+    ----------
+    upper, lower : ReducedBody
+    ports : pair of Port
+        Contact ports of the upper and of the lower body, resultant +1 N along z each.
+    law : contact law
+    local : LocalLaw or None
+        The consistent law with its shares; None for another kind.
+    pattern_force : float [N]
+        Force at which the pressure pattern of the port was taken.
+    """
+
+    upper: ReducedBody
+    lower: ReducedBody
+    ports: tuple[Port, Port]
+    law: ContactLaw
+    local: LocalLaw | None
+    pattern_force: float
+
+
+def selection_of(choice: ModeChoice) -> ModeSelection:
+    """Selection of modes that a case asks for."""
+    if choice.count is not None:
+        return ByCount(choice.count)
+    if choice.frequency is not None:
+        return ByFrequency(choice.frequency)
+    return ByParticipation(choice.participation or 1, choice.pool or 1)
+
+
+def mode_pools(
+    problem: ContactProblem, *, at_least: int, progress: Progress
+) -> Mapping[str, Modes]:
+    """Elastic modes of both bodies: as many as the case needs, and no fewer than ``at_least``."""
+    pools = {}
+    bodies = (problem.pair.upper, problem.pair.lower)
+    flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
+    for i, (body, flexibility) in enumerate(zip(bodies, flexibilities, strict=True)):
+        progress("modes", i / 2)
+        pools[body.name] = _pool(problem.case, body, flexibility, at_least)
+    progress("modes", 1.0)
+    return pools
+
+
+def _pool(case: Case, body: ElasticBody, flexibility: Flexibility, at_least: int) -> Modes:
+    choice = selection_of(case.reduction.choice(body.name))
+    count = at_least
+    if isinstance(choice, ByCount):
+        count = max(count, choice.count)
+    elif isinstance(choice, ByParticipation):
+        count = max(count, choice.pool)
+    if "reduced-participation" in case.run.levels:
+        count = max(count, _PARTICIPATION["pool"])
+    count = min(count, len(body.free) - body.rigid_modes.shape[1])
+    pool = eigenmodes(body, count=count, flexibility=flexibility)
+    if isinstance(choice, ByFrequency) and pool.frequency[-1] < choice.maximum:
+        return eigenmodes(body, max_frequency=choice.maximum, flexibility=flexibility)
+    return pool
+
+
+def damping_of(damping: BodyDamping) -> Damping:
+    """Damping model that a case asks for."""
+    if damping.modal is not None:
+        return ModalDamping(ratio=damping.modal)
+    if damping.rayleigh is not None:
+        return RayleighDamping(alpha=damping.rayleigh.alpha, beta=damping.rayleigh.beta)
+    return LossFactor(eta=damping.loss_factor or 0.0)
+
+
+def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
+    """Constant stiffness of the contact zone alone, as the classical recipe takes it."""
+    law = problem.case.contact.local_law
+    width = problem.static.half_width_at(min(peak_force, problem.static.max_force))
+    size = law.size if isinstance(law, SubmodelLocalLaw) else _CLASSICAL_SIZE * width
+    return local_stiffness(problem.static, problem.pair.upper, problem.pair.lower, size=size)
+
+
+def reduce_pair(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    correction: Correction,
+    selection: Mapping[str, ModeSelection],
+    stiffness: float,
+) -> ReducedPair:
+    """Reduce both bodies at the contact, with the port pattern taken at the peak force.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of body name to Modes
+    correction : "consistent", "attachment" or "none"
+    selection : mapping of body name to ModeSelection
+    stiffness : float [N/m]
+        Of the local contact, for corrections that do not compute their own law.
+    """
+    force = 0.7 * problem.static.max_force
+    for _ in range(_PATTERN_ROUNDS):
+        pair = _reduce_at(problem, pools, force, correction, selection, stiffness)
+        peak = float(np.max(_simulate(problem.case, pair).peak_force))
+        settled = abs(peak - force) <= 0.02 * force
+        force = min(peak, problem.static.max_force)
+        if settled or not force > 0:
+            break
+    return pair
+
+
+def _reduce_at(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    force: float,
+    correction: Correction,
+    selection: Mapping[str, ModeSelection],
+    stiffness: float,
+) -> ReducedPair:
+    load_upper, load_lower = problem.static.load_patterns(force)
+    ports = (Port(PORT, load_upper), Port(PORT, -load_lower))
+    bodies = (problem.pair.upper, problem.pair.lower)
+    flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
+    upper, lower = (
+        reduce_body(
+            body,
+            [port],
+            modes=selection[body.name],
+            correction=correction,
+            damping=damping_of(problem.case.bodies[body.name].damping),
+            modes_pool=pools[body.name],
+            flexibility=flexibility,
+        )
+        for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
+    )
+    law, local = _law(problem, correction, upper, lower, stiffness)
+    return ReducedPair(
+        upper=upper, lower=lower, ports=ports, law=law, local=local, pattern_force=force
+    )
+
+
+def _law(
+    problem: ContactProblem,
+    correction: Correction,
+    upper: ReducedBody,
+    lower: ReducedBody,
+    stiffness: float,
+) -> tuple[ContactLaw, LocalLaw | None]:
+    asked = problem.case.contact.local_law
+    if isinstance(asked, LinearLocalLaw):
+        return LinearLaw(asked.stiffness), None
+    if isinstance(asked, HertzLocalLaw):
+        return HertzLaw(_hertz_coefficient(problem.case, asked.radius)), None
+    if isinstance(asked, SubmodelLocalLaw) or correction != "consistent":
+        return LinearLaw(stiffness), None
+    modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
+    local = consistent_law(problem.static, modal)
+    return local.law, local
+
+
+def _hertz_coefficient(case: Case, radius: float) -> float:
+    """4/3 E* sqrt(R) [N/m^1.5] with the materials at the two contact surfaces."""
+    inverse = 0.0
+    for name, body in case.bodies.items():
+        if not isinstance(body.material, str):
+            raise InputError(
+                f"{case.path or 'case'}: contact.local_law",
+                got=f"a Hertz law on body '{name}' of several materials",
+                expected="bodies of one material",
+                hint="take the consistent law, which needs no such choice.",
+            )
+        inverse += 1.0 / case.materials_of(name, [name])[name].plane_strain_modulus
+    return 4.0 / 3.0 / inverse * float(np.sqrt(radius))
+
+
+def run_reduced(
+    case: Case, pair: ReducedPair, *, level: str, label: str, setup_time: float
+) -> LevelResult:
+    """Impact of two reduced bodies."""
+    _simulate(case, pair)  # compiles, so that the time below is that of the run
+    begin = perf_counter()
+    history = _simulate(case, pair)
+    wall_time = perf_counter() - begin
+    return _level(
+        history,
+        level=level,
+        label=label,
+        dofs=pair.upper.mode_count + pair.lower.mode_count,
+        step=case.run.reduced_step,
+        wall_time=wall_time,
+        setup_time=setup_time,
+    )
+
+
+def _simulate(case: Case, pair: ReducedPair) -> ImpactHistory:
+    return _simulate_bodies(case, pair.upper, pair.lower, pair.law)
+
+
+def _simulate_bodies(
+    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
+) -> ImpactHistory:
+    contact = ContactPair(
+        body_a=upper.name,
+        port_a=PORT,
+        body_b=lower.name,
+        port_b=PORT,
+        law=law,
+        gap=_gap(case),
+    )
+    spring = case.motion.spring
+    closing = case.motion.force
+    springs: tuple[ReturnSpring, ...] = ()
+    if spring is not None:
+        # the preload is the force at first touch; the record starts a gap above it
+        closing += spring.preload - spring.stiffness * _gap(case)
+        springs = (ReturnSpring(body=upper.name, port=PORT, stiffness=spring.stiffness),)
+    forces: tuple[AxialForce, ...] = ()
+    if closing != 0:
+        forces = (AxialForce(body=upper.name, force=-closing),)
+    system = ReducedSystem(
+        bodies=(upper, lower), contacts=(contact,), forces=forces, springs=springs
+    )
+    return simulate_impact(
+        system, speed=case.motion.speed, duration=case.run.duration, step=case.run.reduced_step
+    )
+
+
+def _gap(case: Case) -> float:
+    return case.contact.gap or 0.0
+
+
+def run_lumped(problem: ContactProblem) -> LevelResult:
+    """Impact of rigid masses on one spring, with or without loss: the baseline."""
+    case = problem.case
+    if case.lumped is None:  # refused by require_levels already
+        raise InputError(
+            "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it to the case."
+        )
+    bodies = [
+        fixed_body(body.name, port=PORT)
+        if body.is_fixed
+        else rigid_mass_body(body.name, body.mass, port=PORT)
+        for body in (problem.pair.upper, problem.pair.lower)
+    ]
+    law: ContactLaw = LinearLaw(case.lumped.stiffness)
+    if case.lumped.restitution is not None:
+        alpha = gonthier_coefficient(case.lumped.restitution)
+        law = HuntCrossley(LinearLaw(case.lumped.stiffness), alpha / case.motion.speed)
+    begin = perf_counter()
+    history = _simulate_bodies(case, bodies[0], bodies[1], law)
+    return _level(
+        history,
+        level="lumped",
+        label=f"lumped: rigid masses, {case.lumped.stiffness:.3g} N/m",
+        dofs=sum(body.mode_count for body in bodies),
+        step=case.run.reduced_step,
+        wall_time=perf_counter() - begin,
+        setup_time=0.0,
+    )
+
+
+def run_full(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    progress: Progress,
+    threads: int | None,
+) -> tuple[LevelResult, FullOrderResult]:
+    """Impact with every degree of freedom."""
+    case, pair = problem.case, problem.pair
+    closing = case.motion.force + (case.motion.spring.preload if case.motion.spring else 0.0)
+    progress("full order", 0.0)
+    result = simulate_full_order(
+        pair.upper,
+        pair.lower,
+        problem.space,
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.full_step,
+        axial_force=-closing,
+        longest_period=_longest_period(pools[pair.upper.name]),
+        threads=threads or 2,
+        progress=lambda fraction: progress("full order", fraction),
+    )
+    history = replace(
+        result.history,
+        ledger=replace(
+            result.history.ledger,
+            bodies=tuple(
+                _with_modes(energy, body, pools[body.name], result)
+                for energy, body in zip(
+                    result.history.ledger.bodies, (pair.upper, pair.lower), strict=True
+                )
+            ),
+        ),
+    )
+    statistics = result.statistics
+    level = _level(
+        history,
+        level="full",
+        label=f"full order, {statistics.degrees_of_freedom} degrees of freedom",
+        dofs=statistics.degrees_of_freedom,
+        step=case.run.full_step,
+        wall_time=statistics.loop_time,
+        setup_time=statistics.set_up_time,
+    )
+    return level, result
+
+
+def _longest_period(pool: Modes) -> float:
+    return float(2.0 * np.pi / pool.omega[0]) if len(pool.omega) else 0.0
+
+
+def _with_modes(
+    energy: BodyEnergy, body: ElasticBody, pool: Modes, result: FullOrderResult
+) -> BodyEnergy:
+    """Add the energy of every mode of the pool, from the fields at the end of the run."""
+    fields = next(item for item in result.fields if item.name == body.name)
+    weighted = body.M @ pool.shapes
+    q, v = weighted.T @ fields.end_displacement, weighted.T @ fields.end_velocity
+    return replace(
+        energy,
+        frequency=pool.frequency,
+        modal=0.5 * (v**2 + (pool.omega * q) ** 2),
+    )
+
+
+def _level(
+    history: ImpactHistory,
+    *,
+    level: str,
+    label: str,
+    dofs: int,
+    step: float,
+    wall_time: float,
+    setup_time: float,
+) -> LevelResult:
+    ledger = history.ledger
+    return LevelResult(
+        level=level,
+        label=label,
+        history=history,
+        measures=measure_impact(history),
+        degrees_of_freedom=dofs,
+        steps=_steps(history, step),
+        step=step,
+        wall_time=wall_time,
+        setup_time=setup_time,
+        energies=ledger.parts(),
+        energy_residual=ledger.residual,
+        modal_energy=tuple(
+            ModalEnergy(body=body.name, frequency=body.frequency, energy=body.modal)
+            for body in ledger.bodies
+            if len(body.modal)
+        ),
+    )
+
+
+def _steps(history: ImpactHistory, step: float) -> int:
+    return round(len(history.force) * history.step / step)
+
+
+def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
+    """The 8 + 20 modes of 100 that carry most of the compliance at the contact."""
+    upper, lower = pair_names
+    pool = _PARTICIPATION["pool"]
+    return {
+        upper: ByParticipation(_PARTICIPATION["upper"], pool),
+        lower: ByParticipation(_PARTICIPATION["lower"], pool),
+    }
+
+
+def elastic_count(body: ReducedBody) -> int:
+    """Number of elastic modes without attachment modes."""
+    return body.mode_count - body.rigid_count - body.attachment_count
+
+
+def static_curve(pair: ReducedPair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (indentation [m], force [N]) of the local law, for a picture."""
+    if pair.local is not None:
+        return np.append(0.0, pair.local.force_indentation), np.append(0.0, pair.local.force)
+    indentation = np.linspace(0.0, _indentation_at(pair.law, 1.2 * pair.pattern_force), 50)
+    return indentation, pair.law.force(indentation)
+
+
+def _indentation_at(law: ContactLaw, force: float) -> float:
+    upper = 1e-9
+    while float(law.force(upper)) < force:
+        upper *= 1.3
+    return upper

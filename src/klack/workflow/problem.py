@@ -1,0 +1,158 @@
+"""The contact problem of a case: what every level needs and none should compute twice."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.case.schema import Case
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.statics import (
+    ReachError,
+    StaticContact,
+    contact_compliance,
+    static_contact,
+)
+from klack.elasticity.statics import Flexibility
+from klack.workflow.bodies import BodyPair, build_bodies
+from klack.workflow.progress import Progress
+
+__all__ = ["ContactProblem", "build_problem"]
+
+# The first estimate of the compliance loads the points that touch first.
+_FIRST_POINTS = 48
+# The reach holds the approach of the bound below with this margin.
+_REACH_MARGIN = 1.25
+# The ladder of static loads ends this much above the quasi-static bound of the impact force.
+_LOAD_MARGIN = 1.15
+_ATTEMPTS = 5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactProblem:
+    """Bodies, contact points and static contact of one case.
+
+    Parameters
+    ----------
+    case : Case
+    pair : BodyPair
+    space : ContactSpace
+    flexibility_upper, flexibility_lower : Flexibility
+        Static solutions of both bodies; close them with :meth:`close` before a full-order run
+        to give their memory back.
+    static : StaticContact
+        Ladder of static contact states beyond the highest force of the impact.
+    """
+
+    case: Case
+    pair: BodyPair
+    space: ContactSpace
+    flexibility_upper: Flexibility
+    flexibility_lower: Flexibility
+    static: StaticContact
+
+    def close(self) -> None:
+        """Free the factorisations."""
+        self.flexibility_upper.close()
+        self.flexibility_lower.close()
+
+
+def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:
+    """Mesh, place, factorise, and solve the static contact.
+
+    The highest force is bounded without knowing the contact: an impact of relative speed v and
+    effective mass m stores at most m v^2 / 2 in the contact, and the static curve gives the force
+    and the approach at which that much is stored.  The candidate points reach further than that.
+    """
+    pair = build_bodies(case, progress)
+    progress("factorise", 0.0)
+    upper = Flexibility(pair.upper, threads=threads)
+    progress("factorise", 0.5)
+    lower = Flexibility(pair.lower, threads=threads)
+    progress("factorise", 1.0)
+    static = _static_contact(case, pair, upper, lower, progress)
+    return ContactProblem(
+        case=case,
+        pair=pair,
+        space=static.space,
+        flexibility_upper=upper,
+        flexibility_lower=lower,
+        static=static,
+    )
+
+
+def _effective_mass(pair: BodyPair) -> float:
+    masses = [body.mass for body in (pair.upper, pair.lower) if not body.is_fixed]
+    return 1.0 / sum(1.0 / m for m in masses)
+
+
+def _impact_energy(case: Case, pair: BodyPair) -> float:
+    """Bound of the energy that the contact can store [J]: kinetic, and work of closing forces."""
+    motion = case.motion
+    energy = 0.5 * _effective_mass(pair) * motion.speed**2
+    closing = max(motion.force, 0.0) + (motion.spring.preload if motion.spring else 0.0)
+    return energy + closing * (case.contact.gap or 0.0)
+
+
+def _static_contact(
+    case: Case, pair: BodyPair, upper: Flexibility, lower: Flexibility, progress: Progress
+) -> StaticContact:
+    """Static contact on as many candidate points as the impact can reach."""
+    surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    energy = _impact_energy(case, pair)
+    progress("static contact", 0.0)
+    space = contact_space(*surfaces, reach=case.contact.reach)
+    reach = space.reach
+    force = sqrt(2.0 * energy / _first_compliance(space, upper, lower))
+    if case.contact.reach is None:
+        reach = _REACH_MARGIN * 2.0 * energy / force
+    for attempt in range(_ATTEMPTS):
+        if reach > space.reach:
+            space = contact_space(*surfaces, reach=reach)
+        candidates = space.restricted(space.gap <= space.gap.min() + reach)
+        progress("static contact", 0.2)
+        C = contact_compliance(candidates, upper, lower)
+        progress("static contact", 0.8)
+        try:
+            static = _ladder(candidates, C, energy, force)
+        except ReachError:
+            if case.contact.reach is not None or attempt == _ATTEMPTS - 1:
+                raise
+            reach *= 1.5
+            continue
+        break
+    progress("static contact", 1.0)
+    return static
+
+
+def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibility) -> float:
+    """Axial compliance [m/N] of both bodies under pressure on the points that touch first."""
+    gap = np.where(space.axial > 1e-6, space.gap, np.inf)
+    first = np.argsort(gap, kind="stable")[:_FIRST_POINTS]
+    lam = np.zeros(space.count)
+    lam[first] = space.area[first]
+    lam /= space.axial @ lam
+    compliance = 0.0
+    for G, flexibility in ((space.G_a, upper), (space.G_b, lower)):
+        load = G.T @ lam
+        compliance += float(load @ flexibility.solve(load[:, None])[:, 0])
+    return compliance
+
+
+def _ladder(
+    space: ContactSpace, C: NDArray[np.float64], energy: float, force: float
+) -> StaticContact:
+    """Static contact up to a force above that of a quasi-static impact of this energy."""
+    while True:
+        static = static_contact(space, C, force)
+        # energy stored along the ladder, by the trapezoidal rule from first touch
+        approach, load = np.append(0.0, static.approach), np.append(0.0, static.force)
+        stored = np.concatenate(
+            [[0.0], np.cumsum(np.diff(approach) * (load[1:] + load[:-1]) / 2.0)]
+        )
+        if stored[-1] >= energy:
+            break
+        force *= 1.5
+    needed = _LOAD_MARGIN * float(np.interp(energy, stored, load))
+    return static_contact(space, C, needed)
