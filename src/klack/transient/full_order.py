@@ -32,7 +32,7 @@ from contextlib import ExitStack
 from functools import partial
 from math import ceil, floor, inf
 from time import perf_counter
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
-from klack.elasticity.factorization import Backend, factorize
+from klack.elasticity.factorization import Backend, Factorization, factorize
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.transient.inertia import InverseMass, massless_nodes
 from klack.transient.interface_solve import interface_solve
@@ -52,13 +52,18 @@ __all__ = ["Scheme", "recommended_step", "simulate_full_order"]
 
 Scheme = Literal["contact-stabilised-newmark", "massless"]
 
+_T = TypeVar("_T")
+
 _log = logging.getLogger(__name__)
 
 _PENETRATION = 1e-13
 """Gap [m] below which a point outside of the watched ones counts as closed."""
 
-_WATCH_STEPS = 20
+_WATCH_STEPS = 12
 """A point is watched when it would close within this many steps at the impact speed."""
+
+_LEARN_STEPS = 60
+"""The same for the points whose response is worked out together with those needed now."""
 
 _REVIEW_STEPS = 32
 """Steps between reviews of the watched points."""
@@ -158,13 +163,15 @@ def simulate_full_order(
                 expected="a body that is free to fly along z",
                 hint="fix only radial degrees of freedom of the needle, or swap the bodies.",
             )
+        for body in bodies:
+            stack.callback(body.close)
         pool = None
         if threads > 1 and len(bodies) > 1:
             pool = stack.enter_context(ThreadPoolExecutor(max_workers=len(bodies)))
         run = _Run(bodies, space, speed, step, scheme, pool, axial_force)
-        for body in bodies:
-            body.set_up(stack, step, scheme, backend, threads)
-        run.set_up()
+        run.together(
+            [partial(b.set_up, step, scheme, backend, _share(threads, bodies)) for b in bodies]
+        )
         start, retraction = run.place()
         set_up_time = perf_counter() - begin
         record = _march(
@@ -172,6 +179,11 @@ def simulate_full_order(
         )
         loop_time = perf_counter() - begin - set_up_time
         return _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
+
+
+def _share(threads: int, bodies: Sequence["_Motion"]) -> int:
+    """Threads of one body while the others work as well."""
+    return max(1, threads // len(bodies))
 
 
 class _Motion:
@@ -198,41 +210,51 @@ class _Motion:
         self.whole_mass = csr_array(body.M)
         self.K = csr_array(body.K)[self.free][:, self.free]
         self.G = csr_array(G)[:, self.free]
-        self.contact_nodes = np.unique(csr_array(G).indices) // self.dimension
+        self.contact_nodes = np.unique(csr_array(G).indices // self.dimension).astype(np.int64)
         self.axis = axis[self.free]
         self.mass = float(axis @ (self.whole_mass @ axis))
         self.full_axis = axis
         self.force = np.zeros(len(self.free))
         self.u = np.zeros(len(self.free))
         self.v = np.zeros(len(self.free))
-
-    def set_up(
-        self, stack: ExitStack, step: float, scheme: Scheme, backend: Backend, threads: int
-    ) -> None:
-        """Factorise, and get the compliances of the contact points."""
-        self.step = step
-        M = self.whole_mass
+        self.factor: Factorization | None = None
         self.inverse_mass: InverseMass | None = None
         self.light = np.empty(0, dtype=np.int64)
+
+    def set_up(self, step: float, scheme: Scheme, backend: Backend, threads: int) -> None:
+        """Factorise."""
+        self.step = step
+        M = self.whole_mass
         if scheme == "massless":
             M = massless_nodes(M, self.contact_nodes, self.dimension)
             self.light = np.flatnonzero(np.isin(self.free // self.dimension, self.contact_nodes))
-            self.mobility = np.zeros((self.G.shape[0],) * 2)
         else:
             self.inverse_mass = InverseMass(
                 M, self.free, self.dimension, backend=backend, threads=threads
             )
-            stack.callback(self.inverse_mass.close)
-            self.mobility = self.inverse_mass.compliance(self.G)
         self.M = csr_array(M)[self.free][:, self.free]
         self.axial_mass = (csr_array(M) @ self.full_axis)[self.free]
         self.G_transposed = csr_array(self.G.T)
         self.G_axis = self.G @ self.axis
+        self.mobility = np.zeros((self.G.shape[0],) * 2)
         S = csr_array(self.M * (4.0 / step**2) + self.K)
-        factor = stack.enter_context(factorize(S, backend=backend, threads=threads))
-        self.backend = factor.backend
-        self.factor_entries = factor.nonzeros or 0
-        self.solve = interface_solve(factor, self.G)
+        self.factor = factorize(S, backend=backend, threads=threads)
+        self.solve = interface_solve(self.factor, self.G)
+
+    def learn(self, points: NDArray[np.int64]) -> None:
+        """Work out the response to contact points that come near for the first time."""
+        self.solve.learn(points)
+        if self.inverse_mass is not None:
+            columns = self.inverse_mass.mobility(self.G, points)
+            self.mobility[:, points] = columns
+            self.mobility[points] = columns.T
+
+    def close(self) -> None:
+        """Give the memory of the factors back."""
+        if self.factor is not None:
+            self.factor.close()
+        if self.inverse_mass is not None:
+            self.inverse_mass.close()
 
     def fly(self) -> NDArray[np.float64]:
         """Free flight w of this step; the gaps change by its return value, shape (nc,) [m]."""
@@ -310,15 +332,10 @@ class _Run:
         self.closed = np.zeros(count, dtype=bool)
         self.overshooting = np.zeros(count, dtype=bool)
         self.watched = np.zeros(count, dtype=bool)
+        self.learned = np.zeros(count, dtype=bool)
+        self.share = 1.0 if scheme == "massless" else 2.0
         self.contact_loss = self.overshoot_loss = self.work = 0.0
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
-
-    def set_up(self) -> None:
-        """Add up the compliances of the bodies."""
-        stabilised = self.scheme == "contact-stabilised-newmark"
-        self.share = 2.0 if stabilised else 1.0
-        self.compliance = self.share * sum(body.solve.compliance for body in self.bodies)
-        self.mobility = sum(body.mobility for body in self.bodies)
 
     def place(self) -> tuple[float, float]:
         """Put a just before the first touch; returns the time flown and the retraction."""
@@ -346,19 +363,32 @@ class _Run:
         return flown * self.step, retraction
 
     @property
+    def reach_per_step(self) -> float:
+        """Change of a gap in one step at the impact speed [m]."""
+        return self.speed * self.step
+
+    @property
     def margin(self) -> float:
         """Gap [m] below which a point is watched."""
-        return _WATCH_STEPS * self.speed * self.step
+        return _WATCH_STEPS * self.reach_per_step
 
     def watch(self, points: NDArray[np.bool_]) -> None:
         """Look at these points from now on."""
+        if np.any(points & ~self.learned):
+            new = (points | (self.gap < _LEARN_STEPS * self.reach_per_step)) & ~self.learned
+            self.together([partial(body.learn, np.flatnonzero(new)) for body in self.bodies])
+            self.learned |= new
         self.watched = points
         self.points = np.flatnonzero(points)
         for body in self.bodies:
             body.solve.select(self.points)
         grid = np.ix_(self.points, self.points)
-        self.force_problem = ComplementaritySolver(self.compliance[grid])
-        self.overshoot_problem = ComplementaritySolver(self.mobility[grid])
+        self.force_problem = ComplementaritySolver(
+            self.share * np.sum([body.solve.compliance[grid] for body in self.bodies], axis=0)
+        )
+        self.overshoot_problem = ComplementaritySolver(
+            np.sum([body.mobility[grid] for body in self.bodies], axis=0)
+        )
 
     def advance(self) -> tuple[float, float]:
         """One step; returns its mean axial contact force [N] and its mean smallest gap [m]."""
@@ -377,7 +407,7 @@ class _Run:
                 break
             self.repeats += 1
             self.watch(self.watched | missed | (gap < self.margin))
-            change = sum(body.solve.response() for body in self.bodies)
+            change = np.sum([body.solve.response() for body in self.bodies], axis=0)
         self.rounds += rounds
         self.closed[:] = False
         self.closed[self.points] = active
@@ -388,7 +418,11 @@ class _Run:
         self.mu = np.zeros(len(flight))
         if self.scheme == "massless":
             return self.lam
-        flight = flight - self.step * (self.mobility @ self.y) if np.any(self.y) else flight
+        flight = (
+            flight - self.step * sum(b.mobility @ self.y for b in self.bodies)
+            if np.any(self.y)
+            else flight
+        )
         overshoot = flight < 0.0
         if np.any(overshoot & ~self.watched):
             self.watch(self.watched | overshoot | (self.gap < self.margin))
@@ -435,11 +469,14 @@ class _Run:
         return float(self.space.axial @ mean), float(np.min(0.5 * (before + gap)))
 
     def _sum(self, tasks: Sequence[Callable[[], NDArray[np.float64]]]) -> NDArray[np.float64]:
-        """Sum of what the bodies return, worked on side by side if there are threads."""
+        return np.sum(self.together(tasks), axis=0)
+
+    def together(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
+        """Do the same for all bodies, side by side if there are threads."""
         if self.pool is None:
-            return np.sum([task() for task in tasks], axis=0)
+            return [task() for task in tasks]
         futures = [self.pool.submit(task) for task in tasks]
-        return np.sum([future.result() for future in futures], axis=0)
+        return [future.result() for future in futures]
 
 
 class _Record:
@@ -623,9 +660,10 @@ def _ledger(
 
 
 def _statistics(run: _Run, times: tuple[float, float]) -> SolverStatistics:
+    factors = [body.factor for body in run.bodies if body.factor is not None]
     return SolverStatistics(
         scheme=run.scheme,
-        backend=run.bodies[0].backend,
+        backend=factors[0].backend,
         degrees_of_freedom=sum(len(body.free) for body in run.bodies),
         contact_points=len(run.gap),
         steps=run.steps,
@@ -633,7 +671,7 @@ def _statistics(run: _Run, times: tuple[float, float]) -> SolverStatistics:
         rounds_per_step=run.rounds / max(run.steps_in_contact, 1),
         watched=run.watch_sum / max(run.steps, 1),
         repeats=run.repeats,
-        factor_entries=sum(body.factor_entries for body in run.bodies),
+        factor_entries=sum(factor.nonzeros or 0 for factor in factors),
         set_up_time=times[0],
         loop_time=times[1],
     )

@@ -76,16 +76,15 @@ class InverseMass:
             X[places] = factor.solve(B[places])
         return X
 
-    def compliance(self, G: csr_array) -> NDArray[np.float64]:
-        """G M^-1 G^T, shape (nc, nc) [1/kg], for G of shape (nc, n_free)."""
-        count = G.shape[0]
-        C = np.zeros((count, count))
+    def mobility(self, G: csr_array, points: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Columns ``points`` of G M^-1 G^T, shape (nc, k) [1/kg], for G of shape (nc, n_free)."""
+        columns = np.zeros((G.shape[0], len(points)))
         for places, factor in self._parts:
             part = csr_array(G[:, places])
-            for start in range(0, count, _BLOCK):
+            for start in range(0, len(points), _BLOCK):
                 block = slice(start, start + _BLOCK)
-                C[:, block] += part @ factor.solve(part[block].toarray().T)
-        return 0.5 * (C + C.T)
+                columns[:, block] += part @ factor.solve(part[points[block]].toarray().T)
+        return columns
 
     def close(self) -> None:
         """Give the memory back."""

@@ -14,7 +14,6 @@ The contact points reach only a few rows of :math:`\hat Y` (a path through the e
 substitution already contains the forces.
 """
 
-from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -35,13 +34,17 @@ _LARGEST_RESPONSE = 2**30
 class InterfaceSolve(Protocol):
     """Solves S x = b + G^T lam in two halves, with lam chosen in between.
 
-    ``compliance`` is G S^-1 G^T, shape (nc, nc) [m/N].
+    ``compliance`` is G S^-1 G^T, shape (nc, nc) [m/N], valid between points that were learned.
     """
 
     compliance: NDArray[np.float64]
 
+    def learn(self, points: NDArray[np.int64]) -> None:
+        """Work out the response to new contact points, shape (k,)."""
+        ...
+
     def select(self, points: NDArray[np.int64]) -> None:
-        """Contact points that the next calls speak about, shape (ns,)."""
+        """Contact points that the next calls speak about, shape (ns,); all learned before."""
         ...
 
     def predict(self, b: NDArray[np.float64]) -> None:
@@ -85,16 +88,30 @@ class SplitSolve:
 
     def __init__(self, factorization: _Halves, G: csr_array) -> None:
         self._factorization = factorization
-        self._rows, self._half = _reached(G, factorization.forward)
-        self.compliance = self._half @ self._half.T
-        self._selected = self._half
+        self._G = G
+        # the rows that any point reaches: random weights leave no entry zero by chance
+        weights = np.random.default_rng(1).uniform(1.0, 2.0, G.shape[0])
+        self._rows = np.flatnonzero(factorization.forward(G.T @ weights))
+        self._half = np.zeros((G.shape[0], len(self._rows)))  # memory is taken when written to
+        self._known = np.empty(0, dtype=np.int64)
+        self.compliance = np.zeros((G.shape[0],) * 2)
+        self._selected = self._half[self._known]
         self._y = np.empty(0)
         self._free = np.empty(0)
 
+    def learn(self, points: NDArray[np.int64]) -> None:
+        """See :class:`InterfaceSolve`."""
+        for block in _blocks(points):
+            columns = self._G[block].toarray().T
+            self._half[block] = self._factorization.forward(columns)[self._rows].T
+        self._known = np.concatenate([self._known, points])
+        shared = self._half[points] @ self._half[self._known].T
+        self.compliance[np.ix_(points, self._known)] = shared
+        self.compliance[np.ix_(self._known, points)] = shared.T
+
     def select(self, points: NDArray[np.int64]) -> None:
         """See :class:`InterfaceSolve`."""
-        whole = len(points) == len(self._half)
-        self._selected = self._half if whole else self._half[points]
+        self._selected = self._half[points]
 
     def predict(self, b: NDArray[np.float64]) -> None:
         """See :class:`InterfaceSolve`."""
@@ -122,21 +139,22 @@ class WholeSolve:
     def __init__(self, factorization: Factorization, G: csr_array) -> None:
         self._factorization = factorization
         self._G = G
-        self._kept: NDArray[np.float64] | None = None
-        count, size = G.shape
-        keep = 8 * count * size <= _LARGEST_RESPONSE
-        if keep:
-            self._kept = np.empty((count, size))
-        self.compliance = np.empty((count, count))
-        for start in range(0, count, _BLOCK):
-            columns = G[start : start + _BLOCK].toarray().T
-            response = factorization.solve(columns)
-            self.compliance[:, start : start + _BLOCK] = G @ response
-            if self._kept is not None:
-                self._kept[start : start + _BLOCK] = response.T
-        self.compliance = 0.5 * (self.compliance + self.compliance.T)
-        self._points = np.arange(count)
+        keep = 8 * G.shape[0] * G.shape[1] <= _LARGEST_RESPONSE
+        self._kept = np.zeros(G.shape) if keep else None
+        self.compliance = np.zeros((G.shape[0],) * 2)
+        self._points = np.empty(0, dtype=np.int64)
         self._x = np.empty(0)
+
+    def learn(self, points: NDArray[np.int64]) -> None:
+        """See :class:`InterfaceSolve`."""
+        for block in _blocks(points):
+            response = self._factorization.solve(self._G[block].toarray().T)
+            shared = self._G @ response
+            self.compliance[:, block] = shared
+            self.compliance[block] = shared.T
+            self.compliance[np.ix_(block, block)] = 0.5 * (shared[block] + shared[block].T)
+            if self._kept is not None:
+                self._kept[block] = response.T
 
     def select(self, points: NDArray[np.int64]) -> None:
         """See :class:`InterfaceSolve`."""
@@ -161,23 +179,5 @@ class WholeSolve:
         return self._x + self._factorization.solve(self._G[points].T @ lam[active])
 
 
-def _reached(
-    G: csr_array, forward: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Rows of L^-1 G^T that are not zero, shape (nr,), and its transpose there, (nc, nr)."""
-    count, size = G.shape
-    parts: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
-    touched = np.zeros(size, dtype=bool)
-    for start in range(0, count, _BLOCK):
-        half = forward(G[start : start + _BLOCK].toarray().T)
-        rows = np.flatnonzero(np.any(half != 0.0, axis=1))
-        touched[rows] = True
-        parts.append((rows, half[rows].T))
-    reached = np.flatnonzero(touched)
-    position = np.cumsum(touched) - 1
-    result = np.zeros((count, len(reached)))
-    start = 0
-    for rows, half in parts:
-        result[start : start + len(half), position[rows]] = half
-        start += len(half)
-    return reached, result
+def _blocks(points: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    return [points[start : start + _BLOCK] for start in range(0, len(points), _BLOCK)]

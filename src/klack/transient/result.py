@@ -138,7 +138,7 @@ class FullOrderResult:
     @property
     def pressure(self) -> NDArray[np.float32]:
         """Contact pressure of every point, shape (n, nc) [Pa]."""
-        return self.point_force / self.area.astype(np.float32)
+        return np.asarray(self.point_force / self.area, dtype=np.float32)
 
     @property
     def peak_index(self) -> int:
