@@ -10,8 +10,8 @@ import pytest
 from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
-from klack.mesh.mesh import Mesh
 from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import mesh_summary, require_connected
 from klack.mesh.sizing import MeshSizing, Refinement
@@ -56,9 +56,7 @@ def surface_area(mesh: Mesh, name: str) -> float:
     return 2 * np.pi * total
 
 
-RING = Refinement(
-    position=(2 * MM * SIN45, 2 * MM * (1 - SIN45)), size=0.02 * MM, radius=0.1 * MM
-)
+RING = Refinement(position=(2 * MM * SIN45, 2 * MM * (1 - SIN45)), size=0.02 * MM, radius=0.1 * MM)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +156,9 @@ def test_glued_solids_share_nodes_and_hide_their_interface():
 def test_solids_that_do_not_fit_are_refused(shift, text):
     def block(low: float) -> Profile:
         high = low + 2 * MM
-        return Profile((0, low), (Line((MM, low)), Line((MM, high)), Line((0, high)), Line((0, low))))
+        return Profile(
+            (0, low), (Line((MM, low)), Line((MM, high)), Line((0, high)), Line((0, low)))
+        )
 
     with pytest.raises(InputError, match=text):
         mesh_meridian({"a": block(0.0), "b": block(2 * MM + shift)}, MeshSizing(size=MM))

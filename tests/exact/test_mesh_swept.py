@@ -12,8 +12,8 @@ from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
 from klack.mesh.boundary import FaceTable, outer_surface
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import ElementBlock, Mesh, Surface
 from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import ElementBlock, Mesh, Surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import require_connected
 from klack.mesh.sizing import MeshSizing, Refinement
@@ -36,7 +36,7 @@ def needle() -> Profile:
 
 
 def tube() -> Profile:
-    """A body that does not touch the axis."""
+    """Build a body that does not touch the axis."""
     return Profile(
         (2 * MM, 0),
         (
@@ -103,8 +103,10 @@ def test_volume_of_a_needle_follows_pappus(meridian, layers, tolerance):
 
 @pytest.mark.parametrize("profile", [needle(), tube()], ids=["on the axis", "tube"])
 def test_mesh_is_watertight_and_faces_point_outwards(profile):
-    """Gauss' theorem on the very same curved mesh holds to round-off only if every inner face is
-    shared and every named face points out."""
+    """Gauss' theorem on the very same curved mesh, to round-off.
+
+    It holds only if every inner face is shared and every named face points out.
+    """
     mesh = sweep(mesh_meridian({"body": profile}, MeshSizing(size=1 * MM)), 12)
 
     flux = sum(flux_and_area(mesh, surface)[0] for surface in mesh.surfaces.values())
@@ -180,11 +182,11 @@ def test_sectors_cover_their_share_of_the_circumference(meridian):
 
 
 def test_sectors_are_refused_where_they_make_no_sense(meridian, solid):
-    with pytest.raises(InputError, match="(?s)an axisymmetric mesh.*hold the whole surface"):
+    with pytest.raises(InputError, match=r"(?s)an axisymmetric mesh.*hold the whole surface"):
         sector_nodes(meridian, "shank", 3, 0.5, 0.0)
     with pytest.raises(InputError, match="do not overlap"):
         sector_nodes(solid, "shank", 3, 2.2, 0.0)
-    with pytest.raises(InputError, match="nodes in . of 40 sectors|nodes in .. of 40 sectors"):
+    with pytest.raises(InputError, match=r"nodes in \d+ of 40 sectors"):
         sector_nodes(solid, "shank", 40, 0.01, 0.0)
     with pytest.raises(InputError, match="one of: shank, tip, top"):
         sector_nodes(solid, "shaft", 3, 0.5, 0.0)

@@ -101,7 +101,7 @@ class MeshSizing:
                 raise InputError(
                     f"MeshSizing.surfaces['{name}']",
                     got="a name that the geometry does not have",
-                    expected=f"one of: {', '.join(sorted(known)) or 'none'}",
+                    expected=f"one of: {', '.join(sorted(set(known))) or 'none'}",
                     hint="check the spelling, or name the face in the CAD file.",
                 )
 
