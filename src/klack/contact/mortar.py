@@ -179,13 +179,14 @@ def contact_space(
     _check_pair(mesh_a, surface_a, mesh_b, surface_b, reach)
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
     others = {"a": sides["b"], "b": sides["a"]}
-    gaps = {side: face_gaps(*sides[side], *others[side]) for side in sides}
+    looked_at = ("a", "b") if slave is None else (slave,)
+    gaps = {side: face_gaps(*sides[side], *others[side]) for side in looked_at}
     if not all(np.any(np.isfinite(gap)) for gap in gaps.values()):
         raise _not_facing(surface_a, surface_b)
     floor = min(float(np.nanmin(gap)) for gap in gaps.values())
     if reach is None:
         points = _POINTS_BY_COST[mesh_a.dimension]
-        limit = min(_reach_by_cost(gaps[side], points) for side in sides)
+        limit = min(_reach_by_cost(gap, points) for gap in gaps.values())
     else:
         limit = floor + reach
     if slave is None:
@@ -311,27 +312,24 @@ def _build(
 ) -> ContactSpace:
     mesh, surface = sides[slave]
     other_mesh, other_surface = sides["b" if slave == "a" else "a"]
-    inner = _nodes_of(surface, near)
+    inner = _part(surface, near).nodes
     ring = _faces_at(surface, inner)
     zeros = np.zeros(mesh.node_count)
     sums = _Sums(mesh.dimension, zeros.copy(), zeros.copy(), zeros.copy(), np.inf, [], [])
-    start = 0
-    for block in surface.blocks:
-        chosen = block.connectivity[ring[start : start + len(block.connectivity)]]
-        start += len(block.connectivity)
-        if len(chosen):
-            faces = FaceBlock(block.family, chosen)
-            for piece in _pieces(block.family):
-                _integrate(sums, mesh, faces, piece, other_mesh, other_surface)
+    for block in _part(surface, ring).blocks:
+        for piece in _pieces(block.family):
+            _integrate(sums, mesh, block, piece, other_mesh, other_surface)
     return _assemble(sides, slave, sums, inner, ring, limit, reach)
 
 
-def _nodes_of(surface: Surface, faces: NDArray[np.bool_]) -> NDArray[np.int64]:
-    start, parts = 0, []
+def _part(surface: Surface, faces: NDArray[np.bool_]) -> Surface:
+    """Return the marked faces of a surface."""
+    start, blocks = 0, []
     for block in surface.blocks:
-        parts.append(block.connectivity[faces[start : start + len(block.connectivity)]].ravel())
+        chosen = block.connectivity[faces[start : start + len(block.connectivity)]]
         start += len(block.connectivity)
-    return np.unique(np.concatenate(parts))
+        blocks.append(FaceBlock(block.family, chosen))
+    return Surface(surface.name, tuple(block for block in blocks if len(block.connectivity)))
 
 
 def _faces_at(surface: Surface, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -434,7 +432,7 @@ def _assemble(
         shape = (len(nodes), sides[side][0].dof_count)
         scaled = value[kept] / area[row[kept]]
         matrices[side] = coo_array((scaled, (row[kept], column[kept])), shape=shape).tocsr()
-    left_out = (inside & facing & ~candidate) | ((sums.full > 0) & ~inside)
+    left_out = facing & ~candidate & (gap > limit)
     dimension = mesh.dimension
     return ContactSpace(
         G_a=matrices["a"],
@@ -456,11 +454,9 @@ def _touches(
     surface: Surface, faces: NDArray[np.bool_], marked: NDArray[np.bool_], count: int
 ) -> NDArray[np.bool_]:
     """Nodes that share one of ``faces`` with a marked node."""
-    start, result = 0, np.zeros(count, dtype=bool)
-    for block in surface.blocks:
-        connectivity = block.connectivity[faces[start : start + len(block.connectivity)]]
-        start += len(block.connectivity)
-        result[connectivity[marked[connectivity].any(axis=1)]] = True
+    result = np.zeros(count, dtype=bool)
+    for block in _part(surface, faces).blocks:
+        result[block.connectivity[marked[block.connectivity].any(axis=1)]] = True
     return result
 
 
@@ -514,15 +510,22 @@ def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
     if not np.isfinite(shift):
         raise _not_facing(surface_a, surface_b)
     along = np.zeros(mesh_a.dimension)
+    slave: Literal["a", "b"] | None = None
     for _ in range(30):
         along[-1] = shift
-        step = contact_space(mesh_a.moved(along), surface_a, mesh_b, surface_b).touch
-        shift -= step
-        if abs(step) <= 1e-12:
+        space = contact_space(mesh_a.moved(along), surface_a, mesh_b, surface_b, slave=slave)
+        if slave is None:  # only the faces at the touching place matter from now on
+            slave = space.slave
+            if slave == "a":
+                surface_a = _part(surface_a, _faces_at(surface_a, space.nodes))
+            else:
+                surface_b = _part(surface_b, _faces_at(surface_b, space.nodes))
+        shift -= space.touch
+        if abs(space.touch) <= 1e-12:
             return shift
     raise ConvergenceError(
         f"contact: placing surface '{surface_a.name}' on '{surface_b.name}' did not settle, the "
-        f"last move was {step * 1e6:.3g} um.\n"
+        f"last move was {space.touch * 1e6:.3g} um.\n"
         "Try: a finer mesh on the contact surfaces."
     )
 

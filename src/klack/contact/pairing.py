@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.ray_cutting import cut_nearest, face_polynomials
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
@@ -39,9 +40,6 @@ _OPPOSED = -0.1
 
 _DEPTH = 0.1
 """Deepest penetration that counts, relative to the extent of the master surface."""
-
-_PAIRS = 2_000_000
-"""Number of (point, face) pairs looked at in one go; bounds the memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,100 +171,27 @@ def project_to_surface(
     face_of = np.full(count, -1, dtype=np.int64)
     xi_of = np.zeros((count, d - 1))
     gap_of = np.full(count, np.nan)
-    nearest = np.full(count, np.inf)
     if deepest is None:
         deepest = _DEPTH * float(np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0)))
+    x, n = _in_space(points), _in_space(normals)
     for number, block in enumerate(surface.blocks):
-        for point, face in _candidates(points, normals, mesh.points, block):
-            xi, gap, good = _newton(points[point], normals[point], mesh.points, block, face)
-            good &= gap >= -deepest
-            point, face, xi, gap = point[good], face[good], xi[good], gap[good]
-            order = np.lexsort((np.abs(gap), point))
-            first = np.ones(len(order), dtype=bool)
-            first[1:] = point[order][1:] != point[order][:-1]
-            best = order[first]
-            best = best[np.abs(gap[best]) < nearest[point[best]]]
-            target = point[best]
-            nearest[target] = np.abs(gap[best])
-            block_of[target], face_of[target] = number, face[best]
-            xi_of[target], gap_of[target] = xi[best], gap[best]
+        corner = _in_space(mesh.points[block.connectivity])
+        centre = corner.mean(axis=1)
+        # a quarter more than the nodes span, for the bulge of a curved face
+        radius = 1.25 * np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
+        face, xi, gap = cut_nearest(
+            *(x, n, face_polynomials(mesh.points, block.family, block.connectivity)),
+            *(centre, radius, block.family.startswith("tri"), _INSIDE, _OPPOSED, deepest),
+        )
+        nearer = (face >= 0) & ~(np.abs(gap_of) <= np.abs(gap))
+        block_of[nearer], face_of[nearer] = number, face[nearer]
+        xi_of[nearer], gap_of[nearer] = xi[nearer, : d - 1], gap[nearer]
     return Projection(block_of, face_of, xi_of, gap_of)
 
 
-def _candidates(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    block: FaceBlock,
-) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Pairs (point, face) whose line meets the bounding ball of the face, in chunks."""
-    corner = nodes[block.connectivity]
-    origin = corner.mean(axis=(0, 1))
-    centre = corner.mean(axis=1) - origin
-    radius = np.linalg.norm(corner - corner.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-    square = np.sum(centre**2, axis=1)
-    chunk = max(1, _PAIRS // len(centre))
-    pairs = []
-    for start in range(0, len(points), chunk):
-        x = points[start : start + chunk] - origin
-        n = normals[start : start + chunk]
-        along = n @ centre.T - np.sum(x * n, axis=1)[:, None]
-        distance = square - 2.0 * x @ centre.T + np.sum(x**2, axis=1)[:, None]
-        # a quarter more than the nodes span, for the bulge of a curved face
-        point, face = np.nonzero(distance - along**2 <= (1.25 * radius) ** 2)
-        if len(point):
-            pairs.append((point + start, face))
-    return pairs
-
-
-def _newton(
-    x: NDArray[np.float64],
-    n: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    block: FaceBlock,
-    face: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Find reference coordinates and gap of every (line, face) pair, and which are valid."""
-    d = x.shape[1]
-    corner = nodes[block.connectivity[face]]
-    start = reference_nodes(block.family)[: FAMILIES[block.family].corners].mean(axis=0)
-    xi = np.tile(start, (len(x), 1))
-    gap = np.einsum("pd,pd->p", corner.mean(axis=1) - x, n)
-    cosine = np.zeros(len(x))
-    settled = np.zeros(len(x), dtype=bool)
-    open_ = np.arange(len(x))
-    for _ in range(25):
-        N, dN = shape_functions(block.family, xi[open_])
-        tangents = np.einsum("pnk,pnd->pkd", dN, corner[open_])
-        residual = x[open_] + gap[open_, None] * n[open_]
-        residual -= np.einsum("pn,pnd->pd", N, corner[open_])
-        jacobian = np.empty((len(open_), d, d))
-        jacobian[:, :, : d - 1] = -np.swapaxes(tangents, 1, 2)
-        jacobian[:, :, d - 1] = n[open_]
-        normal = _normals(tangents)
-        length = np.linalg.norm(normal, axis=1)
-        slope = np.einsum("pd,pd->p", normal, n[open_])
-        regular = np.abs(slope) > 1e-3 * length  # a line that grazes the face meets nothing
-        open_, length, slope = open_[regular], length[regular], slope[regular]
-        step = np.linalg.solve(jacobian[regular], -residual[regular, :, None])[:, :, 0]
-        move = np.abs(step[:, : d - 1]).max(axis=1)
-        step[:, : d - 1] *= (1.0 / np.maximum(move, 1.0))[:, None]
-        xi[open_] += step[:, : d - 1]
-        gap[open_] += step[:, d - 1]
-        cosine[open_] = slope / length
-        done = move < 1e-12
-        settled[open_[done]] = True
-        near = np.abs(xi[open_]).max(axis=1) < 4.0
-        open_ = open_[~done & near]
-        if not len(open_):
-            break
-    return xi, gap, settled & _inside(block.family, xi) & (cosine < _OPPOSED)
-
-
-def _inside(family: str, xi: NDArray[np.float64]) -> NDArray[np.bool_]:
-    if family.startswith("tri"):
-        return (xi.min(axis=1) >= -_INSIDE) & (xi.sum(axis=1) <= 1.0 + _INSIDE)
-    return np.abs(xi).max(axis=1) <= 1.0 + _INSIDE
+def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns (r, z) become (r, 0, z)."""
+    return x if x.shape[-1] == 3 else np.insert(x, 1, 0.0, axis=-1)
 
 
 def face_gaps(

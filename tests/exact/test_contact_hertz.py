@@ -1,0 +1,102 @@
+"""Static contact of half-spaces; truth: Hertz, Sneddon and the line contact (Johnson 1985).
+
+The bodies are 1000 contact widths large (their far ends change the approach by 0.05 %) and the
+slopes of the gap are small, as the closed solutions assume.
+"""
+
+import numpy as np
+import pytest
+
+from klack.contact.statics import check_resolution
+from klack.verification.indentation import STEEL, half_spaces, parabola
+
+MODULUS = STEEL.plane_strain_modulus / 2.0  # 1/E* = 2 (1 - nu^2)/E
+WIDTH = 100e-6
+
+
+def sphere(cells, family="quad8", radius=40e-3):
+    problem = half_spaces(
+        parabola(radius, 4 * WIDTH),
+        contact=WIDTH,
+        cells=cells,
+        family=family,
+        reach=(1.45 * WIDTH) ** 2 / (2 * radius),
+    )
+    stiffness = 4.0 / 3.0 * MODULUS * np.sqrt(radius)
+    return problem.solve(stiffness * (WIDTH**2 / radius) ** 1.5), stiffness, radius
+
+
+@pytest.mark.parametrize(
+    ("cells", "family"),
+    [((16, 12), "quad8"), ((12, 16), "quad8"), ((16, 12), "tri6")],
+    ids=["hats above", "hats below", "triangles"],
+)
+def test_sphere_on_half_space(cells, family):
+    """Measured: coefficient +0.04 %, exponent 1.5000, radius -0.1 %, pressure 1.7 % of p0."""
+    static, stiffness, radius = sphere(cells, family)
+
+    resolved = static.half_width > 0.25 * WIDTH
+    exponent = np.polyfit(np.log(static.approach[resolved]), np.log(static.force[resolved]), 1)[0]
+    a = np.cbrt(3 * static.force * radius / (4 * MODULUS))
+    p0 = 1.5 * static.force[-1] / (np.pi * a[-1] ** 2)
+    r = static.space.points[:, 0]
+    inside = r < 0.9 * a[-1]
+    pressure = (static.pressures[-1] / static.space.area)[inside]
+    assert resolved.sum() > 10
+    assert exponent == pytest.approx(1.5, abs=5e-3)
+    np.testing.assert_allclose(
+        static.force[resolved], stiffness * static.approach[resolved] ** 1.5, rtol=5e-3
+    )
+    np.testing.assert_allclose(static.half_width[resolved], a[resolved], rtol=1.5e-2)
+    np.testing.assert_allclose(pressure / p0, np.sqrt(1 - (r[inside] / a[-1]) ** 2), atol=0.02)
+
+
+def test_area_converges_from_below():
+    """Only whole hats count: the error falls with the size of the elements."""
+    error = []
+    for cells in ((8, 6), (16, 12), (32, 24)):
+        static, _, radius = sphere(cells)
+        a = np.cbrt(3 * static.force[-1] * radius / (4 * MODULUS))
+        error.append(static.area[-1] / (np.pi * a**2) - 1)
+
+    assert np.all(np.array(error) < 0)
+    assert abs(error[2]) < abs(error[1]) < abs(error[0]) < 0.08
+
+
+def test_cone_on_half_space():
+    """Sneddon 1965: P = 2 E* d^2/(pi m) for a cone of small slope m; contact radius 2 d/(pi m)."""
+    slope, limit = 0.005, 4 * WIDTH
+    problem = half_spaces(
+        lambda r: slope * r, contact=WIDTH, cells=(16, 12), reach=1.45 * slope * WIDTH
+    )
+    approach = 0.5 * np.pi * slope * WIDTH
+    static = problem.solve(2 * MODULUS * approach**2 / (np.pi * slope))
+
+    resolved = static.approach > 0.3 * static.approach[-1]
+    exact = 2 * MODULUS * static.approach**2 / (np.pi * slope)
+    edge = static.space.points[static.pressures[-1] > 0, 0].max()
+    assert resolved.sum() > 8
+    assert limit > WIDTH
+    np.testing.assert_allclose(static.force[resolved], exact[resolved], rtol=1e-2)
+    assert edge == pytest.approx(2 * static.approach[-1] / (np.pi * slope), rel=0.05)
+
+
+def test_torus_on_half_space_is_a_line_contact():
+    """Half width b = sqrt(4 P' R/(pi E*)), P' = P/(2 pi r); b/r = 1/50 leaves about a percent."""
+    radius, ring = 2e-3, 50 * WIDTH / 4
+    width = WIDTH / 4
+    line_load = np.pi * MODULUS * width**2 / (4 * radius)
+    problem = half_spaces(
+        parabola(radius, 5 * width),
+        contact=width,
+        cells=(12, 9),
+        ring=ring,
+        reach=(2.5 * width) ** 2 / (2 * radius),
+    )
+    static = problem.solve(2 * np.pi * ring * line_load)
+
+    b = np.sqrt(4 * static.force * radius / (2 * np.pi * ring * np.pi * MODULUS))
+    resolved = b > 0.4 * width
+    assert resolved.sum() > 8
+    np.testing.assert_allclose(static.half_width[resolved], b[resolved], rtol=0.02)
+    assert check_resolution(static) == pytest.approx(width / 12 / b[-1], rel=0.02)
