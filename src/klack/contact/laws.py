@@ -44,9 +44,9 @@ class FlatLaw:
     ----------
     kind : int
         ``LAW_LINEAR``: ``parameters = [k]``; ``LAW_HERTZ``: ``[K, n]``; ``LAW_TABLE``: ``[n]``
-        followed by six arrays of length ``n``: start of each interval, force there, the factors of
-        ``s``, ``s^2``, ``s^3`` (``s`` from the start of the interval) and the potential there.  The
-        last interval has no end: it is the linear continuation.
+        followed by six numbers for each of ``n`` intervals: its start, the force there, the factors
+        of ``s``, ``s^2``, ``s^3`` (``s`` from the start of the interval) and the potential there.
+        The last interval has no end: it is the linear continuation.
     parameters : array
     dissipation : float [-]
         ``alpha`` of :class:`HuntCrossley`; 0 for an elastic law.
@@ -207,7 +207,7 @@ class TableLaw:
         )
         return FlatLaw(
             kind=LAW_TABLE,
-            parameters=np.concatenate(([float(self.indentation.size)], *columns)),
+            parameters=np.append(float(self.indentation.size), np.column_stack(columns).ravel()),
         )
 
     def _locate(self, indentation: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

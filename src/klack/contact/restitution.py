@@ -197,9 +197,10 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 2e-3) -> Impact
 
     strongest = max(cluster, key=lambda phase: phase.peak_force)
     J = float(np.sum(history.force[first:last]) * history.step)
-    J_outside = float(np.sum(history.external_force[first:last]) * history.step)
-    gained = history.mass_a * (history.velocity_a[last] - history.velocity_a[first])
-    dv = J * (inverse_a + inverse_b) + J_outside * inverse_a
+    outside = _outside_speed(history)
+    gained = history.velocity_a[last] - history.velocity_a[first] - outside[last] + outside[first]
+    drift = np.interp(release, history.edges, outside) - np.interp(touch, history.edges, outside)
+    dv = J * (inverse_a + inverse_b) + float(drift)
     approach_energy = 0.5 * before**2 / (inverse_a + inverse_b)
     lost = history.ledger.contact_dissipation + history.ledger.damping
     return ImpactMeasures(
@@ -214,7 +215,7 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 2e-3) -> Impact
         rebound_speed=after,
         restitution=e,
         restitution_from_impulse=dv / -before - 1.0,
-        impulse_residual=(J - gained + J_outside) / J,
+        impulse_residual=float(1.0 - history.mass_a * gained / J),
         dissipated_share=lost / approach_energy,
         vibration_share=1.0 - e**2 - lost / approach_energy,
         impacts=len(clusters),

@@ -1,7 +1,7 @@
 """Bodies that need no finite elements: rigid mass, immovable wall, elastic rod.
 
-They are :class:`klack.reduction.reduced_body.ReducedBody` objects like any other, so the lumped level
-and the exact one-dimensional tests run through the same code as a reduced valve.
+They are :class:`klack.reduction.reduced_body.ReducedBody` objects like any other, so the lumped
+level and the exact one-dimensional tests run through the same code as a reduced valve.
 """
 
 from math import pi, sqrt

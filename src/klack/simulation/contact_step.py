@@ -1,56 +1,57 @@
 r"""The scalar contact equation of one time step, compiled.
 
-With a constant force over a step the modes move exactly, so the indentation at its end is
-``d1 = d_free - G F`` and the work done is exactly ``F (d1 - d0)``.  The force is the discrete gradient
+With a constant force over a step the modes move exactly, so the indentation at its end is ``d1 =
+d_free - G F`` and the work done is exactly ``F (d1 - d0)``.  The force is the discrete gradient
 of the potential (Gonzalez 1996),
 
 .. math:: F = \frac{V(d_1) - V(d_0)}{d_1 - d_0}\,\Bigl(1 + \chi\frac{d_1 - d_0}{h}\Bigr),
 
-which makes that work equal to the stored energy plus a loss that is never negative: an energy identity
-for every step size.  ``V(d_1) - V(d_0)`` is never formed by subtraction where digits would be lost.
-Laws arrive as flat numbers, see :class:`klack.contact.laws.FlatLaw`.
+which makes that work equal to the stored energy plus a loss that is never negative: an energy
+identity for every step size.  ``V(d_1) - V(d_0)`` is never formed by subtraction where digits
+would be lost.  Laws arrive as flat numbers, see :class:`klack.contact.laws.FlatLaw`.
 """
 
 from math import sqrt
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from klack.contact.laws import LAW_HERTZ, LAW_LINEAR
+from klack.contact.laws import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
 
 __all__ = ["law_potential", "mean_force", "solve_step"]
 
-_LINEAR, _HERTZ = LAW_LINEAR, LAW_HERTZ
-_STEP_ACCEPTED = 1e-15  # [m] Newton step that is taken without a look at what it leaves
+Vector = NDArray[np.float64]
+
+_LINEAR, _HERTZ, _TABLE = LAW_LINEAR, LAW_HERTZ, LAW_TABLE
+_FORCE_LEFT = 1e-9  # [N] accepted error of a force
+_UNKNOWN = 1e16  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-13 m
+_FAR = 1.0  # [m] deeper than any contact
 _NEWTON_LIMIT = 60
 
 
 @njit(cache=True, inline="always")
-def _power(d, n):
+def _power(d: float, n: float) -> float:
     if n == 1.5:
         return d * sqrt(d)
     return d**n
 
 
-@njit(cache=True)
-def _interval(p, start, n, d, hint):
-    """Interval of a table that holds ``d``, searched from where it was last."""
-    i = hint
-    while i > 0 and d < p[start + 1 + i]:
-        i -= 1
-    while i < n - 1 and d >= p[start + 2 + i]:
-        i += 1
+@njit(cache=True, inline="always")
+def _interval(p: Vector, start: int, d: float, hint: int) -> int:
+    """Offset in ``p`` of the table interval that holds ``d``, searched from where it was last."""
+    first = start + 1
+    last = first + 6 * (int(p[start]) - 1)
+    i = first + 6 * hint
+    while i > first and d < p[i]:
+        i -= 6
+    while i < last and d >= p[i + 6]:
+        i += 6
     return i
 
 
-@njit(cache=True, inline="always")
-def _cubic(p, start, n, i, d):
-    s = d - p[start + 1 + i]
-    base = start + 1 + i
-    return p[base + n] + s * (p[base + 2 * n] + s * (p[base + 3 * n] + s * p[base + 4 * n]))
-
-
 @njit(cache=True)
-def law_potential(kind, p, start, d):
+def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
     """Stored energy [J] of the elastic law at indentation ``d``."""
     if d <= 0.0:
         return 0.0
@@ -58,18 +59,13 @@ def law_potential(kind, p, start, d):
         return 0.5 * p[start] * d * d
     if kind == _HERTZ:
         return p[start] / (p[start + 1] + 1.0) * _power(d, p[start + 1]) * d
-    n = int(p[start])
-    i = _interval(p, start, n, d, 0)
-    base = start + 1 + i
-    s = d - p[base]
-    return p[base + 5 * n] + s * (
-        p[base + n]
-        + s * (p[base + 2 * n] / 2 + s * (p[base + 3 * n] / 3 + s * p[base + 4 * n] / 4))
-    )
+    i = _interval(p, start, d, 0)
+    s = d - p[i]
+    return p[i + 5] + s * (p[i + 1] + s * (p[i + 2] / 2 + s * (p[i + 3] / 3 + s * p[i + 4] / 4)))
 
 
 @njit(cache=True)
-def _hertz_mean(K, n, low, high):
+def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
     """Mean of ``K d^n`` over ``low < d < high``, both positive and close together or not."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     r = half / middle
@@ -81,71 +77,77 @@ def _hertz_mean(K, n, low, high):
     return K / (n + 1.0) * (_power(high, n) * high - _power(low, n) * low) / (high - low)
 
 
+@njit(cache=True, inline="always")
+def _cubic_mean(p: Vector, i: int, s0: float, s1: float) -> tuple[float, float]:
+    """Mean force between two places of one table interval, and its slope over ``s1``."""
+    c1, c2, c3 = p[i + 2], p[i + 3], p[i + 4]
+    sum1, sum2 = s0 + s1, s0 * s0 + s1 * s1
+    mean = p[i + 1] + c1 / 2 * sum1 + c2 / 3 * (sum2 + s0 * s1) + c3 / 4 * sum1 * sum2
+    slope = c1 / 2 + c2 / 3 * (s0 + 2.0 * s1) + c3 / 4 * (sum2 + 2.0 * s1 * sum1)
+    return mean, slope
+
+
+@njit(cache=True, inline="always")
+def _within(p: Vector, start: int, i: int, d0: float, d1: float) -> bool:
+    """Whether both indentations lie in the table interval at offset ``i``."""
+    return min(d0, d1) >= p[i] and (i + 6 > start + 6 * int(p[start]) or max(d0, d1) < p[i + 6])
+
+
 @njit(cache=True)
-def mean_force(kind, p, start, d0, d1, hint):
-    """Mean force between two indentations, its slope over ``d1``, and the table interval of ``d1``."""
-    low, high = min(d0, d1), max(d0, d1)
-    if high <= 0.0:
+def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple[float, float, int]:
+    """Mean force of a table, its slope over ``d1``, and the interval of ``d1``."""
+    i = _interval(p, start, max(d1, 0.0), hint)
+    number = (i - start - 1) // 6
+    if _within(p, start, i, d0, d1):
+        mean, slope = _cubic_mean(p, i, d0 - p[i], d1 - p[i])
+        return mean, slope, number
+    low, high = max(min(d0, d1), 0.0), max(d0, d1)
+    i = _interval(p, start, low, number)
+    j = _interval(p, start, high, number)
+    work, left = 0.0, low
+    for piece in range(i, j + 1, 6):
+        right = high if piece == j else p[piece + 6]
+        mean, _ = _cubic_mean(p, piece, left - p[piece], right - p[piece])
+        work += (right - left) * mean
+        left = right
+    mean = work / abs(d1 - d0)
+    f1 = 0.0
+    if d1 > 0.0:
+        end = j if d1 >= d0 else i
+        f1, _ = _cubic_mean(p, end, d1 - p[end], d1 - p[end])
+    return mean, (f1 - mean) / (d1 - d0), number
+
+
+@njit(cache=True)
+def mean_force(
+    kind: int, p: Vector, start: int, d0: float, d1: float, hint: int
+) -> tuple[float, float, int]:
+    """Mean force between two indentations, its slope over ``d1``, and the table interval."""
+    if d0 <= 0.0 and d1 <= 0.0:
         return 0.0, 0.0, hint
-    below = max(low, 0.0)
-    width, closed = high - low, high - below
     if kind == _LINEAR:
         k = p[start]
-        f1 = k * max(d1, 0.0)
-        mean = 0.5 * k * (below + high)
-        tangent = k
-    elif kind == _HERTZ:
+        if d0 >= 0.0 and d1 >= 0.0:
+            return 0.5 * k * (d0 + d1), 0.5 * k, hint
+        mean = 0.5 * k * max(d0, d1) ** 2 / abs(d1 - d0)
+        return mean, (k * max(d1, 0.0) - mean) / (d1 - d0), hint
+    if kind == _HERTZ:
         K, n = p[start], p[start + 1]
-        f1 = K * _power(max(d1, 0.0), n)
-        mean = _hertz_mean(K, n, below, high)
-        tangent = 0.0  # set below where it is needed
-        if width < 1e-16:
-            tangent = n * mean / high
-    else:
-        n_points = int(p[start])
-        i = _interval(p, start, n_points, below, hint)
-        j = _interval(p, start, n_points, high, i)
-        if i == j:
-            f_low = _cubic(p, start, n_points, i, below)
-            f_high = _cubic(p, start, n_points, i, high)
-            f_middle = _cubic(p, start, n_points, i, 0.5 * (below + high))
-            mean = (f_low + 4.0 * f_middle + f_high) / 6.0  # exact for a cubic
-        else:
-            work = 0.0
-            left = below
-            f_high = 0.0
-            for piece in range(i, j + 1):
-                right = high if piece == j else p[start + 2 + piece]
-                f_left = _cubic(p, start, n_points, piece, left)
-                f_high = _cubic(p, start, n_points, piece, right)
-                f_middle = _cubic(p, start, n_points, piece, 0.5 * (left + right))
-                work += (right - left) * (f_left + 4.0 * f_middle + f_high) / 6.0
-                left = right
-            mean = work / closed
-        hint = j
-        f1 = f_high
-        if d1 < high:
-            f1 = 0.0
-            if d1 > 0.0:
-                f1 = _cubic(p, start, n_points, i, below)
-        s = below - p[start + 1 + i]
-        base = start + 1 + i
-        tangent = p[base + 2 * n_points] + s * (
-            2.0 * p[base + 3 * n_points] + 3.0 * s * p[base + 4 * n_points]
-        )
-    if width < 1e-16:
-        return mean, 0.5 * tangent, hint
-    mean *= closed / width
-    return mean, (f1 - mean) / (d1 - d0), hint
+        low, high = min(d0, d1), max(d0, d1)
+        mean = _hertz_mean(K, n, max(low, 0.0), high)
+        if high - low < 1e-16:
+            return mean, 0.5 * n * mean / high, hint
+        mean *= (high - max(low, 0.0)) / (high - low)
+        return mean, (K * _power(max(d1, 0.0), n) - mean) / (d1 - d0), hint
+    return _table_mean(p, start, d0, d1, hint)
 
 
 @njit(cache=True)
-def _solve_linear(k, G, d0, df):
+def _solve_linear(k: float, G: float, d0: float, df: float) -> float:
     """Closed form of the elastic step for ``F = k d``: both closed, release, onset."""
     a = 1.0 + 0.5 * G * k
     if d0 >= 0.0:
-        d1 = (df - 0.5 * G * k * d0) / a
-        if d1 >= 0.0:
+        if df >= 0.5 * G * k * d0:
             return 0.5 * k * (d0 + df) / a
         b, c = df + d0, d0 * (df - 0.5 * G * k * d0)
         root = sqrt(max(b * b - 4.0 * c, 0.0))
@@ -158,11 +160,22 @@ def _solve_linear(k, G, d0, df):
 
 
 @njit(cache=True)
-def solve_step(kind, p, start, chi_over_h, G, d0, df, guess, hint):
+def solve_step(
+    kind: int,
+    p: Vector,
+    start: int,
+    chi_over_h: float,
+    G: float,
+    d0: float,
+    df: float,
+    guess: float,
+    hint: int,
+) -> tuple[float, int, float]:
     """Contact force of one step.
 
-    Solves ``d1 = df - G F(d0, d1)``; its left minus right side rises with ``d1``, so there is one
-    root, between ``df - G F(d0, df)`` and ``df``.
+    Solves ``excess = d1 - df + G F(d0, d1) = 0``.  ``excess`` rises with a slope of 1 or more, so
+    there is one root, and it lies within ``|excess|`` of any ``d1``: the bracket of the safeguarded
+    Newton iteration costs nothing.
 
     Returns the force, the table interval, and the part of the work ``F (d1 - d0)`` that is lost.
     """
@@ -170,33 +183,40 @@ def solve_step(kind, p, start, chi_over_h, G, d0, df, guess, hint):
         return 0.0, hint, 0.0
     if kind == _LINEAR and chi_over_h == 0.0:
         return _solve_linear(p[start], G, d0, df), hint, 0.0
-    high = df
-    force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, df, hint)
-    if force <= 0.0:
-        return 0.0, hint, _lost(kind, p, start, chi_over_h, d0, df, hint)
-    low = df - G * force
-    d1 = min(max(df - G * guess, low), high)
+    low, high = -_FAR, df
+    d1 = df - G * guess
+    force = 0.0
     for _ in range(_NEWTON_LIMIT):
-        force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, d1, hint)
+        i = start + 1 + 6 * hint
+        if kind == _TABLE and chi_over_h == 0.0 and _within(p, start, i, d0, d1):
+            force, slope = _cubic_mean(p, i, d0 - p[i], d1 - p[i])  # the usual case, no call
+            curvature = abs(p[i + 3]) + abs(p[i + 4]) * (d0 + 3.0 * d1 - 4.0 * p[i])
+        else:
+            force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, d1, hint)
+            curvature = _UNKNOWN
         excess = d1 - df + G * force
         step = excess / (1.0 + G * slope)
-        if abs(step) < _STEP_ACCEPTED:  # before the bracket test: both its ends are round-off now
-            force -= slope * step
+        # taken without a look back, and before the bracket test: both its ends are round-off then
+        if curvature * step * step < _FORCE_LEFT:
+            force = max(force - slope * step, 0.0)
             d1 -= step
             break
         if excess > 0.0:
-            high = d1
+            low, high = max(low, d1 - excess), d1
         else:
-            low = d1
+            low, high = d1, min(high, d1 - excess)
         d1 -= step
-        if not low < d1 < high:
+        if not low <= d1 <= high:
             d1 = 0.5 * (low + high)
-    force = max(force, 0.0)
+    if chi_over_h == 0.0:
+        return force, hint, 0.0
     return force, hint, _lost(kind, p, start, chi_over_h, d0, d1, hint)
 
 
 @njit(cache=True)
-def _step_force(kind, p, start, chi_over_h, d0, d1, hint):
+def _step_force(
+    kind: int, p: Vector, start: int, chi_over_h: float, d0: float, d1: float, hint: int
+) -> tuple[float, float, int]:
     mean, slope, hint = mean_force(kind, p, start, d0, d1, hint)
     if chi_over_h == 0.0:
         return mean, slope, hint
@@ -207,9 +227,9 @@ def _step_force(kind, p, start, chi_over_h, d0, d1, hint):
 
 
 @njit(cache=True)
-def _lost(kind, p, start, chi_over_h, d0, d1, hint):
-    if chi_over_h == 0.0:
-        return 0.0
+def _lost(
+    kind: int, p: Vector, start: int, chi_over_h: float, d0: float, d1: float, hint: int
+) -> float:
     mean, _, _ = mean_force(kind, p, start, d0, d1, hint)
     stored = mean * (d1 - d0)
     rate = chi_over_h * (d1 - d0)

@@ -131,7 +131,6 @@ def simulate(
     out_v[0] = flat.watch_v @ v
     books = np.zeros(3 + 2 * contacts)
     status = run_steps(
-        float(step),
         int(steps_per_record),
         q,
         v,
@@ -153,8 +152,10 @@ def simulate(
         flat.damped_weight,
         flat.damped_loss,
         flat.watch_q,
+        flat.watch_q_range,
         flat.watch_q_force,
         flat.watch_v,
+        flat.watch_v_range,
         flat.watch_v_force,
         force,
         peak,
@@ -276,9 +277,7 @@ def _ledger(
     )
 
 
-def _body_energy(
-    block: BodyBlock, q: NDArray[np.float64], v: NDArray[np.float64]
-) -> BodyEnergy:
+def _body_energy(block: BodyBlock, q: NDArray[np.float64], v: NDArray[np.float64]) -> BodyEnergy:
     body, rigid = block.body, block.body.rigid_count
     strain = 0.5 * (body.omega * q) ** 2
     translation = 0.5 * float(body.rigid_axial @ v[:rigid]) ** 2 / body.mass

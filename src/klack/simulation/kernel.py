@@ -1,16 +1,20 @@
 """The time loop: exact modes, discrete-gradient contacts, decimated records, energy books.
 
-Everything is a flat array; :mod:`klack.simulation.system` builds them.  One step is one pass over the
-modes (free motion, with the contact force of the step before folded in) and a scalar equation for each
-contact that is closed or closes.
+Everything is a flat array; :mod:`klack.simulation.system` builds them.  One step is one pass over
+the modes (free motion, with the contact force of the step before folded in) and a scalar equation
+for each contact that is closed or closes.
 """
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from klack.simulation.contact_step import solve_step
 
 __all__ = ["STATUS_CONTACTS", "STATUS_FINE", "run_steps"]
+
+Vector = NDArray[np.float64]  # one axis
+Matrix = NDArray[np.float64]  # two axes
 
 STATUS_FINE, STATUS_CONTACTS = 0, 1
 _SWEEP_LIMIT = 500
@@ -20,7 +24,7 @@ _FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use v
 
 
 @njit(cache=True, fastmath=_FAST)
-def _free(q, v, A, row):
+def _free(q: Vector, v: Vector, A: Matrix, row: Vector) -> float:
     """Free motion over a step, in place; returns ``row . q``."""
     y = 0.0
     for i in range(q.size):
@@ -32,7 +36,7 @@ def _free(q, v, A, row):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _forced(q, v, A, row, P, F):
+def _forced(q: Vector, v: Vector, A: Matrix, row: Vector, P: Matrix, F: float) -> float:
     """Free motion after the modal force ``F P`` of the step before; returns ``row . q``."""
     y = 0.0
     for i in range(q.size):
@@ -44,7 +48,7 @@ def _forced(q, v, A, row, P, F):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _dot(a, b):
+def _dot(a: Vector, b: Vector) -> float:
     y = 0.0
     for i in range(a.size):
         y += a[i] * b[i]
@@ -52,14 +56,22 @@ def _dot(a, b):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _copy(q, v, q0, v0):
+def _watch(row: Vector, first: int, last: int, state: Vector) -> float:
+    y = 0.0
+    for i in range(first, last):
+        y += row[i] * state[i]
+    return y
+
+
+@njit(cache=True, fastmath=_FAST)
+def _copy(q: Vector, v: Vector, q0: Vector, v0: Vector) -> None:
     for i in range(q.size):
         q0[i] = q[i]
         v0[i] = v[i]
 
 
 @njit(cache=True, fastmath=_FAST)
-def _modal_force(rows, F, f):
+def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
     for i in range(f.size):
         f[i] = rows[0, i] * F[0]
     for c in range(1, F.size):
@@ -68,7 +80,7 @@ def _modal_force(rows, F, f):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _damped_energy(q, v, B, f, W):
+def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> float:
     """Energy of the damped modes after the pending modal force ``f``."""
     total = 0.0
     for i in range(q.size):
@@ -79,8 +91,8 @@ def _damped_energy(q, v, B, f, W):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _damping_loss(q, v, B, f_before, f, Q):
-    """Loss of one step that started after the pending ``f_before`` and had the modal force ``f``."""
+def _damping_loss(q: Vector, v: Vector, B: Matrix, f_before: Vector, f: Vector, Q: Matrix) -> float:
+    """Loss of a step that started after the pending ``f_before`` and had the modal force ``f``."""
     total = 0.0
     for i in range(q.size):
         qi = q[i] + B[0, i] * f_before[i]
@@ -92,43 +104,44 @@ def _damping_loss(q, v, B, f_before, f, Q):
 
 @njit(cache=True)
 def run_steps(
-    h,
-    steps_per_record,
-    q,
-    v,
-    A,
-    B,
-    P,
-    rows,
-    gap_offset,
-    G,
-    push_index,
-    push,
-    push_gap,
-    law_kind,
-    law_data,
-    law_start,
-    alpha,
-    series,
-    damped,
-    damped_weight,
-    damped_loss,
-    watch_q,
-    watch_q_force,
-    watch_v,
-    watch_v_force,
-    out_force,
-    out_peak,
-    out_gap,
-    out_q,
-    out_v,
-    books,
-):
+    steps_per_record: int,
+    q: Vector,
+    v: Vector,
+    A: Matrix,
+    B: Matrix,
+    P: Matrix,
+    rows: Matrix,
+    gap_offset: Vector,
+    G: Matrix,
+    push_index: NDArray[np.int64],
+    push: Matrix,
+    push_gap: Vector,
+    law_kind: NDArray[np.int64],
+    law_data: Vector,
+    law_start: NDArray[np.int64],
+    alpha: Vector,
+    series: Vector,
+    damped: bool,
+    damped_weight: Matrix,
+    damped_loss: Matrix,
+    watch_q: Matrix,
+    watch_q_range: NDArray[np.int64],
+    watch_q_force: Matrix,
+    watch_v: Matrix,
+    watch_v_range: NDArray[np.int64],
+    watch_v_force: Matrix,
+    out_force: Matrix,
+    out_peak: Matrix,
+    out_gap: Matrix,
+    out_q: Matrix,
+    out_v: Matrix,
+    books: Vector,
+) -> int:
     """Integrate ``out_force.shape[0]`` records of ``steps_per_record`` steps, in place.
 
     Parameters
     ----------
-    h : float [s]
+    steps_per_record : int
     q, v : array (m,)
         Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
         position under the constant forces.
@@ -147,8 +160,8 @@ def run_steps(
     damped_weight, damped_loss : array (2, m), (6, m)
         Energy weights of the damped modes (zero for the others) and their loss forms.
     watch_q, watch_v : array (k, m), (l, m)
-        What is recorded at the ends of records; ``watch_*_force`` (k, c), (l, c): effect of unit
-        contact forces of the last step.
+        What is recorded at the ends of records; ``watch_*_range`` (k, 2), (l, 2): modes that count;
+        ``watch_*_force`` (k, c), (l, c): effect of unit contact forces of the last step.
     out_force, out_peak, out_gap : array (n, c)
         Mean force, largest step force, mean gap of each record.
     out_q, out_v : array (n + 1, k), (n + 1, l)
@@ -176,14 +189,20 @@ def run_steps(
     free = np.zeros(contacts)
     e = np.zeros(contacts)
     chi = np.zeros(contacts)
+    sum_gap = np.zeros(contacts)
+    sum_force = np.zeros(contacts)
+    peak = np.zeros(contacts)
     approaching = np.ones(contacts, np.bool_)
+    row0 = rows[0]
+    pushes = push_index.size
     one = contacts == 1
     if one:
         for i in range(modes):
-            pending_rows[0, i] = P[0, i] * rows[0, i]
-            pending_rows[1, i] = P[1, i] * rows[0, i]
+            pending_rows[0, i] = P[0, i] * row0[i]
+            pending_rows[1, i] = P[1, i] * row0[i]
     for c in range(contacts):
         gap[c] = gap_offset[c] + _dot(rows[c], q)
+    offset0 = gap_offset[0] + push_gap[0]
     pending = False
     in_flight = True
     flight_energy = _damped_energy(q, v, B, f, damped_weight) if damped else 0.0
@@ -191,76 +210,69 @@ def run_steps(
 
     for record in range(out_force.shape[0]):
         for c in range(contacts):
-            out_gap[record, c] = 0.0
-            out_force[record, c] = 0.0
-            out_peak[record, c] = 0.0
+            sum_gap[c] = sum_force[c] = peak[c] = 0.0
         for _ in range(steps_per_record):
             if damped:
                 _copy(q, v, q0, v0)
             if not pending:
-                free[0] = _free(q, v, A, rows[0])
+                y = _free(q, v, A, row0)
             elif one:
-                free[0] = _forced(q, v, A, rows[0], pending_rows, F[0])
+                y = _forced(q, v, A, row0, pending_rows, F[0])
             else:
                 for i in range(modes):
                     pending_rows[0, i] = P[0, i] * f[i]
                     pending_rows[1, i] = P[1, i] * f[i]
-                free[0] = _forced(q, v, A, rows[0], pending_rows, 1.0)
-            for k in range(push_index.size):
-                i = push_index[k]
-                q[i] += push[0, k]
-                v[i] += push[1, k]
-            free[0] += gap_offset[0] + push_gap[0]
+                y = _forced(q, v, A, row0, pending_rows, 1.0)
+            for k in range(pushes):
+                q[push_index[k]] += push[0, k]
+                v[push_index[k]] += push[1, k]
+            free[0] = offset0 + y
+            near = free[0] < e[0] or gap[0] + e[0] < 0.0
             for c in range(1, contacts):
                 free[c] = gap_offset[c] + _dot(rows[c], q)
+                near = near or free[c] < e[c] or gap[c] + e[c] < 0.0
 
-            near = False
-            for c in range(contacts):
-                F_before[c] = F[c]
-                if gap[c] + e[c] < 0.0 or free[c] - e[c] < 0.0:
-                    near = True
             closed = False
             if near:
                 for c in range(contacts):
                     if alpha[c] > 0.0 and approaching[c] and free[c] < 0.0:
                         # mean rate of the gap over the step of onset: no force has acted yet
-                        chi[c] = alpha[c] * h / max(gap[c] - free[c], 1e-30)
+                        chi[c] = alpha[c] / max(gap[c] - free[c], 1e-30)
                         approaching[c] = False
                 for sweep in range(_SWEEP_LIMIT):
-                    change = 0.0
-                    lost = 0.0
+                    change, lost = 0.0, 0.0
                     for c in range(contacts):
                         df = e[c] - free[c]
                         for other in range(contacts):
                             if other != c:
                                 df -= G[c, other] * F[other]
-                        d0 = -gap[c] - e[c]
                         own = G[c, c] + 2.0 * series[c]
+                        guess = F[c] if sweep > 0 else 2.0 * F[c] - F_before[c]
                         force, hint[c], loss = solve_step(
                             law_kind[c],
                             law_data,
                             law_start[c],
-                            chi[c] / h,
+                            chi[c],
                             own,
-                            d0,
+                            -gap[c] - e[c],
                             df,
-                            F[c],
+                            guess,
                             hint[c],
                         )
+                        if sweep == 0:
+                            F_before[c] = F[c]
                         change = max(change, abs(force - F[c]) * own)
                         lost += loss
                         F[c] = force
+                        closed = closed or force > 0.0
                     if one or change < _SWEEP_ACCEPTED:
                         break
                     if sweep == _SWEEP_LIMIT - 1:
                         return STATUS_CONTACTS
                 contact_loss += lost
-                for c in range(contacts):
-                    if F[c] > 0.0:
-                        closed = True
-            else:
-                for c in range(contacts):
-                    F[c] = 0.0
+            elif pending:
+                F[:] = 0.0
+                F_before[:] = 0.0
 
             if damped:
                 # flight: energy at its two ends; contact: the exact loss of each step
@@ -284,36 +296,36 @@ def run_steps(
             pending = closed
 
             for c in range(contacts):
-                before = gap[c]
                 after = free[c]
                 if closed:
                     for other in range(contacts):
                         after += G[c, other] * F[other]
-                if F[c] > 0.0:
-                    e[c] = 2.0 * series[c] * F[c] - e[c]
-                    out_force[record, c] += F[c]
-                    if F[c] > out_peak[record, c]:
-                        out_peak[record, c] = F[c]
-                elif e[c] != 0.0:
-                    release_loss += 0.5 * e[c] * e[c] / series[c]
-                    e[c] = 0.0
+                    sum_force[c] += F[c]
+                    peak[c] = max(peak[c], F[c])
+                sum_gap[c] += 0.5 * (gap[c] + after)
+                gap[c] = after
+                if series[c] > 0.0:
+                    if F[c] > 0.0:
+                        e[c] = 2.0 * series[c] * F[c] - e[c]
+                    elif e[c] != 0.0:
+                        release_loss += 0.5 * e[c] * e[c] / series[c]
+                        e[c] = 0.0
                 if after > _SEPARATED:
                     approaching[c] = True
                     chi[c] = 0.0
-                gap[c] = after
-                out_gap[record, c] += 0.5 * (before + after)
 
         for c in range(contacts):
-            out_force[record, c] /= steps_per_record
-            out_gap[record, c] /= steps_per_record
+            out_force[record, c] = sum_force[c] / steps_per_record
+            out_peak[record, c] = peak[c]
+            out_gap[record, c] = sum_gap[c] / steps_per_record
         for k in range(watch_q.shape[0]):
-            y = _dot(watch_q[k], q)
+            y = _watch(watch_q[k], watch_q_range[k, 0], watch_q_range[k, 1], q)
             if pending:
                 for c in range(contacts):
                     y += watch_q_force[k, c] * F[c]
             out_q[record + 1, k] = y
         for k in range(watch_v.shape[0]):
-            y = _dot(watch_v[k], v)
+            y = _watch(watch_v[k], watch_v_range[k, 0], watch_v_range[k, 1], v)
             if pending:
                 for c in range(contacts):
                     y += watch_v_force[k, c] * F[c]

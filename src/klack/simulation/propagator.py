@@ -131,9 +131,7 @@ def damping_loss(
     return DampingLoss(Q11=Q11, Q12=Q12, Q22=Q22, L1=L1, L2=L2, S=S)
 
 
-_Columns = tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]
+_Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 def _underdamped(w: NDArray[np.float64], z: NDArray[np.float64], h: float) -> _Columns:

@@ -1,0 +1,87 @@
+"""Sampled signals and spectra that carry their axis and their unit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, require_positive
+
+__all__ = ["Spectrum", "TimeSeries"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimeSeries:
+    """Values on a uniform time axis.
+
+    Parameters
+    ----------
+    step : float [s]
+    values : array, shape (n,) [unit]
+    unit : str
+        For example ``"N"``.
+    start : float [s]
+        Time of the first value.
+    name : str
+    """
+
+    step: float
+    values: NDArray[np.float64]
+    unit: str
+    start: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require_positive(f"TimeSeries '{self.name}': step", self.step, "s")
+        if self.values.ndim != 1 or self.values.size == 0:
+            raise InputError(
+                f"TimeSeries '{self.name}': values",
+                got=f"an array of shape {self.values.shape}",
+                expected="one axis with at least one value",
+                hint="give one channel at a time.",
+            )
+
+    @property
+    def time(self) -> NDArray:
+        """Time of each value [s], shape (n,)."""
+        return self.start + self.step * np.arange(self.values.size)
+
+    @property
+    def rate(self) -> float:
+        """Values per second [Hz]."""
+        return 1.0 / self.step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spectrum:
+    """One-sided values over frequency.
+
+    Parameters
+    ----------
+    frequency : array, shape (k,) [Hz]
+        Uniform, from 0.
+    values : array, shape (k,) [unit]
+        Complex for a spectrum, real for a density.
+    unit : str
+        For example ``"N s"``.
+    name : str
+    """
+
+    frequency: NDArray[np.float64]
+    values: NDArray[np.complex128] | NDArray[np.float64]
+    unit: str
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.frequency.shape != self.values.shape or self.frequency.size < 2:
+            raise InputError(
+                f"Spectrum '{self.name}'",
+                got=f"{self.frequency.size} frequencies and {self.values.size} values",
+                expected="the same number of both, at least two",
+                hint="use klack.acoustics.spectrum to make spectra from time series.",
+            )
+
+    @property
+    def resolution(self) -> float:
+        """Distance of neighbouring frequencies [Hz]."""
+        return float(self.frequency[1] - self.frequency[0])
