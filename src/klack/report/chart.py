@@ -17,6 +17,7 @@ from klack.errors import InputError
 __all__ = [
     "COLOURS",
     "DASHES",
+    "LABEL_STEP",
     "AxisSpec",
     "Band",
     "BarChart",
@@ -52,6 +53,9 @@ DASHES: dict[Style, tuple[float, ...]] = {
 }
 """Lengths in px of strokes and spaces."""
 
+LABEL_STEP = 0.13
+"""Labels of upright marks stand below each other, this share of the panel apart."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisSpec:
@@ -78,7 +82,7 @@ class AxisSpec:
             return ()
         low, high = self.range
         decades = range(floor(log10(low)), ceil(log10(high)) + 1)
-        steps = (1, 2, 5) if log10(high / low) < 3 else (1,)
+        steps = (1, 2, 5) if log10(high / low) < 3.01 else (1,)
         # 1e-3 * 2 is not the float that 2e-3 is
         values = [float(f"{step}e{power}") for power in decades for step in steps]
         return tuple(value for value in values if low <= value <= high)

@@ -319,8 +319,9 @@ def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
             "spectrum",
             "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "
             "f t) dt| in N s, without a window (the force begins and ends at zero), as a level "
-            "relative to 1 µN s. A third-octave level is that of the root mean square magnitude in "
-            "its band (IEC 61260-1, base ten).",
+            "relative to 1 µN s: 20 lg(|F|/1 µN s). A third-octave level is the integral of "
+            "2 |F|² over the band (IEC 61260-1, base ten) relative to 1 pN² s; all bands together "
+            "hold the integral of F² over time.",
         ),
         (
             "third-octave levels, deviation",

@@ -3,13 +3,20 @@
 Units on the axes are those of the workshop: us, N, um, kHz.
 """
 
+from dataclasses import replace
+from math import ceil, floor
+
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.comparison import first_impact, impact_third_octaves
+from klack.acoustics.spectrum import impulse_level, impulse_spectrum
+from klack.acoustics.third_octave import ThirdOctaves
 from klack.contact.history import ImpactHistory
 from klack.reduction.transfer import TransferComparison
 from klack.report.chart import (
     AxisSpec,
+    Band,
     BarChart,
     BarPart,
     Chart,
@@ -31,6 +38,7 @@ __all__ = [
     "law_chart",
     "modal_energy_chart",
     "motion_chart",
+    "spectrum_chart",
     "transfer_chart",
 ]
 
@@ -53,6 +61,7 @@ _MORE_LOOKS: tuple[Look, ...] = (
     ("orange", "dashed", 1.6),
     ("sky", "dashdot", 1.6),
 )
+_LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 _TIME = AxisSpec(label="time since first touch", unit="µs")
 _BODY_COLOURS: tuple[Colour, ...] = ("blue", "red", "green", "pink")
 _PART_LOOKS: tuple[tuple[Colour, str], ...] = (
@@ -69,7 +78,8 @@ _PART_LOOKS: tuple[tuple[Colour, str], ...] = (
 
 def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
     """Every figure that the study has data for, in the order of the report."""
-    found: list[Chart | BarChart] = [force_chart(study), motion_chart(study)]
+    found: list[Chart | BarChart] = [force_chart(study), spectrum_chart(study)]
+    found.append(motion_chart(study))
     found += [transfer_chart(comparison) for comparison in study.transfer]
     found += [law_chart(study), approach_chart(study), energy_bars(study)]
     if any(result.modal_energy for result in study.levels.values()):
@@ -180,6 +190,85 @@ def _way(history: ImpactHistory, time: Floats) -> Floats:
     return way - np.interp(0.0, time, way)
 
 
+# --------------------------------------------------------------------------- frequency
+
+
+def spectrum_chart(study: ImpactStudy) -> Chart:
+    """Spectrum of the force of the first impact: narrow band, third octaves, their difference."""
+    results = _ordered(study)
+    reference = results[0]
+    top = min(_TOP_FREQUENCY, *(0.1 / result.history.step for result in results))
+    frequency = np.geomspace(_LOW_FREQUENCY, top, 800)
+    narrow, bands, differences = [], [], []
+    levels = [impact_third_octaves(result.history, high=top) for result in results]
+    for result, octaves in zip(results, levels, strict=True):
+        spectrum = impulse_spectrum(first_impact(result.history), resolution=_RESOLUTION)
+        level = np.interp(frequency, spectrum.frequency, impulse_level(spectrum))
+        narrow.append(_level_curve(1e-3 * frequency, level, result))
+        bands.append(_steps(octaves, octaves.level, result))
+        if result is not reference:
+            differences.append(_steps(octaves, octaves.level - levels[0].level, result))
+    panels = [
+        _level_panel("level", "dB re 1 µN s", narrow, 60.0),
+        _level_panel("third octaves", "dB re 1 pN²s", bands, 50.0),
+    ]
+    trusted = _kept_up_to(study)
+    if trusted > _LOW_FREQUENCY:
+        label = f"below the highest kept mode, {1e-3 * trusted:.3g} kHz"
+        band = Band(low=1e-3 * _LOW_FREQUENCY, high=1e-3 * min(trusted, top), label=label)
+        panels[0] = replace(panels[0], bands=(band,))
+    if differences:
+        limit = max(1.5, 1.1 * max(float(np.max(np.abs(curve.y))) for curve in differences))
+        panels.append(
+            Panel(
+                y=AxisSpec(label="difference", unit="dB", range=(-limit, limit)),
+                curves=tuple(differences),
+                marks=tuple(Mark(value=value, axis="y") for value in (-1.0, 0.0, 1.0)),
+                share=0.55,
+            )
+        )
+    note = (
+        "Above: magnitude of the Fourier integral of the first impact, no window; its left end is "
+        "the impulse. Middle: energy in third octaves."
+    )
+    if differences:
+        note += (
+            f" Below: third-octave levels minus those of '{reference.label}', with lines at ±1 dB."
+        )
+    if trusted > _LOW_FREQUENCY:
+        note += " Shaded: frequencies below the highest kept mode of both bodies."
+    return Chart(
+        name="spectrum",
+        title="Spectrum of the contact force",
+        x=AxisSpec(
+            label="frequency", unit="kHz", log=True, range=(1e-3 * _LOW_FREQUENCY, 1e-3 * top)
+        ),
+        panels=tuple(panels),
+        note=note,
+    )
+
+
+def _level_panel(label: str, unit: str, curves: list[Curve], depth: float) -> Panel:
+    """Panel that reaches ``depth`` below the highest level; notches go deeper without meaning."""
+    highest = max(float(np.max(curve.y)) for curve in curves)
+    limits = (5 * floor((highest - depth) / 5), 5 * ceil((highest + 3) / 5))
+    return Panel(y=AxisSpec(label=label, unit=unit, range=limits), curves=tuple(curves), share=0.8)
+
+
+def _steps(octaves: ThirdOctaves, values: Floats, result: LevelResult) -> Curve:
+    """Levels as steps from band edge to band edge."""
+    seen = octaves.low >= 0.99 * _LOW_FREQUENCY / 10**0.05
+    edges = np.append(octaves.low[seen], octaves.high[-1])
+    heights = np.append(values[seen], values[-1])
+    return replace(_level_curve(1e-3 * edges, heights, result, label=False), drawn="steps")
+
+
+def _kept_up_to(study: ImpactStudy) -> float:
+    """Lower one of the highest kept frequencies of the bodies [Hz]."""
+    tops = [float(body.frequencies[-1]) for body in study.bodies if body.frequencies.size]
+    return min(tops) if tops else 0.0
+
+
 # --------------------------------------------------------------------------- reduction
 
 
@@ -237,11 +326,11 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
 def law_chart(study: ImpactStudy) -> Chart:
     """Local contact law with its straight line and the classical stiffness."""
     law = study.law
-    indentation = 1e6 * law.indentation
+    indentation, load = 1e6 * np.append(0.0, law.indentation), np.append(0.0, law.force)
     curves = [
         Curve(
             x=indentation,
-            y=law.force,
+            y=load,
             label=f"local law ({law.kind})",
             colour="black",
             width=2.4,
@@ -250,7 +339,7 @@ def law_chart(study: ImpactStudy) -> Chart:
     low, high = law.fit_range
     if np.isfinite(law.linear_stiffness) and law.linear_stiffness > 0:
         force = np.array([low, high])
-        near = float(np.interp(0.5 * (low + high), law.force, indentation))
+        near = float(np.interp(0.5 * (low + high), load, indentation))
         along = near + 1e6 * (force - force.mean()) / law.linear_stiffness
         curves.append(
             Curve(
@@ -296,16 +385,17 @@ def law_chart(study: ImpactStudy) -> Chart:
 def approach_chart(study: ImpactStudy) -> Chart:
     """Approach of the bodies under a static force, split into law and kept modes."""
     contact, law = study.contact, study.law
-    local = 1e6 * np.interp(contact.force, law.force, law.indentation)
-    local[contact.force > law.force[-1]] = np.nan
-    total = 1e6 * contact.approach
+    force = np.append(0.0, contact.force)
+    total = 1e6 * np.append(0.0, contact.approach)
+    local = 1e6 * np.interp(force, np.append(0.0, law.force), np.append(0.0, law.indentation))
+    local[force > law.force[-1]] = np.nan
     panels = [
         Panel(
             y=AxisSpec(label="approach", unit="µm"),
             curves=(
-                Curve(x=contact.force, y=total, label="both bodies, static", width=2.4),
+                Curve(x=force, y=total, label="both bodies, static", width=2.4),
                 Curve(
-                    x=contact.force,
+                    x=force,
                     y=local,
                     label="of it in the local law",
                     colour="red",

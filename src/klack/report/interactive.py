@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from klack.report.chart import COLOURS, DASHES, AxisSpec, BarChart, Chart, Curve, Panel
+from klack.report.chart import COLOURS, DASHES, LABEL_STEP, AxisSpec, BarChart, Chart, Curve, Panel
 
 __all__ = ["plotly_bars", "plotly_chart"]
 
@@ -153,6 +153,7 @@ def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) 
                 "width": curve.width,
                 "dash": dash or "solid",
                 "shape": "hv" if curve.drawn == "steps" else "linear",
+                "simplify": False,
             },
         }
     named.add(curve.label)
@@ -177,7 +178,8 @@ def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) ->
                 "layer": "below",
             }
         )
-        layout["annotations"].append(_label(band.label, band.high, 0.02, y_axis, log_x, "right"))
+        layout["annotations"].append(_label(band.label, band.low, 0.02, y_axis, log_x, "left"))
+    upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for mark in panel.marks:
         across = mark.axis == "y"
         layout["shapes"].append(
@@ -192,10 +194,9 @@ def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) ->
                 "line": {"color": "#5b626b", "width": 1, "dash": "3px,3px"},
             }
         )
-        if mark.label and not across:
-            layout["annotations"].append(
-                _label(mark.label, mark.value, 0.98, y_axis, log_x, "left")
-            )
+    for i, mark in enumerate(upright):  # one below the other
+        height = 0.98 - LABEL_STEP * i
+        layout["annotations"].append(_label(mark.label, mark.value, height, y_axis, log_x, "left"))
 
 
 def _label(text: str, x: float, y: float, y_axis: str, log_x: bool, anchor: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from klack.report.chart import COLOURS, DASHES, AxisSpec, BarChart, Chart, Curve, Panel
+from klack.report.chart import COLOURS, DASHES, LABEL_STEP, AxisSpec, BarChart, Chart, Curve, Panel
 
 __all__ = ["STYLE", "plain", "svg", "svg_bars", "svg_chart"]
 
@@ -97,12 +97,13 @@ def svg_bars(chart: BarChart) -> bytes:
 def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
     for band in panel.bands:
         axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
-        _note(axes, band.high, 0.02, band.label, "right", "bottom")
+        _note(axes, band.low, 0.02, " " + band.label, "left", "bottom")
     for mark in panel.marks:
         draw = axes.axvline if mark.axis == "x" else axes.axhline
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
-        if mark.label and mark.axis == "x":
-            _note(axes, mark.value, 0.98, " " + mark.label, "left", "top")
+    upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
+    for i, mark in enumerate(upright):
+        _note(axes, mark.value, 0.98 - LABEL_STEP * i, " " + mark.label, "left", "top")
     for curve in panel.curves:
         _draw_curve(axes, curve)
     _scale(axes, panel.y, "y")

@@ -1,8 +1,10 @@
 """The two bodies cut open: meshes on the left, displacement on the right, the contact enlarged.
 
 The needle moves several micrometres as a rigid body while it is stopped.  The colour is the total
-displacement, which is continuous through the contact.  The magnified *shape* leaves the rigid
-closing motion out: magnified with it, the bodies would run through each other.  The enlarged
+displacement; across the contact only its normal part is continuous, since the surfaces slide.
+The magnified *shape* leaves the rigid closing motion out: magnified with it, the bodies would run
+through each other.  Next to the contact
+strains are so large that magnified elements turn inside out; they are left out.  The enlarged
 contact is drawn at true scale, where the surfaces do touch.
 """
 
@@ -28,6 +30,10 @@ _TINTS = ("#d9e4ef", "#eee6d8", "#e2eddd", "#efe0e8")
 _INK = "#22262b"
 _VECTOR_LINES = 4000
 _MAP = "viridis"
+_SHOWN = 0.03
+"""Largest magnified displacement over the size of the picture, at most."""
+_CRUSHED = 0.2
+"""Triangles that magnification leaves less than this share of their area are not drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +51,7 @@ def section_figure(study: ImpactStudy) -> SectionFigure:
     low, high = _bounds(pictures)
     width, height = high[0], high[1] - low[1]
     elastic = max(float(np.abs(_elastic(picture)).max()) for picture in pictures)
-    factor = _round_down(0.04 * max(width, height) / elastic) if elastic > 0 else 1.0
+    factor = _round_down(_SHOWN * max(width, height) / elastic) if elastic > 0 else 1.0
     top = 1e6 * max(float(picture.magnitude.max()) for picture in pictures)
     spot = _contact_spot(pictures, study.contact.half_width)
     with rc_context(STYLE | {"axes.grid": False}):
@@ -79,6 +85,8 @@ def _note(study: ImpactStudy, factor: float) -> str:
             f" The rigid motion of the {picture.body} ({quantity(picture.closing, 'm', 3)} along "
             "the axis) is left out of the shape, not out of the colour; this is why a gap opens."
         )
+    if factor > 1:
+        note += " Elements at the contact that magnification would turn inside out are left out."
     return note + " Far right: the contact zone at true scale, with the elements of both bodies."
 
 
@@ -124,10 +132,13 @@ def _draw_mesh(axes: Any, picture: SectionPicture, tint: str) -> None:
 
 def _draw_field(axes: Any, picture: SectionPicture, shift: Floats, top: float) -> Any:
     points = 1e3 * (picture.points + shift)
+    whole = _areas(points, picture.triangles) > _CRUSHED * 1e6 * _areas(
+        picture.points, picture.triangles
+    )
     colours = axes.tripcolor(
         points[:, 0],
         points[:, 1],
-        picture.triangles,
+        picture.triangles[whole],
         1e6 * picture.magnitude,
         shading="gouraud",
         cmap=_MAP,
@@ -135,8 +146,15 @@ def _draw_field(axes: Any, picture: SectionPicture, shift: Floats, top: float) -
         vmax=top,
         rasterized=True,
     )
-    _draw_lines(axes, points[_rim(picture)], 0.7)
+    rim = _rim(picture)
+    kept = np.isin(rim, picture.triangles[whole]).all(axis=1)
+    _draw_lines(axes, points[rim[kept]], 0.7)
     return colours
+
+
+def _areas(points: Floats, triangles: NDArray[np.int64]) -> Floats:
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
 
 
 def _draw_lines(axes: Any, segments: Floats, width: float) -> None:
