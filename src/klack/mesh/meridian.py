@@ -186,9 +186,6 @@ def _corners_on_curves(tri: _Triangulation) -> NDArray[np.float64]:
     nearest = gap.argmin(axis=1)
     same = gap.min(axis=1) < 1e-9 * np.ptp(ends, axis=0).max()
     points[boundary[same]] = ends[nearest[same]]
-    for k, curve in enumerate(tri.curves):
-        if on_axis(curve):
-            points[tri.segments[tri.segment_curves == k], 0] = 0.0
     return points
 
 

@@ -114,7 +114,7 @@ _SPACING = 0.5
 def _steps(refinement: Refinement) -> NDArray[np.float64]:
     h = _SPACING * refinement.size
     count = int(np.ceil(refinement.radius / h))
-    return h * np.arange(-count, count + 1)
+    return np.linspace(-count * h, count * h, 2 * count + 1)
 
 
 def disc_points(refinement: Refinement) -> NDArray[np.float64]:
