@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 
-__all__ = ["Backend", "Factorization", "available_backends", "factorize"]
+__all__ = ["Backend", "Factorization", "Precision", "available_backends", "factorize"]
 
 Backend = Literal["auto", "pardiso", "ngsolve", "superlu"]
+Precision = Literal["double", "single"]
 
 _LARGEST_CONDITION = 1e14
+_LARGEST_RESIDUAL = {"double": 1e-10, "single": 1e-4}
 
 
 class Factorization(Protocol):
@@ -77,7 +79,13 @@ def available_backends() -> tuple[str, ...]:
     return tuple(name for name in _BACKENDS if _loadable(name))
 
 
-def factorize(A: Any, *, backend: Backend = "auto", threads: int | None = None) -> Factorization:
+def factorize(
+    A: Any,
+    *,
+    backend: Backend = "auto",
+    threads: int | None = None,
+    precision: Precision = "double",
+) -> Factorization:
     """Factorise a sparse symmetric positive definite matrix.
 
     Parameters
@@ -89,6 +97,9 @@ def factorize(A: Any, *, backend: Backend = "auto", threads: int | None = None) 
     threads : int, optional
         Threads of the factorisation and of each solve (pardiso only); the default is that of MKL.
         One thread is best for many single solves, two for the factorisation.
+    precision : {"double", "single"}
+        Of the factor; ``"single"`` (pardiso only, the others stay double) takes half the memory and
+        0.6 of the time, with relative residuals of some 1e-6.
 
     Raises
     ------
@@ -115,9 +126,11 @@ def factorize(A: Any, *, backend: Backend = "auto", threads: int | None = None) 
         raise not_positive_definite(
             f"diagonal entry {int(np.argmin(A.diagonal()))} is not positive"
         )
-    factor = _load(_chosen(backend))(A, threads)
+    name = _chosen(backend)
+    single = precision == "single" and name == "pardiso"
+    factor = _load(name)(A, threads, "single") if single else _load(name)(A, threads)
     try:
-        _check_condition(A, factor)
+        _check_condition(A, factor, _LARGEST_RESIDUAL["single" if single else "double"])
     except BaseException:
         factor.close()
         raise
@@ -149,7 +162,7 @@ def _loadable(name: str) -> bool:
         return False
 
 
-def _load(name: str) -> Callable[[Any, int | None], Factorization]:
+def _load(name: str) -> Callable[..., Factorization]:
     _, module, class_name = _BACKENDS[name]
     return getattr(import_module(module), class_name)
 
@@ -168,7 +181,7 @@ def _chosen(backend: str) -> str:
     return backend
 
 
-def _check_condition(A: Any, factor: Factorization) -> None:
+def _check_condition(A: Any, factor: Factorization, largest_residual: float) -> None:
     """Two inverse iterations: a lower bound of the condition number, and the residual."""
     x = np.random.default_rng(1).standard_normal(A.shape[0])
     scale = abs(A).sum(axis=1).max()
@@ -181,5 +194,5 @@ def _check_condition(A: Any, factor: Factorization) -> None:
         if not b @ x > 0:
             raise not_positive_definite("it has a negative eigenvalue")
     residual = np.linalg.norm(A @ x - b) / (scale * np.linalg.norm(x))
-    if not residual < 1e-10:
+    if not residual < largest_residual:
         raise not_positive_definite(f"solutions leave a residual of {residual:.1e}")

@@ -126,12 +126,15 @@ _CHOICE: dict[str, Choice] = {
     # the radius raises the degree by one, the hoop strain brings 1/r
     "tri3": _same(lambda: _triangle(4)),
     "tri6": _same(lambda: _triangle(6)),
-    "quad4": _same(lambda: _tensor(_line(2), _line(2))),
+    "quad4": (lambda: _tensor(_line(2), _line(2)), lambda: _tensor(_line(3), _line(3))),
     "quad8": _same(lambda: _tensor(_line(3), _line(3))),
     "tet4": (lambda: _tetrahedron(1), lambda: _tetrahedron(2)),
     "tet10": (lambda: _tetrahedron(2), lambda: _tetrahedron(5)),
-    "hex8": _same(lambda: _tensor(_line(2), _line(2), _line(2))),
+    "hex8": (
+        lambda: _tensor(_line(2), _line(2), _line(2)),
+        lambda: _tensor(_line(3), _line(3), _line(3)),
+    ),
     "hex20": _same(lambda: _tensor(_line(3), _line(3), _line(3))),
-    "wedge6": _same(lambda: _tensor(_triangle(2), _line(2))),
+    "wedge6": (lambda: _tensor(_triangle(2), _line(2)), lambda: _tensor(_triangle(4), _line(3))),
     "wedge15": _same(lambda: _tensor(_triangle(4), _line(3))),
 }
