@@ -26,7 +26,9 @@ from klack.workflow.levels import (
     Variant,
     classical_stiffness,
     elastic_count,
+    first_stiffness,
     mode_pools,
+    own_pair,
     participating,
     reduce_pair,
     run_full,
@@ -46,13 +48,11 @@ from klack.workflow.study import (
     LevelResult,
     SectionPicture,
 )
-from klack.workflow.transfer import compare_transfer
+from klack.workflow.transfer import TRANSFER_MODES, compare_transfer
 
 __all__ = ["run_impact"]
 
 _LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
-# Modes of the transfer functions that are compared, beside those of the case.
-_TRANSFER_MODES = 50
 _REDUCED_LABELS: Mapping[str, tuple[Variant, str]] = {
     "reduced": ("consistent", "consistent law"),
     "reduced-participation": ("consistent", "consistent law, modes by participation"),
@@ -91,14 +91,12 @@ def run_impact(
     with _collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
         with_transfer = case.run.transfer is not None
-        pools = mode_pools(
-            problem, at_least=_TRANSFER_MODES if with_transfer else 1, progress=clock
-        )
+        pools = mode_pools(problem, at_least=TRANSFER_MODES if with_transfer else 1, progress=clock)
         clock("reduced", 0.0)
-        preview = _own_pair(problem, pools, stiffness=_first_stiffness(problem))
+        preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
         classical = classical_stiffness(problem, peak)
-        own = _own_pair(problem, pools, stiffness=classical.stiffness)
+        own = own_pair(problem, pools, stiffness=classical.stiffness)
         results: dict[str, LevelResult] = {}
         for level in wanted:
             if level == "lumped":
@@ -192,26 +190,6 @@ def _collected_warnings() -> Iterator[list[str]]:
                 notes.append(text)
         else:
             warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
-
-
-def _first_stiffness(problem: ContactProblem) -> float:
-    """Secant of the static contact, to find the force at which the rest is computed [N/m]."""
-    return problem.static.max_force / float(problem.static.approach[-1])
-
-
-def _own_pair(
-    problem: ContactProblem, pools: Mapping[str, Modes], *, stiffness: float
-) -> ReducedPair:
-    """Reduction that the case asks for."""
-    case = problem.case
-    names = (problem.pair.upper.name, problem.pair.lower.name)
-    return reduce_pair(
-        problem,
-        pools,
-        correction=case.reduction.correction,
-        selection={name: selection_of(case.reduction.choice(name)) for name in names},
-        stiffness=stiffness,
-    )
 
 
 def _variant(

@@ -50,12 +50,17 @@ __all__ = [
     "ReducedPair",
     "Variant",
     "classical_stiffness",
+    "elastic_count",
+    "first_stiffness",
     "mode_pools",
+    "own_pair",
+    "participating",
     "reduce_pair",
     "run_full",
     "run_lumped",
     "run_reduced",
     "selection_of",
+    "static_curve",
 ]
 
 PORT = "contact"
@@ -149,6 +154,31 @@ def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStif
     return local_stiffness(problem.static, problem.pair.upper, problem.pair.lower, size=size)
 
 
+def first_stiffness(problem: ContactProblem) -> float:
+    """Secant of the static contact [N/m], good enough to find the order of the peak force."""
+    return problem.static.max_force / float(problem.static.approach[-1])
+
+
+def own_pair(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    stiffness: float,
+    recovery: bool = False,
+) -> ReducedPair:
+    """Reduce both bodies as the case asks for; see :func:`reduce_pair`."""
+    reduction = problem.case.reduction
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    return reduce_pair(
+        problem,
+        pools,
+        correction=reduction.correction,
+        selection={name: selection_of(reduction.choice(name)) for name in names},
+        stiffness=stiffness,
+        recovery=recovery,
+    )
+
+
 def reduce_pair(
     problem: ContactProblem,
     pools: Mapping[str, Modes],
@@ -156,6 +186,7 @@ def reduce_pair(
     correction: Correction,
     selection: Mapping[str, ModeSelection],
     stiffness: float,
+    recovery: bool = False,
 ) -> ReducedPair:
     """Reduce both bodies at the contact, with the port pattern taken at the peak force.
 
@@ -167,10 +198,12 @@ def reduce_pair(
     selection : mapping of body name to ModeSelection
     stiffness : float [N/m]
         Of the local contact, for corrections that do not compute their own law.
+    recovery : bool
+        Keep the displacement of all named surfaces.
     """
     force = 0.7 * problem.static.max_force
     for _ in range(_PATTERN_ROUNDS):
-        pair = _reduce_at(problem, pools, force, correction, selection, stiffness)
+        pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
         peak = float(np.max(_simulate(problem.case, pair).peak_force))
         settled = abs(peak - force) <= 0.02 * force
         force = min(peak, problem.static.max_force)
@@ -186,6 +219,7 @@ def _reduce_at(
     correction: Correction,
     selection: Mapping[str, ModeSelection],
     stiffness: float,
+    recovery: bool,
 ) -> ReducedPair:
     load_upper, load_lower = problem.static.load_patterns(force)
     ports = (Port(PORT, load_upper), Port(PORT, -load_lower))
@@ -200,6 +234,7 @@ def _reduce_at(
             damping=damping_of(problem.case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
         )
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )

@@ -19,9 +19,12 @@ from klack.reduction.transfer import TransferComparison, compare_receptances
 from klack.workflow.problem import ContactProblem
 from klack.workflow.progress import Progress
 
-__all__ = ["compare_transfer"]
+__all__ = ["TRANSFER_MODES", "compare_transfer"]
 
 _COUNTS = (20, 50)
+TRANSFER_MODES = max(_COUNTS)
+"""Elastic modes of each body that the comparison needs."""
+
 # With less damping the notches between two points of the axis would decide the comparison.
 _LOSS_FACTOR = 0.01
 
@@ -91,16 +94,11 @@ def _compare(
                     label=f"{count} {words}",
                 )
             )
-    worst = float(np.max(full.residual))
-    checked = float(np.max(full.checked_deviations, initial=0.0))
     return compare_receptances(
         full.receptance,
         candidates,
         port.name,
         body=body.name,
         loss_factor=_LOSS_FACTOR,
-        reference_note=(
-            f"Krylov basis of {full.basis_size} vectors, largest residual {worst:.1e}, "
-            f"deviation from direct solutions {checked:.1e}"
-        ),
+        reference_note=full.note,
     )
