@@ -83,7 +83,7 @@ def test_the_page_shows_the_numbers_of_the_study(impact_study: ImpactStudy, page
             assert quantity(value, unit) in text
         assert f"{result.measures.restitution:.4f}" in text
     deviation = impact_study.deviations["reduced"]
-    assert f"{100 * deviation.peak_force:+.2f} %" in text
+    assert f"{100 * deviation.peak_force:+.2f}\N{NO-BREAK SPACE}%" in text
     assert "made-up study is coarse" in text
 
 
@@ -219,4 +219,4 @@ def test_section_figure_leaves_the_closing_motion_out_of_the_shape(
     assert figure.image.startswith(b"<?xml")
     assert len(figure.image) < 3e6
     assert figure.magnification in (100.0, 200.0, 500.0)
-    assert "−3.00 µm" in figure.note
+    assert "−3.00\N{NO-BREAK SPACE}µm" in figure.note

@@ -63,7 +63,6 @@ _MORE_LOOKS: tuple[Look, ...] = (
 )
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 _TIME = AxisSpec(label="time since first touch", unit="µs")
-_BODY_COLOURS: tuple[Colour, ...] = ("blue", "red", "green", "pink")
 _PART_LOOKS: tuple[tuple[Colour, str], ...] = (
     ("blue", ""),
     ("sky", "/"),
@@ -210,7 +209,7 @@ def spectrum_chart(study: ImpactStudy) -> Chart:
             differences.append(_steps(octaves, octaves.level - levels[0].level, result))
     panels = [
         _level_panel("level", "dB re 1 µN s", narrow, 60.0),
-        _level_panel("third octaves", "dB re 1 pN²s", bands, 50.0),
+        _level_panel("bands", "dB re 1 pN²s", bands, 50.0),
     ]
     trusted = _kept_up_to(study)
     if trusted > _LOW_FREQUENCY:
@@ -408,7 +407,7 @@ def approach_chart(study: ImpactStudy) -> Chart:
     if np.size(law.share):
         panels.append(
             Panel(
-                y=AxisSpec(label="share of the law", unit="%", range=(0.0, 100.0)),
+                y=AxisSpec(label="law share", unit="%", range=(0.0, 100.0)),
                 curves=(
                     Curve(x=law.force, y=100 * law.share, colour="red", style="dashed", width=2.0),
                 ),
@@ -456,24 +455,42 @@ def energy_bars(study: ImpactStudy) -> BarChart:
 
 
 def modal_energy_chart(study: ImpactStudy) -> Chart:
-    """Energy left in each mode, for the first level that has modes."""
-    result = next(result for result in _ordered(study) if result.modal_energy)
-    initial = next(iter(result.energies.values()))
-    largest = max(float(np.max(item.energy, initial=0.0)) for item in result.modal_energy)
+    """Energy left in each mode: one panel per body, the reference and the reduced level."""
+    results = [result for result in _ordered(study) if result.modal_energy]
+    results = [r for r in results if r.level in (results[0].level, "reduced")]
+    initial = next(iter(results[0].energies.values()))
+    stems_of = results[0]
+    largest = max(float(np.max(m.energy, initial=0.0)) for r in results for m in r.modal_energy)
     top = 100 * largest / initial if largest > 0 else 1.0
     floor = 1e-4 * top
     panels = []
-    for i, item in enumerate(result.modal_energy):
-        energy = np.maximum(100 * item.energy / initial, floor)
-        x, y = stems(1e-3 * item.frequency, energy, floor)
-        colour = _BODY_COLOURS[i % len(_BODY_COLOURS)]
-        tops = Curve(
-            x=1e-3 * item.frequency, y=energy, label=item.body, colour=colour, drawn="points"
-        )
+    for body in (item.body for item in stems_of.modal_energy):
+        curves: list[Curve] = []
+        for result in results:
+            colour, _, _ = _look(result.level)
+            for item in result.modal_energy:
+                if item.body != body:
+                    continue
+                frequency = 1e-3 * item.frequency
+                energy = 100 * item.energy / initial
+                energy = np.where(energy > floor, energy, np.nan)
+                if result is stems_of:
+                    x, y = stems(frequency, energy, floor)
+                    curves.append(Curve(x=x, y=y, colour=colour, width=1.4))
+                curves.append(
+                    Curve(
+                        x=frequency,
+                        y=energy,
+                        label=result.label,
+                        colour=colour,
+                        drawn="points",
+                        width=2.0 if result is stems_of else 1.3,
+                    )
+                )
         panels.append(
             Panel(
-                y=AxisSpec(label=item.body, unit="%", log=True, range=(floor, 2 * top)),
-                curves=(Curve(x=x, y=y, colour=colour, width=1.4), tops),
+                y=AxisSpec(label=body, unit="%", log=True, range=(floor, 2 * top)),
+                curves=tuple(curves),
                 share=0.6,
             )
         )
@@ -482,5 +499,5 @@ def modal_energy_chart(study: ImpactStudy) -> Chart:
         title="Energy left in the modes",
         x=AxisSpec(label="eigenfrequency", unit="kHz"),
         panels=tuple(panels),
-        note=f"Share of the initial kinetic energy, '{result.label}', after separation.",
+        note="Share of the initial kinetic energy in each elastic mode at the end of the run.",
     )

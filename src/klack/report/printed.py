@@ -84,7 +84,12 @@ def svg_bars(chart: BarChart) -> bytes:
             texts = [f"{v:.3g}" if v > 0.06 * whole else "" for v in part.values]
             light = part.colour in ("yellow", "sky", "orange")
             axes.bar_label(
-                bars, texts, label_type="center", fontsize=7, color="black" if light else "white"
+                bars,
+                texts,
+                label_type="center",
+                fontsize=7,
+                color="black" if light else "white",
+                bbox={"facecolor": COLOURS[part.colour], "edgecolor": "none", "pad": 0.8},
             )
             left = [a + b for a, b in zip(left, part.values, strict=True)]
         axes.set_yticks(range(len(left)), [plain(row) for row in chart.rows])

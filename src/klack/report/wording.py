@@ -8,16 +8,15 @@ from klack.workflow.study import ImpactStudy, LevelResult
 __all__ = ["answer", "count", "listed", "quantity", "share", "signed", "signed_share", "verdict"]
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_MINUS, _NONE, _THIN = "\N{MINUS SIGN}", "–", "\N{NARROW NO-BREAK SPACE}"
+_MINUS, _NONE = "\N{MINUS SIGN}", "–"
+_THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """Value with a prefix that keeps the number between 1 and 1000.
+    """Value with a prefix that keeps the number between 1 and 1000; no line breaks within.
 
-    >>> quantity(1.4823e-5, "s"), quantity(255.31, "N"), quantity(float("nan"), "-")
-    ('14.82 µs', '255.3 N', '–')
-    >>> quantity(0.99996e3, "N")
-    '1.000 kN'
+    >>> quantity(1.4823e-5, "s").split(), quantity(0.99996e3, "N").split()
+    (['14.82', 'µs'], ['1.000', 'kN'])
     """
     if not isfinite(value):
         return _NONE if value != value else "∞"
@@ -31,34 +30,39 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 
 
 def _space(unit: str) -> str:
-    return f" {unit}" if unit else ""
+    return _FIXED + unit.replace(" ", _FIXED) if unit else ""
 
 
 def signed(value: float, decimals: int, unit: str = "") -> str:
     """With sign, also a plus.
 
-    >>> signed(0.00114, 4), signed(-0.31, 2, "dB")
-    ('+0.0011', '−0.31 dB')
+    >>> signed(0.00114, 4), signed(-0.31, 2, "dB").split()
+    ('+0.0011', ['−0.31', 'dB'])
     """
     if not isfinite(value):
         return _NONE
-    return f"{value:+.{decimals}f}".replace("-", _MINUS) + _space(unit)
+    text = f"{value:+.{decimals}f}"
+    if float(text) == 0.0:
+        text = text[1:]  # zero has no sign
+    return text.replace("-", _MINUS) + _space(unit)
 
 
 def share(value: float, decimals: int = 1) -> str:
     """Fraction as a percentage.
 
-    >>> share(0.653)
-    '65.3 %'
+    >>> share(0.653).split()
+    ['65.3', '%']
     """
-    return f"{100 * value:.{decimals}f} %".replace("-", _MINUS) if isfinite(value) else _NONE
+    if not isfinite(value):
+        return _NONE
+    return f"{100 * value:.{decimals}f}".replace("-", _MINUS) + _space("%")
 
 
 def signed_share(value: float, decimals: int = 2) -> str:
     """Relative difference as a percentage with its sign.
 
-    >>> signed_share(-0.0067)
-    '−0.67 %'
+    >>> signed_share(-0.0067).split()
+    ['−0.67', '%']
     """
     return signed(100 * value, decimals, "%")
 
