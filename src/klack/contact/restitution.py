@@ -7,9 +7,12 @@ Restitution is a *result* and belongs to the centres of mass, never to a point o
 (``v_b = 0`` for a supported body).  Contacts closer than two longest periods of body a, or 50 us,
 form one cluster = one impact; ``after`` is after the last of them.
 
-Times are found inside the records: the impulse gathered since first touch grows like a power
-``1 + n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give
-the exponent and the instant of touch.  The same rule, backwards, gives the end.
+Times are found inside the records: the impulse gathered since first touch grows like a power ``1
++ n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the
+exponent and the instant of touch.  The same rule, backwards, gives the end.  Where the force
+fades out instead of ending (rods do, in theory for ever), the end is where it crosses the
+threshold: that is the rule when the way from the threshold to zero takes more than half the time
+of the fall from ten times the threshold to the threshold.
 """
 
 from dataclasses import dataclass
@@ -136,12 +139,12 @@ class Deviation:
     third_octave_up_to_Hz: float
 
 
-def find_contacts(history: ImpactHistory, *, threshold: float = 2e-3) -> tuple[ContactPhase, ...]:
+def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[ContactPhase, ...]:
     """Every contact of a record, in order.
 
     A contact is a run of records with force above ``threshold`` times the peak force of the
-    history, extended outwards while the force keeps falling and stays above zero.  Chatter below
-    the threshold neither makes a contact nor prolongs one.
+    history; chatter below it neither makes a contact nor prolongs one.  The records that belong
+    to it go on outwards while the force falls, so that the impulse is complete.
 
     Parameters
     ----------
@@ -163,11 +166,11 @@ def find_contacts(history: ImpactHistory, *, threshold: float = 2e-3) -> tuple[C
             first -= 1
         while last < ceiling and 0.0 < force[last] < force[last - 1]:
             last += 1
-        phases.append(_phase(history, first, last))
+        phases.append(_phase(history, first, last, threshold * peak))
     return tuple(phases)
 
 
-def measure_impact(history: ImpactHistory, *, threshold: float = 2e-3) -> ImpactMeasures:
+def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> ImpactMeasures:
     """Numbers of the first impact in a history.
 
     Parameters
@@ -222,22 +225,39 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 2e-3) -> Impact
     )
 
 
-def _phase(history: ImpactHistory, first: int, last: int) -> ContactPhase:
+def _phase(history: ImpactHistory, first: int, last: int, threshold: float) -> ContactPhase:
     force, h = history.force, history.step
     top = first + int(np.argmax(history.peak_force[first:last]))
-    start, end = history.start + first * h, history.start + last * h
-    if first > 0:  # else it was closed from the start
-        start += h - _time_since_touch(force[first : first + 3], h)
-    if last < force.size:
-        end -= h - _time_since_touch(force[max(first, last - 3) : last][::-1], h)
+    start, end = _onset(force, first, last, threshold, h), force.size * h
+    if last < force.size:  # else it never ended
+        end -= _onset(force[::-1], force.size - last, force.size - first, threshold, h)
     return ContactPhase(
-        start=start,
-        end=end,
+        start=history.start + start,
+        end=history.start + end,
         peak_force=float(history.peak_force[top]),
         peak_time=history.start + (top + 0.5) * h,
         first=first,
         last=last,
     )
+
+
+def _onset(force: NDArray, first: int, last: int, threshold: float, h: float) -> float:
+    """Time of touch of the contact in these records, from the beginning of ``force``."""
+    touch = (first + 1) * h - _time_since_touch(force[first : min(first + 3, last)], h)
+    low = _crossing(force, first, last, threshold, h)
+    high = _crossing(force, first, last, 10.0 * threshold, h)
+    ends_at_zero = first == 0 or force[first - 1] == 0.0
+    if ends_at_zero and low - touch <= max(0.5 * (high - low), h):
+        return touch
+    return low
+
+
+def _crossing(force: NDArray, first: int, last: int, level: float, h: float) -> float:
+    """Time at which the mean force of the records first exceeds a level, by straight lines."""
+    k = first + int(np.argmax(force[first:last] > level))
+    below, above = float(force[k - 1]) if k > 0 else 0.0, float(force[k])
+    part = (level - below) / (above - below) if above > level > below else 0.0
+    return (k - 0.5 + part) * h
 
 
 def _time_since_touch(force: NDArray[np.float64], h: float) -> float:

@@ -26,7 +26,6 @@ Vector = NDArray[np.float64]
 _LINEAR, _HERTZ, _TABLE = LAW_LINEAR, LAW_HERTZ, LAW_TABLE
 _FORCE_LEFT = 1e-9  # [N] accepted error of a force
 _UNKNOWN = 1e16  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-13 m
-_FAR = 1.0  # [m] deeper than any contact
 _NEWTON_LIMIT = 60
 
 
@@ -183,7 +182,7 @@ def solve_step(
         return 0.0, hint, 0.0
     if kind == _LINEAR and chi_over_h == 0.0:
         return _solve_linear(p[start], G, d0, df), hint, 0.0
-    low, high = -_FAR, df
+    low, high = -np.inf, df
     d1 = df - G * guess
     force = 0.0
     for _ in range(_NEWTON_LIMIT):
