@@ -9,6 +9,9 @@ the picture shows the elements and not their division.
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES, ElementFamily
@@ -25,7 +28,7 @@ _PLANE_SHIFT = 1e-8
 y = 0, where a cut would be undefined."""
 
 _MERGED = 1e-6
-"""Points of the picture closer than this (over its size) become one, and slivers vanish."""
+"""Points of the picture closer than this (over its size) become one."""
 
 _TRIANGLES_OF = {
     "tri3": ((0, 1, 2),),
@@ -300,19 +303,21 @@ def _clip(points: Floats, triangles: Ints, edges: Ints) -> tuple[Floats, Ints, I
 def _compact(
     points: Floats, moved: Floats, triangles: Ints, edges: Ints
 ) -> tuple[Floats, Floats, Ints, Ints]:
-    """Drop unused and merge equal points, drop slivers without area and doubled lines."""
+    """Drop unused points, merge those that coincide, drop what vanishes by that."""
     used = np.unique(triangles)
     scale = np.ptp(points[used], axis=0).max()
-    grid = np.round(points[used] / (_MERGED * scale)).astype(np.int64)
-    _, first, group = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    pairs = cKDTree(points[used]).query_pairs(_MERGED * scale, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(used), len(used)))
+    count, group = connected_components(links, directed=False)
     number = np.full(len(points), -1, dtype=np.int64)
-    number[used] = group.ravel()
-    keep = used[first]
+    number[used] = group
+    keep = np.empty(count, dtype=np.int64)
+    keep[group[::-1]] = used[::-1]  # the first of each group
     faces = number[triangles]
+    faces = faces[np.all(faces != np.roll(faces, 1, axis=1), axis=1)]
     a, b, c = (points[keep][faces[:, i]] for i in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces = np.where((area < 0)[:, None], faces[:, [0, 2, 1]], faces)
-    faces = faces[np.abs(area) > (1e-3 * _MERGED * scale) ** 2]
     lines = np.sort(number[edges], axis=1)
     lines = lines[(lines[:, 0] >= 0) & (lines[:, 0] != lines[:, 1])]
     return points[keep], moved[keep], faces, np.unique(lines, axis=0)
