@@ -201,11 +201,14 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     where = f"{path}:{mark.line + 1}" if mark else str(path)
     column = f" at column {mark.column + 1}" if mark else ""
     context = f" {error.context}" if error.context else ""
+    hint = "look at this line and the one before: indentation by spaces, 'key: value', brackets."
+    if "mapping values are not allowed" in str(error.problem):
+        hint = "put text with a colon into quotes; close the bracket or quote opened before."
     return InputError(
         where,
         got=f"text that is no YAML{column}: {error.problem or 'unreadable'}{context}",
         expected="a case file (YAML 1.2)",
-        hint="look at this line and the one before: indentation by spaces, 'key: value', brackets.",
+        hint=hint,
     )
 
 

@@ -189,27 +189,27 @@ class CaseBody(Section):
 class ConsistentLocalLaw(Section):
     """Massless law that carries exactly the compliance that the kept modes miss."""
 
-    kind: Literal["consistent"]
+    kind: Literal["consistent"] = Field(description="Which law: consistent.")
 
 
 class LinearLocalLaw(Section):
     """Constant local stiffness."""
 
-    kind: Literal["linear"]
+    kind: Literal["linear"] = Field(description="Which law: linear.")
     stiffness: Stiffness = Field(gt=0, description="Stiffness of the contact zone alone.")
 
 
 class HertzLocalLaw(Section):
     """Hertz (1882) for smooth curved bodies, F = 4/3 E* sqrt(R) d^(3/2)."""
 
-    kind: Literal["hertz"]
+    kind: Literal["hertz"] = Field(description="Which law: hertz.")
     radius: Length = Field(gt=0, description="Effective radius R: 1/R = 1/R1 + 1/R2.")
 
 
 class SubmodelLocalLaw(Section):
     """Constant stiffness from a static model of the contact zone alone."""
 
-    kind: Literal["submodel"]
+    kind: Literal["submodel"] = Field(description="Which law: submodel.")
     size: Length = Field(gt=0, description="Radius of the zone around the first touch.")
 
 

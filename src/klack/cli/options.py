@@ -12,7 +12,11 @@ CaseArgument = Annotated[
 ]
 Json = Annotated[
     Path | None,
-    Parameter(name="--json", help="Write plain numbers in SI to this file; - for the terminal."),
+    Parameter(
+        name="--json",
+        allow_leading_hyphen=True,
+        help="Write plain numbers in SI to this file; - for the terminal.",
+    ),
 ]
 Out = Annotated[
     Path | None,

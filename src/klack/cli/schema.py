@@ -13,7 +13,12 @@ __all__ = ["schema"]
 def schema(
     *,
     json: Annotated[
-        Path, Parameter(name="--json", help="Write to this file; - for the terminal.")
+        Path,
+        Parameter(
+            name="--json",
+            allow_leading_hyphen=True,
+            help="Write to this file; - for the terminal.",
+        ),
     ] = Path("-"),
 ) -> int:
     """Print the JSON schema of case files, for editors that check while one types."""

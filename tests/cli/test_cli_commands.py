@@ -1,0 +1,364 @@
+"""The command klack through main(argv): truth = the exit codes and messages it promises."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from klack.cli import demo as demo_module
+from klack.cli.main import main
+from klack.cli.output import staged_folder, write_json
+from klack.cli.progress import show_progress
+from klack.errors import ConvergenceError, InputError
+from klack.verification import GROUPS, Check, compare, run_checks
+
+DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
+COMMANDS = ["demo", "impact", "reduce", "report", "schema", "verify"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    """Run each test in an empty folder, so that nothing is left in the project."""
+    monkeypatch.chdir(tmp_path)
+
+
+def contents(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_names_the_options(command, capsys):
+    assert main([*command.split(), "--help"]) == 0
+
+    out = capsys.readouterr().out
+    assert out.startswith(f"Usage: klack {command}".rstrip())
+    if not command:
+        assert all(name in out for name in COMMANDS)
+    elif command != "schema":
+        assert "--quiet" in out
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_imports_nothing_heavy(command):
+    # this is what keeps --help below half a second; times themselves are not asserted
+    code = (
+        "import sys; from klack.cli.main import main; "
+        f"code = main({[*command.split(), '--help']!r}); "
+        "heavy = {'numpy', 'scipy', 'numba', 'pydantic', 'pint', 'zarr', 'ruamel.yaml', 'plotly'}; "
+        "sys.exit(code or ','.join(heavy & set(sys.modules)) or None)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_version(capsys):
+    from klack import __version__
+
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"klack {__version__}\n"
+
+
+def test_module_is_the_command():
+    command = [sys.executable, "-m", "klack", "impact", "no.yaml"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+
+    assert done.returncode == 2
+    assert done.stderr.startswith("klack impact: no.yaml: got neither a file nor a shipped case")
+
+
+# arguments, words that the one message must contain; {} is the text of a good case
+BAD = {
+    "unknown command": (["impct"], ["klack impct:", 'Did you mean "impact"', "klack --help"]),
+    "no case": (["impact"], ["klack impact:", "CASE", "klack impact --help"]),
+    "two cases": (["impact", "a", "b"], ["'b'"]),
+    "unknown option": (["impact", "a", "--modes"], ["--modes"]),
+    "missing file": (["impact", "valve.yaml"], ["valve.yaml", "neither a file nor a shipped"]),
+    "misspelled shipped case": (["impact", "demo-vave"], ["did you mean 'demo-valve'"]),
+    "folder without case": (["impact", "."], ["a folder without case.yaml"]),
+    "threads no number": (["impact", str(DRAWN), "--threads", "x"], ["--threads", "x"]),
+    "threads zero": (["impact", str(DRAWN), "--threads", "0"], ["--threads", "0"]),
+    "unknown level": (["impact", str(DRAWN), "--level", "ful"], ["'ful'", "did you mean 'full'"]),
+    "JSON into nothing": (
+        ["impact", str(DRAWN), "--json", "none/x.json"],
+        ["--json none/x.json", "a folder that does not exist"],
+    ),
+    "JSON into a folder": (["schema", "--json", "."], ["--json .", "a folder"]),
+    "results into a file": (
+        ["impact", str(DRAWN), "--out", f"{DRAWN}/x"],
+        ["--out", "drawn.yaml, expected a folder"],
+    ),
+    "report of nothing": (["report", "none"], ["none", "result.zarr"]),
+    "reduce a missing file": (["reduce", "valve.yaml"], ["klack reduce: valve.yaml"]),
+    "unknown group": (["verify", "--group", "foo"], ["'foo'", "elasticity"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_arguments_give_one_message_and_exit_2(name, capsys, tmp_path):
+    arguments, words = BAD[name]
+
+    code = main(arguments)
+
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert err.startswith(f"klack {arguments[0]}: ")
+    assert "\nTry: " in err
+    assert "Traceback" not in err
+    for word in words:
+        assert word in err
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "word"),
+    [
+        ("motion: {", "motion: ", ":44", "no YAML"),  # a hole in the file
+        ("size: 1.2 mm", "size: 1.2 bar", ":23: bodies.needle.mesh.size", "a pressure"),
+        ("density:", "densty:", ":6: materials.steel.densty", "did you mean 'density'"),
+        ("needle.tip", "needle.tipp", ":42: contact.between[0]", "did you mean 'tip'"),
+        ("count: 20", "count: 0", ":45: reduction.modes.needle.count", "0 modes"),
+        ("gap: 0", "gap: -2 um", ":43: contact.gap", "penetrate already"),
+        ("title:", "title: a\ntitle:", ":3: title", "a second time"),
+        ("klack: 1", "hello", ":2", "no YAML"),
+    ],
+)
+@pytest.mark.parametrize("command", ["impact", "reduce"])
+def test_bad_cases_give_one_message_and_exit_2(command, old, new, where, word, capsys, tmp_path):
+    text = DRAWN.read_text(encoding="utf-8")
+    assert old in text
+    Path("valve.yaml").write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    code = main([command, "valve.yaml"])
+
+    out, err = capsys.readouterr()
+    assert (code, out) == (2, "")
+    assert err.startswith(f"klack {command}: valve.yaml{where}: got ")
+    assert word in err
+    assert "Traceback" not in err
+    assert contents(tmp_path) == ["valve.yaml"]
+
+
+def test_schema_is_printed_and_written(capsys):
+    assert main(["schema"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert main(["schema", "--json", "case.schema.json"]) == 0
+
+    assert printed["properties"]["klack"]["const"] == 1
+    assert json.loads(Path("case.schema.json").read_text()) == printed
+
+
+# ------------------------------------------------------------------ the run of a case, played
+
+
+def play(monkeypatch: pytest.MonkeyPatch, run: Callable[..., object]) -> None:
+    """Replace the calculation by ``run``; all else is the real command."""
+    module = ModuleType("klack.workflow.impact")
+    module.run_impact = run  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "klack.workflow.impact", module)
+
+
+def raising(error: BaseException) -> Callable[..., object]:
+    def run(case: object, *, levels: object, progress: Callable, threads: object) -> object:
+        progress("mesh", 0.5)
+        raise error
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "klack impact: stopped; nothing was written."),
+        (ConvergenceError("the contact did not settle in 50 rounds"), 1, "50 rounds"),
+        (InputError("mesh", got="a", expected="b", hint="c"), 2, "mesh: got a, expected b."),
+        (MemoryError(), 2, "memory"),
+        (ZeroDivisionError("bug"), 70, "a mistake of klack itself"),
+        (FileNotFoundError(2, "lost", "x"), 70, "a mistake of klack itself"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_each_kind_of_trouble_has_its_exit_code(error, code, words, monkeypatch, capsys, tmp_path):
+    play(monkeypatch, raising(error))
+
+    assert main(["impact", str(DRAWN), "--json", "numbers.json"]) == code
+
+    err = capsys.readouterr().err
+    assert words in err
+    assert ("Traceback" in err) == (code == 70)
+    assert contents(tmp_path) == []
+
+
+# ------------------------------------------------------------------ verification
+
+
+def play_group(monkeypatch: pytest.MonkeyPatch, group: str, checks: Callable[[], list]) -> None:
+    module = ModuleType(f"klack.verification.{group}")
+    module.checks = checks  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+
+
+def check(computed: float, tolerance: float = 0.1) -> Check:
+    known = dict(expected=2.0, tolerance=tolerance, source="a closed formula")
+    return compare("impact", "speed [m/s]", computed=computed, **known)
+
+
+def stop() -> list[Check]:
+    raise ConvergenceError("no rest after 50 rounds")
+
+
+@pytest.mark.parametrize(
+    ("checks", "code", "verdicts", "words"),
+    [
+        (lambda: [check(2.0), check(2.1)], 0, [True, True], "2 of 2 checks passed"),
+        (lambda: [check(2.0), check(2.3)], 1, [True, False], "FAILED"),
+        (lambda: [check(float("nan"))], 1, [False], "0 of 1"),
+        (stop, 1, [False], "no rest after 50"),  # counted, not skipped
+        (lambda: [], 1, [False], "no checks"),  # an empty group proves nothing
+    ],
+    ids=["all pass", "one fails", "not a number", "stops", "empty"],
+)
+def test_verify_fails_when_a_check_fails(checks, code, verdicts, words, monkeypatch, capsys):
+    play_group(monkeypatch, "impact", checks)
+
+    assert main(["verify", "--group", "impact", "--json", "checks.json"]) == code
+
+    assert words in capsys.readouterr().out
+    written = json.loads(Path("checks.json").read_text())["checks"]
+    assert [one["passed"] for one in written] == verdicts
+    keys = ["computed", "deviation", "expected", "group", "name", "passed", "source", "tolerance"]
+    assert all(sorted(one) == keys for one in written)
+
+
+def test_numbers_on_the_terminal_are_pure_json(monkeypatch, capsys):
+    play_group(monkeypatch, "impact", lambda: [check(2.2, tolerance=0.2)])
+
+    assert main(["verify", "--group", "impact", "--json", "-"]) == 0
+
+    out, err = capsys.readouterr()
+    assert json.loads(out)["checks"][0]["deviation"] == pytest.approx(0.1, rel=1e-12)
+    assert "1 of 1" in err
+
+
+def test_groups_run_once_each_in_a_fixed_order(monkeypatch):
+    ran = []
+    for group in GROUPS:
+        play_group(monkeypatch, group, lambda group=group: ran.append(group) or [check(2.0)])
+
+    assert len(run_checks()) == len(GROUPS) == 7
+    assert tuple(ran) == GROUPS
+    ran.clear()
+    run_checks([GROUPS[3], GROUPS[1], GROUPS[3]])
+    assert ran == [GROUPS[1], GROUPS[3]]
+
+
+# ------------------------------------------------------------------ files and progress
+
+
+def test_staged_files_appear_together_and_leave_others_alone(tmp_path):
+    out = tmp_path / "deep" / "out"
+    out.mkdir(parents=True)
+    (out / "notes.txt").write_text("mine")
+    (out / "result.zarr").mkdir()
+    (out / "result.zarr" / "old").write_text("old")
+    (out / "report.html").write_text("old")
+
+    with staged_folder(out) as stage:
+        (stage / "result.zarr").mkdir()
+        (stage / "result.zarr" / "new").write_text("new")
+        (stage / "report.html").write_text("new")
+        assert (out / "report.html").read_text() == "old"
+
+    assert contents(out) == ["notes.txt", "report.html", "result.zarr", "result.zarr/new"]
+    assert (out / "report.html").read_text() == "new"
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_an_interruption_leaves_the_folder_as_it_was(error, tmp_path):
+    old = tmp_path / "old"
+    old.mkdir()
+    (old / "report.html").write_text("old")
+
+    def interrupted(folder: Path) -> None:
+        with staged_folder(folder) as stage:
+            (stage / "report.html").write_text("half")
+            raise error
+
+    for folder in (old, tmp_path / "new" / "deep"):
+        with pytest.raises(error):
+            interrupted(folder)
+
+    assert contents(tmp_path) == ["old", "old/report.html"]
+    assert (old / "report.html").read_text() == "old"
+
+
+def test_full_disk_is_one_clear_error(tmp_path):
+    with pytest.raises(InputError, match="No space left"), staged_folder(tmp_path / "out"):
+        raise OSError(28, "No space left on device")
+    assert contents(tmp_path) == []
+
+
+def test_json_is_whole_or_absent(tmp_path):
+    target = tmp_path / "x.json"
+    write_json(target, {"peak_force_N": 250.0})
+
+    with pytest.raises(ValueError, match="JSON compliant"):
+        write_json(target, {"peak_force_N": float("nan")})
+
+    assert json.loads(target.read_text()) == {"peak_force_N": 250.0}
+    assert contents(tmp_path) == ["x.json"]
+
+
+def test_progress_reports_only_stages_that_took_long(monkeypatch, capsys):
+    clock = iter([0.0, 0.0, 0.0, 1.0, 1.0, 6.0, 6.0, 6.5])
+    played = SimpleNamespace(perf_counter=lambda: next(clock))
+    monkeypatch.setattr("klack.cli.progress.time", played)
+
+    with show_progress() as progress:
+        progress("mesh", 0.0)
+        progress("modes", 0.0)
+        progress("modes", 1.0)
+        progress("run", 1.0)
+
+    assert capsys.readouterr().err == "modes: 5.0 s\n"
+
+
+def test_quiet_is_quiet(capsys):
+    with show_progress(quiet=True) as progress:
+        progress("mesh", 0.5)
+
+    assert capsys.readouterr() == ("", "")
+
+
+def test_browser_needs_a_screen(monkeypatch):
+    monkeypatch.setattr(demo_module.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(demo_module.sys.stdout, "isatty", lambda: True, raising=False)
+    assert not demo_module._has_display()
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert demo_module._has_display()
+
+    monkeypatch.setattr(demo_module.sys.stdout, "isatty", lambda: False, raising=False)
+    assert not demo_module._has_display()
+
+
+def test_reader_of_a_pipe_may_leave_early():
+    # klack schema | head -1: no traceback, and no error code for the shell to stumble over
+    command = f"{sys.executable} -m klack schema; echo code $? >&2"
+    done = subprocess.run(
+        ["bash", "-c", f"({command}) | head -1"],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+
+    assert done.stdout == "{\n"
+    assert done.stderr == "code 0\n"

@@ -1,0 +1,122 @@
+"""What the commands do with a finished study: truth = the study that is put in."""
+
+import json
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from klack.cli.main import main
+from klack.workflow.store import load_study
+
+DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def asked(monkeypatch, impact_study):
+    """Replace the calculation by a finished study; tell what it was asked for."""
+    got = SimpleNamespace(study=impact_study)
+
+    def run_impact(case, *, levels, progress, threads):
+        got.case, got.levels, got.threads = case, levels, threads
+        progress("mesh", 1.0)
+        return got.study
+
+    module = ModuleType("klack.workflow.impact")
+    module.run_impact = run_impact
+    monkeypatch.setitem(sys.modules, "klack.workflow.impact", module)
+    return got
+
+
+@pytest.fixture
+def quick_report(monkeypatch):
+    """Write a word instead of a report, which takes seconds to draw."""
+    for name in ("html.write_report", "pdf.write_pdf"):
+        monkeypatch.setattr(f"klack.report.{name}", lambda study, path: path.write_text(study.case))
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.slow
+def test_impact_writes_result_report_and_numbers(asked, capsys):
+    code = main(["impact", str(DRAWN), "--level", "full", "reduced", "--json", "numbers.json"])
+
+    assert code == 0
+    folder = Path("klack-results/drawn")
+    assert names(folder) == ["report.html", "report.pdf", "result.zarr"]
+    assert (folder / "report.html").read_text().lstrip().startswith("<!")
+    assert (folder / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert (asked.case.title, asked.threads) == ("Two turned bodies", None)
+    assert asked.levels == ("reduced", "full")
+    out = capsys.readouterr().out
+    assert "peak force [N]" in out
+    assert "Results in klack-results/drawn: result.zarr, report.html, report.pdf" in out
+    numbers = json.loads(Path("numbers.json").read_text())
+    peak = asked.study.levels["full"].measures.peak_force
+    assert numbers["levels"]["full"]["peak_force_N"] == pytest.approx(peak, rel=1e-12)
+    assert load_study(folder).levels["full"].measures.peak_force == peak
+
+
+def test_options_of_impact(asked, capsys):
+    options = ["--no-report", "--out", "x/y", "--threads", "2", "-q", "--json", "-"]
+    assert main(["impact", str(DRAWN), "--level", "lumped", *options]) == 0
+
+    assert names(Path("x/y")) == ["result.zarr"]
+    assert (asked.levels, asked.threads) == (("lumped",), 2)
+    out, err = capsys.readouterr()
+    assert json.loads(out)["case"] == "demo"
+    assert err == ""
+
+
+def test_levels_come_from_the_case_if_none_are_asked_for(asked):
+    assert main(["impact", str(DRAWN), "--no-report", "-q"]) == 0
+
+    assert asked.levels == ("reduced", "full")
+
+
+def test_demo_runs_the_shipped_valve(asked, quick_report, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("klack.cli.demo._has_display", lambda: True)
+    Path("demo-valve").write_text("a file of the same name in the working folder")
+
+    assert main(["demo", "-q"]) == 0
+    assert main(["demo", "-q", "--no-open"]) == 0
+
+    assert asked.case.name == "demo-valve"
+    assert asked.levels == ("reduced", "full")
+    assert opened == [Path("klack-results/demo-valve/report.html").resolve().as_uri()]
+
+
+def test_report_is_written_again_from_the_store(asked, quick_report, capsys):
+    assert main(["impact", str(DRAWN), "--no-report", "-q", "--out", "r"]) == 0
+
+    assert main(["report", "r"]) == 0
+    assert main(["report", "r", "--out", "elsewhere", "-q"]) == 0
+
+    assert names(Path("r")) == ["report.html", "report.pdf", "result.zarr"]
+    assert names(Path("elsewhere")) == ["report.html", "report.pdf"]
+    assert "Report in r: report.html, report.pdf" in capsys.readouterr().out
+
+
+def test_ctrl_c_while_writing_leaves_the_former_result(asked, quick_report, monkeypatch, capsys):
+    assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 0
+    before = {p: p.stat().st_mtime_ns for p in Path("r").rglob("*")}
+
+    def interrupted(study, path):
+        path.write_text("half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("klack.report.html.write_report", interrupted)
+    assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 130
+
+    assert {p: p.stat().st_mtime_ns for p in Path("r").rglob("*")} == before
+    assert "stopped" in capsys.readouterr().err

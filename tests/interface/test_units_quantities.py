@@ -1,0 +1,119 @@
+"""Quantities: truth = definitions of the units (SI brochure; NIST SP 811 for inch and psi)."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+
+from klack import units
+from klack.errors import InputError
+from klack.units import format_si, parse_quantity
+
+# kind, text, SI value; exact definitions, so the tolerance is round-off
+GOOD = [
+    ("LENGTH", "80 um", 80e-6),
+    ("LENGTH", "80um", 80e-6),
+    ("LENGTH", "80 µm", 80e-6),  # micro sign
+    ("LENGTH", "80 μm", 80e-6),  # Greek mu
+    ("LENGTH", "-1.2e-1 mm", -1.2e-4),
+    ("LENGTH", ".5 inch", 0.0127),
+    ("LENGTH", 0, 0.0),
+    ("LENGTH", "0", 0.0),
+    ("SPEED", "0.5 m/s", 0.5),
+    ("SPEED", "36 km/h", 10.0),
+    ("TIME", "40 us", 40e-6),
+    ("FORCE", "1.5 kN", 1500.0),
+    ("STIFFNESS", "5 N/mm", 5000.0),
+    ("STIFFNESS", "5 N·mm^-1", 5000.0),
+    ("PRESSURE", "210 GPa", 210e9),
+    ("PRESSURE", "1 N/mm^2", 1e6),
+    ("PRESSURE", "1 N/mm**2", 1e6),
+    ("PRESSURE", "1 psi", 6894.757293168361),
+    ("DENSITY", "7.85 g/cm^3", 7850.0),
+    ("DAMPING", "20 N s/m", 20.0),
+    ("ANGLE", "40 deg", math.radians(40)),
+    ("ANGLE", "40°", math.radians(40)),
+    ("FREQUENCY", "900 kHz", 9e5),
+    ("RATE", "50 1/s", 50.0),
+    ("RATIO", "5 %", 0.05),
+    ("RATIO", 0.3, 0.3),
+    ("RATIO", "0.3", 0.3),
+]
+
+
+@pytest.mark.parametrize(("kind", "text", "expected"), GOOD, ids=[f"{k} {t}" for k, t, _ in GOOD])
+def test_quantity_becomes_si(kind, text, expected):
+    assert parse_quantity(text, getattr(units, kind)) == pytest.approx(expected, rel=1e-14)
+
+
+BAD = [
+    ("LENGTH", "80 bar", "a pressure"),  # the error names what came
+    ("PRESSURE", "80 um", "a length"),
+    ("LENGTH", 80, "without unit"),
+    ("LENGTH", "80", "without unit"),
+    ("LENGTH", "1,5 mm", '"1.5 mm"'),  # pint itself would read 15 mm
+    ("LENGTH", "5 foo", "unknown unit 'foo'"),
+    ("PRESSURE", "210 gpa", "upper and lower case"),
+    ("DENSITY", "7850 kg/m3", "kg/m^3"),
+    ("FREQUENCY", "5 rad/s", "a frequency"),  # 2 pi apart; pint itself would read 5 Hz
+    ("FREQUENCY", "5 rpm", "a frequency"),
+    ("RATE", "5 Hz", "a rate"),
+    ("ANGLE", 40, "without unit"),
+    ("ANGLE", "40 %", "an angle"),
+    ("RATIO", "40 deg", "an angle"),
+    ("LENGTH", True, "True"),
+    ("LENGTH", None, "None"),
+    ("LENGTH", [1], "[1]"),
+    ("LENGTH", math.nan, "finite"),
+    ("LENGTH", "nan m", "one number and one unit"),
+    ("LENGTH", "1e400 m", "finite"),
+    ("LENGTH", "1e308 km", "finite"),
+    ("LENGTH", "", "one number and one unit"),
+    ("LENGTH", "m", "one number and one unit"),
+    ("LENGTH", "1 mm + 2 mm", "one number and one unit"),
+    ("LENGTH", "1 m/", "one number and one unit"),
+    ("LENGTH", "5 class", "unknown unit"),
+]
+
+
+@pytest.mark.parametrize(("kind", "value", "words"), BAD, ids=[f"{k} {v}" for k, v, _ in BAD])
+def test_what_is_no_such_quantity_is_refused(kind, value, words):
+    with pytest.raises(InputError) as caught:
+        parse_quantity(value, getattr(units, kind), "gap")
+
+    text = str(caught.value)
+    assert text.startswith("gap: got ")
+    assert words in text
+    assert "\nTry: " in text
+
+
+@pytest.mark.parametrize("text", ["9**9**9", "m**9**9**9", "1 m**9**9**9", "1 m^9^9^9"])
+def test_towers_of_powers_are_not_evaluated(text):
+    # pint evaluates 9**9**9, which has 369 million digits; the test would not end
+    with pytest.raises(InputError):
+        parse_quantity(text, units.LENGTH)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (3.6e-6, "m", "3.6 um"),
+        (-3.6e-6, "m", "-3.6 um"),
+        (1.25e9, "N/m", "1.25 GN/m"),
+        (0.0, "N", "0 N"),
+        (999.99, "N", "1 kN"),  # rounding may not give 1000 N
+        (7850.0, "kg/m^3", "7850 kg/m^3"),
+        (0.9871, "-", "0.9871"),
+        (1e-20, "s", "1e-05 fs"),
+        (math.nan, "s", "nan s"),
+    ],
+)
+def test_si_numbers_are_written_with_a_prefix(value, unit, text):
+    assert format_si(value, unit) == text
+
+
+def test_pint_waits_until_a_unit_is_read():
+    # klack --help and reports of stored results import klack.units, but read no unit
+    code = "import sys, klack.units; sys.exit('pint' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
