@@ -182,7 +182,11 @@ def simulate_full_order(
         start, retraction = run.place()
         set_up_time = perf_counter() - begin
         record = _march(
-            run, ceil(duration / step), stop_after_separation, energy_interval, progress
+            run,
+            ceil(duration / step * (1.0 - 1e-9)),
+            stop_after_separation,
+            energy_interval,
+            progress,
         )
         loop_time = perf_counter() - begin - set_up_time
         return _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
