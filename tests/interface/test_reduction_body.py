@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from klack.elasticity.eigen import eigenmodes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from klack.elasticity.eigen import eigenmodes
+from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError
 from klack.reduction.damping import LossFactor, ModalDamping, RayleighDamping
 from klack.reduction.full_order import full_order_receptance
@@ -13,7 +14,7 @@ from klack.reduction.receptance import reduced_receptance
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, select
-from klack.reduction.transfer import compare_receptances, mean_level_deviation
+from klack.reduction.transfer import compare_receptances, compare_reductions, mean_level_deviation
 from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import rod
 
@@ -254,42 +255,43 @@ def test_krylov_basis_that_is_too_small_says_so(parts):
         full_order_receptance(body, ports, [1e3, 3e6], loss_factor=1e-3, max_vectors=8)
 
 
-def test_comparison_finds_where_a_curve_leaves(parts, reduced):
-    """More modes or a correction never shorten the valid range of the rod."""
-    body, ports, _ = parts
+def test_comparison_finds_where_a_curve_leaves(parts):
+    """The bare modes leave first, then those with residual, then those with attachment mode."""
+    body, ports, pool = parts
     axis = np.geomspace(1e3, 5e5, 500)
-    full = full_order_receptance(body, ports, axis, loss_factor=1e-2)
-    plain = reduce_with(parts, modes=ByCount(5))
-    candidates = [
-        reduced_receptance(plain, axis, with_residual=False, loss_factor=1e-2),
-        reduced_receptance(plain, axis, with_residual=True, loss_factor=1e-2),
-        reduced_receptance(reduced, axis, with_residual=False, loss_factor=1e-2),
-    ]
-    comparison = compare_receptances(
-        full.receptance,
-        candidates,
-        "bottom",
-        body="rod",
+
+    comparison = compare_reductions(
+        body,
+        ports[0],
+        [ByCount(5), ByParticipation(5, 8)],
+        axis,
         loss_factor=1e-2,
-        reference_note="Krylov",
+        modes_pool=pool,
+        flexibility=Flexibility(body),
     )
 
     reach = comparison.valid_up_to
     assert reach[0] == axis[-1]
     assert reach[1] < reach[2] < reach[3]
-    assert comparison.labels[1:] == (
+    assert comparison.labels[1:5] == (
         "5 modes",
         "5 modes + residual compliance",
-        "5 modes + 2 attachment",
+        "5 modes + 1 attachment",
+        "5 modes by participation",
     )
+    assert_array_equal(reach[1:4], reach[4:])  # the rod's lowest modes participate most
+    assert comparison.curves.shape == comparison.mean_deviations.shape == (7, 500)
+    assert "direct solutions at 1 of them" in comparison.reference_note
+
+
+def test_comparison_refuses_another_axis(parts):
+    reduced = reduce_with(parts)
+    curves = [
+        reduced_receptance(reduced, axis, with_residual=False) for axis in ([1e3, 2e3], [1e3, 3e3])
+    ]
     with pytest.raises(InputError, match="one axis"):
         compare_receptances(
-            full.receptance,
-            [reduced_receptance(plain, axis[:9], with_residual=False)],
-            "bottom",
-            body="rod",
-            loss_factor=1e-2,
-            reference_note="",
+            curves[0], curves[1:], "bottom", body="rod", loss_factor=1e-2, reference_note=""
         )
 
 

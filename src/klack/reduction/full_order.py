@@ -86,7 +86,7 @@ class FullOrderReceptance:
         if not len(self.checked_frequencies):
             return text
         return (
-            f"{text}; {len(self.checked_frequencies)} direct solutions deviate by at most "
+            f"{text}; deviation from direct solutions at {len(self.checked_frequencies)} of them "
             f"{self.checked_deviations.max():.1g}"
         )
 
