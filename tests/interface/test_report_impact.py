@@ -168,7 +168,12 @@ def test_energy_bars_add_up(impact_study: ImpactStudy) -> None:
 
 
 def test_curves_differ_in_black_and_white(impact_study: ImpactStudy) -> None:
-    for chart in charts(impact_study):
+    """Also with all six levels at once."""
+    reduced = impact_study.levels["reduced"]
+    names = ("lumped", "reduced-none", "reduced-attachment", "reduced-participation")
+    more = {name: replace(reduced, level=name, label=name) for name in names}
+    crowded = replace(impact_study, levels={**impact_study.levels, **more})
+    for chart in charts(crowded):
         if isinstance(chart, Chart):
             for panel in chart.panels:
                 lines = [(c.style, c.drawn, c.width) for c in panel.curves if c.label]

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 Colour = Literal["black", "orange", "sky", "green", "yellow", "blue", "red", "pink", "grey"]
-Style = Literal["solid", "dashed", "dotted", "dashdot", "long"]
+Style = Literal["solid", "dashed", "dotted", "dashdot", "long", "sparse"]
 
 COLOURS: dict[Colour, str] = {
     "black": "#111111",
@@ -50,6 +50,7 @@ DASHES: dict[Style, tuple[float, ...]] = {
     "dotted": (2, 2.5),
     "dashdot": (9, 3, 2, 3),
     "long": (14, 4),
+    "sparse": (2, 6),
 }
 """Lengths in px of strokes and spaces."""
 

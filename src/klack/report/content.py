@@ -126,8 +126,8 @@ def _has_something(section: Section) -> bool:
 
 def _number_table(study: ImpactStudy) -> Table:
     """Quantities down, levels across; the deviation from the reference stands below the value."""
-    names = [study.reference, *(name for name in study.levels if name != study.reference)]
-    results = [study.levels[name] for name in names]
+    results = study.ordered
+    names = [result.level for result in results]
     rows = []
     for title, text, deviation in _KEY_NUMBERS:
         cells = []
@@ -177,7 +177,7 @@ _KEY_NUMBERS: tuple[
     ("degrees of freedom", lambda r: count(r.degrees_of_freedom), None),
     ("time step", lambda r: f"{quantity(r.step, 's', 3)}\n{count(r.steps)} steps", None),
     ("computing time", lambda r: quantity(r.wall_time, "s", 3), None),
-    ("preparation", lambda r: quantity(r.setup_time, "s", 3), None),
+    ("preparation", lambda r: quantity(r.setup_time, "s", 3) if r.setup_time else "–", None),
 )
 
 
@@ -258,8 +258,7 @@ _BODY_ROWS: tuple[tuple[str, Callable[[BodySummary], str]], ...] = (
 
 
 def _energy_table(study: ImpactStudy) -> Table:
-    results = [study.levels[study.reference]]
-    results += [result for name, result in study.levels.items() if name != study.reference]
+    results = study.ordered
     names = dict.fromkeys(name for result in results for name in result.energies)
     rows = []
     for name in names:

@@ -27,7 +27,7 @@ from klack.report.chart import (
     Style,
     stems,
 )
-from klack.report.wording import quantity
+from klack.report.wording import quantity, sentence
 from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = [
@@ -51,7 +51,7 @@ _LOOKS: dict[str, Look] = {
     "reduced-participation": ("green", "long", 1.9),
     "reduced-attachment": ("blue", "dashdot", 1.9),
     "reduced-none": ("orange", "dotted", 1.9),
-    "lumped": ("pink", "dotted", 1.9),
+    "lumped": ("pink", "sparse", 2.1),
 }
 _MORE_LOOKS: tuple[Look, ...] = (
     ("red", "dashed", 1.6),
@@ -86,12 +86,6 @@ def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
     return tuple(found)
 
 
-def _ordered(study: ImpactStudy) -> list[LevelResult]:
-    """Levels with the reference first, so that the others are drawn on top of it."""
-    others = [result for name, result in study.levels.items() if name != study.reference]
-    return [study.levels[study.reference], *others]
-
-
 def _look(level: str) -> Look:
     return _LOOKS.get(level, ("grey", "dashed", 1.9))
 
@@ -111,7 +105,7 @@ def _since_touch(result: LevelResult, time: Floats) -> Floats:
 
 def force_chart(study: ImpactStudy) -> Chart:
     """Contact force of all levels, and their difference from the reference below."""
-    results = _ordered(study)
+    results = study.ordered
     longest = max(result.measures.total_contact_time for result in results)
     limits = (-0.08e6 * longest, 1.25e6 * longest)
     curves, differences = [], []
@@ -132,13 +126,16 @@ def force_chart(study: ImpactStudy) -> Chart:
     if differences:
         panels.append(
             Panel(
-                y=AxisSpec(label="difference", unit="%"),
+                y=AxisSpec(label="difference", unit="%", range=_span(differences, 0.5, 30.0)),
                 curves=tuple(differences),
                 marks=(Mark(value=0.0, axis="y"),),
                 share=0.5,
             )
         )
-        note += f" Below: difference from '{reference.label}', in per cent of its peak force."
+        note += (
+            f" Below: difference from '{reference.label}', in per cent of its peak force; "
+            "a level that is far off leaves the panel."
+        )
     return Chart(
         name="force",
         title="Contact force over time",
@@ -148,10 +145,19 @@ def force_chart(study: ImpactStudy) -> Chart:
     )
 
 
+def _span(curves: list[Curve], least: float, most: float) -> tuple[float, float]:
+    """Symmetric range that shows all curves that stay within ``most``, others as far as it goes."""
+    tops = [float(np.max(np.abs(curve.y), initial=0.0)) for curve in curves]
+    limit = max([least, *(1.15 * top for top in tops if top <= most)])
+    if min(tops) > most:
+        limit = 1.15 * max(tops)
+    return -limit, limit
+
+
 def motion_chart(study: ImpactStudy) -> Chart:
     """Velocity of the needle's centre of mass and the way it has gone."""
     velocities, ways = [], []
-    for result in _ordered(study):
+    for result in study.ordered:
         history = result.history
         time = _since_touch(result, history.edges)
         velocities.append(_level_curve(time, history.velocity_a, result))
@@ -194,7 +200,7 @@ def _way(history: ImpactHistory, time: Floats) -> Floats:
 
 def spectrum_chart(study: ImpactStudy) -> Chart:
     """Spectrum of the force of the first impact: narrow band, third octaves, their difference."""
-    results = _ordered(study)
+    results = study.ordered
     reference = results[0]
     top = min(_TOP_FREQUENCY, *(0.1 / result.history.step for result in results))
     frequency = np.geomspace(_LOW_FREQUENCY, top, 800)
@@ -217,10 +223,9 @@ def spectrum_chart(study: ImpactStudy) -> Chart:
         band = Band(low=1e-3 * _LOW_FREQUENCY, high=1e-3 * min(trusted, top), label=label)
         panels[0] = replace(panels[0], bands=(band,))
     if differences:
-        limit = max(1.5, 1.1 * max(float(np.max(np.abs(curve.y))) for curve in differences))
         panels.append(
             Panel(
-                y=AxisSpec(label="difference", unit="dB", range=(-limit, limit)),
+                y=AxisSpec(label="difference", unit="dB", range=_span(differences, 1.5, 10.0)),
                 curves=tuple(differences),
                 marks=tuple(Mark(value=value, axis="y") for value in (-1.0, 0.0, 1.0)),
                 share=0.55,
@@ -317,7 +322,7 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
             "level difference from the full body, averaged over a sliding third octave; the level "
             f"line is at {comparison.tolerance:g} dB, an upright line marks where a reduced body "
             "first exceeds it. Structural damping with a loss factor of "
-            f"{comparison.loss_factor:g} in every curve. {comparison.reference_note}"
+            f"{comparison.loss_factor:g} in every curve. {sentence(comparison.reference_note)}"
         ),
     )
 
@@ -432,7 +437,7 @@ def approach_chart(study: ImpactStudy) -> Chart:
 
 def energy_bars(study: ImpactStudy) -> BarChart:
     """Shares of the initial kinetic energy after separation, one bar per level."""
-    results = _ordered(study)
+    results = study.ordered
     initial = [next(iter(result.energies.values())) for result in results]
     names = dict.fromkeys(name for result in results for name in list(result.energies)[1:])
     parts: list[BarPart] = []
@@ -456,7 +461,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
 
 def modal_energy_chart(study: ImpactStudy) -> Chart:
     """Energy left in each mode: one panel per body, the reference and the reduced level."""
-    results = [result for result in _ordered(study) if result.modal_energy]
+    results = [result for result in study.ordered if result.modal_energy]
     results = [r for r in results if r.level in (results[0].level, "reduced")]
     initial = next(iter(results[0].energies.values()))
     stems_of = results[0]

@@ -5,7 +5,17 @@ from math import floor, isfinite, log10
 from klack.contact.restitution import Deviation
 from klack.workflow.study import ImpactStudy, LevelResult
 
-__all__ = ["answer", "count", "listed", "quantity", "share", "signed", "signed_share", "verdict"]
+__all__ = [
+    "answer",
+    "count",
+    "listed",
+    "quantity",
+    "sentence",
+    "share",
+    "signed",
+    "signed_share",
+    "verdict",
+]
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
@@ -41,10 +51,12 @@ def signed(value: float, decimals: int, unit: str = "") -> str:
     """
     if not isfinite(value):
         return _NONE
-    text = f"{value:+.{decimals}f}"
-    if float(text) == 0.0:
-        text = text[1:]  # zero has no sign
+    text = _signless_zero(f"{value:+.{decimals}f}")
     return text.replace("-", _MINUS) + _space(unit)
+
+
+def _signless_zero(text: str) -> str:
+    return text.lstrip("+-") if float(text) == 0.0 else text
 
 
 def share(value: float, decimals: int = 1) -> str:
@@ -55,7 +67,7 @@ def share(value: float, decimals: int = 1) -> str:
     """
     if not isfinite(value):
         return _NONE
-    return f"{100 * value:.{decimals}f}".replace("-", _MINUS) + _space("%")
+    return _signless_zero(f"{100 * value:.{decimals}f}").replace("-", _MINUS) + _space("%")
 
 
 def signed_share(value: float, decimals: int = 2) -> str:
@@ -79,6 +91,16 @@ def listed(words: list[str]) -> str:
     ('a, b and c', 'a')
     """
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def sentence(text: str) -> str:
+    """Begin with a capital letter and end with a full stop.
+
+    >>> sentence("full order")
+    'Full order.'
+    """
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) or not text else ".")
 
 
 def answer(study: ImpactStudy) -> str:

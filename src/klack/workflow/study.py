@@ -234,3 +234,9 @@ class ImpactStudy:
     transfer: tuple[TransferComparison, ...] = ()
     sections: tuple[SectionPicture, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def ordered(self) -> tuple[LevelResult, ...]:
+        """Results in the order of tables: the reference, the reduced level, the others as run."""
+        first = dict.fromkeys(n for n in (self.reference, "reduced") if n in self.levels)
+        return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
