@@ -1,5 +1,7 @@
 """Truth: closed formulas of the laws, and calculus (potential = integral, slope = derivative)."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -40,7 +42,7 @@ def test_potential_is_the_integral_of_the_force(law):
     x, weights = np.polynomial.legendre.leggauss(20)
     points = np.concatenate(([0.0], DEPTH, [6e-6]))
     work = 0.0
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         work += 0.5 * (b - a) * weights @ law.force(0.5 * (a + b) + 0.5 * (b - a) * x)
         # Gauss is exact for the cubics; 1e-7 for the root at the origin of the power laws
         assert float(law.potential(b)) == pytest.approx(work, rel=3e-7)

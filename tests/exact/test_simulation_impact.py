@@ -76,9 +76,7 @@ def test_hertz_sphere_on_plane():
     duration = 4.0 * sqrt(pi) / 5.0 * gamma(0.4) / gamma(0.9) * depth / speed
 
     m = measure_impact(
-        simulate_impact(
-            needle_on_wall(mass, HertzLaw(K)), speed=speed, step=1e-9, duration=30e-6
-        )
+        simulate_impact(needle_on_wall(mass, HertzLaw(K)), speed=speed, step=1e-9, duration=30e-6)
     )
 
     assert duration == pytest.approx(27.0855e-6, rel=1e-5)

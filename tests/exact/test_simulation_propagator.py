@@ -49,9 +49,7 @@ def test_two_steps_are_one_double_step():
     one, two = (modal_propagator(omega, zeta, h) for h in (1e-6, 2e-6))
 
     np.testing.assert_allclose(one.A11**2 + one.A12 * one.A21, two.A11, atol=1e-14)
-    np.testing.assert_allclose(
-        one.A11 * one.B1 + one.A12 * one.B2 + one.B1, two.B1, rtol=1e-12
-    )
+    np.testing.assert_allclose(one.A11 * one.B1 + one.A12 * one.B2 + one.B1, two.B1, rtol=1e-12)
 
 
 def test_damping_loss_closes_the_energy_balance_of_one_step():
