@@ -49,14 +49,14 @@ def at(spectrum, frequency):
 
 
 def test_half_sine_has_the_tabulated_spectrum():
-    spectrum = impulse_spectrum(pulse(half_sine), resolution=100.0)
+    spectrum = impulse_spectrum(pulse(half_sine), resolution=20.0)
     ours = at(spectrum, PULSES[:, 0] / LENGTH) / (PEAK * LENGTH)
 
     np.testing.assert_allclose(ours, PULSES[:, 1], atol=2e-6)  # six digits in the table
 
 
 def test_rectangle_has_the_tabulated_spectrum():
-    spectrum = impulse_spectrum(pulse(lambda x: PEAK * LENGTH * x, tail=20e-6), resolution=100.0)
+    spectrum = impulse_spectrum(pulse(lambda x: PEAK * LENGTH * x, tail=20e-6), resolution=20.0)
     ours = at(spectrum, PULSES[:, 0] / LENGTH) / (PEAK * LENGTH)
 
     np.testing.assert_allclose(ours, PULSES[:, 3], atol=2e-6)
@@ -76,7 +76,7 @@ def test_simulated_hertz_impact_has_the_tabulated_spectrum():
     )
     history = simulate_impact(system, speed=0.5, step=5e-9, duration=40e-6)
     series = first_impact(history)
-    spectrum = impulse_spectrum(series, resolution=100.0)
+    spectrum = impulse_spectrum(series, resolution=20.0)
     duration = 2.9432751844 * (5.0 * 1e-3 * 0.25 / (4.0 * 7e9)) ** 0.4 / 0.5
     ours = at(spectrum, PULSES[:, 0] / duration) / (history.peak_force.max() * duration)
 

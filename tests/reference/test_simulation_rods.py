@@ -56,12 +56,14 @@ def test_truncated_rod_on_a_spring(row):
     assert m.contact_time == pytest.approx(separation, abs=3e-2 if fading else 2e-3)
 
 
-@pytest.mark.parametrize("row", rows("rod_linear_spring_wall.csv"), ids=lambda row: row[0])
+# up to a spring 20 times stiffer than the rod; beyond, a wave front needs more than 300 modes
+@pytest.mark.parametrize(
+    "row",
+    [row for row in rows("rod_linear_spring_wall.csv") if float(row[0]) <= 20],
+    ids=lambda row: row[0],
+)
 def test_needle_in_one_dimension(row):
     kappa, restitution, peak, separation = (float(x) for x in row[:4])
-    if kappa > 20:
-        pytest.skip("needs more than 300 modes; 20 is beyond the stiffest seat")
-
     history = rod_on_wall(kappa, 300, "static_spring", step=5e-4, duration=14.0)
     m = measure_impact(history)
 
