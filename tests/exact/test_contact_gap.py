@@ -73,12 +73,14 @@ def test_reach_marks_its_border_as_rim():
     assert r[space.rim].max() == r.max()
 
 
-def test_clearance_is_that_of_the_surfaces():
-    """Lifted by 10 nm; integration points lie up to 4 um beside the ring: 15 nm at most."""
+@pytest.mark.parametrize("lift", [0.0, 0.1e-6])
+def test_clearance_is_that_of_the_surfaces(lift):
+    """The weighted gap of 60 um elements closes 0.1 um later; measured to 1 nm."""
     sphere, cone, _ = sphere_on_cone("hex20", (26, 24))
-    lifted = sphere.moved(np.array([0, 0, 10e-9]))
+    lifted = sphere.moved(np.array([0, 0, lift]))
 
-    space = contact_space(lifted, lifted.surface("bottom"), cone, cone.surface("top"), reach=2e-6)
+    space = contact_space(lifted, lifted.surface("bottom"), cone, cone.surface("top"), reach=4e-6)
 
-    assert 9e-9 < space.clearance < 25e-9
-    assert space.clearance < space.touch
+    assert space.clearance == pytest.approx(lift, abs=3e-9)
+    assert space.touch - space.clearance > 50e-9
+    assert space.shifted(1e-6).clearance == pytest.approx(space.clearance + 1e-6, rel=1e-9)
