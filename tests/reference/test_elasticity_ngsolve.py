@@ -64,6 +64,7 @@ def ngsolve_frequencies(mesh, count: int) -> np.ndarray:
     return np.sqrt(np.sort(squares)[6:]) / (2 * np.pi)
 
 
+@pytest.mark.slow
 def test_frequencies_agree_on_an_unsymmetric_body():
     """1e-9 relative: round-off of two eigenvalue solvers."""
     mesh = ngsolve_mesh()

@@ -46,16 +46,14 @@ class _Subspace:
 
     def orthonormalised(self, W: Array) -> tuple[Array, Array, Array]:
         """W = V C + Q B with Q mass-orthonormal and orthogonal to V; Q may have fewer columns."""
-        C = np.zeros((self.size, W.shape[1]))
-        length = np.sqrt(np.einsum("ij,ij->j", W, self.M @ W))
-        for _ in range(2):
-            part = self.basis.T @ (self.M @ W)
-            W = W - self.basis @ part
-            C += part
-        Q, B = _orthonormal(self.M, W, length.max())
-        Q = Q - self.basis @ (self.basis.T @ (self.M @ Q))
-        Q, B2 = _orthonormal(self.M, Q, 1.0)
-        return Q, C, B2 @ B
+        MW = self.M @ W
+        largest = np.sqrt(np.einsum("ij,ij->j", W, MW).max(initial=0.0))
+        C = self.basis.T @ MW
+        Q, B = _orthonormal(self.M, W - self.basis @ C, largest)
+        # the first pass left round-off of W, which is large beside its smallest new directions
+        rest = self.basis.T @ (self.M @ Q)
+        Q, again = _orthonormal(self.M, Q - self.basis @ rest, 1.0)
+        return Q, C + rest @ B, again @ B
 
 
 def block_lanczos(
