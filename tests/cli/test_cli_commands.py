@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -14,7 +15,8 @@ from klack.cli import demo as demo_module
 from klack.cli.main import main
 from klack.cli.output import staged_folder, write_json
 from klack.cli.progress import show_progress
-from klack.errors import ConvergenceError, InputError
+from klack.cli.tables import print_table
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.verification import GROUPS, Check, compare, run_checks
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
@@ -192,6 +194,26 @@ def test_each_kind_of_trouble_has_its_exit_code(error, code, words, monkeypatch,
     assert words in err
     assert ("Traceback" in err) == (code == 70)
     assert contents(tmp_path) == []
+
+
+def test_doubts_about_accuracy_are_notes_without_source_lines(monkeypatch, capsys):
+    def run(*arguments: object, **options: object) -> object:
+        warnings.warn("too few modes", AccuracyWarning, stacklevel=2)
+        raise KeyboardInterrupt
+
+    play(monkeypatch, run)
+    main(["impact", str(DRAWN), "-q"])
+
+    assert capsys.readouterr().err.startswith("klack impact: note: too few modes\nklack impact: st")
+
+
+def test_units_in_brackets_survive_the_table(capsys):
+    # rich would take [us] for a style and drop it
+    print_table("a [b] table", ["level", "time [us]"], [["[bold]full", "1.5"]])
+
+    out = capsys.readouterr().out
+    for words in ("a [b] table", "time [us]", "[bold]full"):
+        assert words in out
 
 
 # ------------------------------------------------------------------ verification

@@ -120,3 +120,15 @@ def test_ctrl_c_while_writing_leaves_the_former_result(asked, quick_report, monk
 
     assert {p: p.stat().st_mtime_ns for p in Path("r").rglob("*")} == before
     assert "stopped" in capsys.readouterr().err
+
+
+def test_a_bug_in_a_report_does_not_cost_the_calculation(asked, quick_report, monkeypatch, capsys):
+    assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 0
+    monkeypatch.setattr("klack.report.pdf.write_pdf", lambda study, path: 1 / 0)
+
+    assert main(["impact", str(DRAWN), "--out", "r"]) == 70
+
+    assert names(Path("r")) == ["result.zarr"]  # and no report of the run before
+    out, err = capsys.readouterr()
+    assert "Results in r: result.zarr\n" in out
+    assert "ZeroDivisionError" in err

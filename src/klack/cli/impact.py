@@ -1,11 +1,12 @@
 """``klack impact``: one dry impact at one or several levels."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads
+from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 from klack.cli.progress import show_progress
 from klack.cli.tables import print_table
@@ -44,11 +45,9 @@ def run_case(
 ) -> Path:
     """Run a case, write and print what came out; return the folder of the results."""
     from klack.case import find_case, load_case
-    from klack.errors import require_positive
 
     require_json_target(json)
-    if threads is not None:
-        require_positive("--threads", threads, "cores")
+    require_threads(threads)
     checked = load_case(find_case(case))
     levels = checked.require_levels(level if level else checked.run.levels)
     folder = out if out is not None else Path("klack-results") / checked.name
@@ -60,17 +59,30 @@ def run_case(
 
     with show_progress(quiet) as progress:
         study = run_impact(checked, levels=levels, progress=progress, threads=threads)
+        failure: Exception | None = None
         with staged_folder(folder) as stage:
             progress("result", 0.0)
             save_study(study, stage)
             if report:
                 progress("report", 0.0)
-                write_reports(study, stage)
+                try:
+                    write_reports(study, stage)
+                except Exception as error:  # a mistake in a picture may not cost the calculation
+                    failure = error
+            if failure or not report:
+                _remove_reports(stage)
+                _remove_reports(folder)  # they would show an earlier result
     if not quiet:
-        _print_study(study, folder, report, to_stderr=str(json) == "-")
+        made = report and failure is None
+        _print_study(study, folder, made, to_stderr=str(json) == "-")
     if json is not None:
         write_json(json, study_to_json(study))
+    if failure:
+        raise failure
     return folder
+
+
+_REPORTS = ("report.html", "report.pdf")
 
 
 def write_reports(study: "ImpactStudy", folder: Path) -> None:
@@ -78,18 +90,22 @@ def write_reports(study: "ImpactStudy", folder: Path) -> None:
     from klack.report.html import write_report
     from klack.report.pdf import write_pdf
 
-    write_report(study, folder / "report.html")
-    write_pdf(study, folder / "report.pdf")
+    page, print_ = (folder / name for name in _REPORTS)
+    write_report(study, page)
+    write_pdf(study, print_)
+
+
+def _remove_reports(folder: Path) -> None:
+    for name in _REPORTS:
+        (folder / name).unlink(missing_ok=True)
 
 
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    import sys
-
     from klack.workflow.summary import SUMMARY_COLUMNS, summary_rows
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
     for warning in study.warnings:
         print(f"Note: {warning}", file=stream)
-    made = "result.zarr" + (", report.html, report.pdf" if report else "")
-    print(f"Results in {folder}: {made}", file=stream)
+    made = ["result.zarr", *(_REPORTS if report else ())]
+    print(f"Results in {folder}: {', '.join(made)}", file=stream)

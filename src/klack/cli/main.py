@@ -16,13 +16,15 @@ code  meaning
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from cyclopts import App, CycloptsError
 
 from klack import __version__
 from klack.cli import demo, impact, reduce, report, schema, verify
-from klack.errors import ConvergenceError, KlackError
+from klack.errors import AccuracyWarning, ConvergenceError, KlackError
 
 __all__ = ["app", "main"]
 
@@ -55,9 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = " ".join(["klack", *(a for a in arguments[:1] if not a.startswith("-"))])
     try:
-        code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
-        sys.stdout.flush()
-        return code if isinstance(code, int) else EXIT_OK
+        return _run(arguments, name)
     except CycloptsError as error:
         return _complain(f"{name}: {_one_line(error)}\nTry: {_help_of(name)}", EXIT_BAD_INPUT)
     except ConvergenceError as error:
@@ -77,6 +77,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         traceback.print_exc()
         text = "this is a mistake of klack itself, not of your input; please report the text above."
         return _complain(f"{name}: {text}", EXIT_BUG)
+
+
+def _run(arguments: list[str], name: str) -> int:
+    def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if issubclass(category, AccuracyWarning):
+            print(f"{name}: note: {message}", file=sys.stderr)
+        else:
+            usual(message, category, *place, **more)
+
+    with warnings.catch_warnings():
+        usual, warnings.showwarning = warnings.showwarning, note
+        code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
+    sys.stdout.flush()
+    return code if isinstance(code, int) else EXIT_OK
 
 
 def _complain(text: str, code: int) -> int:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-__all__ = ["CaseArgument", "Json", "Levels", "Out", "Quiet", "Threads"]
+from klack.errors import require_positive
+
+__all__ = ["CaseArgument", "Json", "Levels", "Out", "Quiet", "Threads", "require_threads"]
 
 CaseArgument = Annotated[
     Path, Parameter(name="CASE", help="Case file (YAML), or the name of a shipped case.")
@@ -38,3 +40,9 @@ Levels = Annotated[
         "several are compared. [default: as in the case]",
     ),
 ]
+
+
+def require_threads(threads: int | None) -> None:
+    """Refuse a number of processor cores that cannot be."""
+    if threads is not None:
+        require_positive("--threads", threads, "cores")

@@ -3,9 +3,8 @@
 import sys
 from collections.abc import Iterable, Sequence
 
-__all__ = ["Colour", "print_table"]
+__all__ = ["print_table"]
 
-Colour = dict[str, str]
 _WIDE = 160  # where no terminal limits the width
 
 
@@ -31,7 +30,7 @@ def print_table(
     table = Table(title=Text(title), box=SIMPLE_HEAD, title_justify="left")
     for i, column in enumerate(columns):
         words = i < left
-        table.add_column(column, justify="left" if words else "right", overflow="fold")
+        table.add_column(Text(column), justify="left" if words else "right", overflow="fold")
     for row in rows:
         table.add_row(*(Text(cell, style=_STYLES.get(cell, "")) for cell in row))
     console.print(table)
