@@ -18,6 +18,7 @@ from klack.contact.submodel import LocalStiffness
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
+from klack.materials import Material
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
@@ -53,6 +54,8 @@ from klack.workflow.transfer import TRANSFER_MODES, compare_transfer
 __all__ = ["run_impact"]
 
 _LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
+# What a reduced level needs before it can run, beyond meshes and matrices.
+_SET_UP = ("factorise", "static contact", "modes", "reduced")
 _REDUCED_LABELS: Mapping[str, tuple[Variant, str]] = {
     "reduced": ("consistent", "consistent law"),
     "reduced-participation": ("consistent", "consistent law, modes by participation"),
@@ -103,7 +106,7 @@ def run_impact(
                 results[level] = run_lumped(problem)
             elif level != "full":
                 pair = own if level == "reduced" else _variant(level, problem, pools, classical)
-                results[level] = _run_variant(case, level, pair)
+                results[level] = _run_variant(case, level, pair, setup_time=clock.spent(_SET_UP))
         clock("reduced", 1.0)
         transfer: tuple[TransferComparison, ...] = ()
         if case.run.transfer is not None:
@@ -170,6 +173,10 @@ class _Clock:
             self._times[self._stage] = self._times.get(self._stage, 0.0) + now - self._since
         self._since = now
 
+    def spent(self, stages: Sequence[str]) -> float:
+        """Seconds in these stages so far."""
+        return sum(self.times().get(stage, 0.0) for stage in stages)
+
     def times(self) -> dict[str, float]:
         """Seconds per stage."""
         self._book()
@@ -208,12 +215,14 @@ def _variant(
     )
 
 
-def _run_variant(case: Case, level: str, pair: ReducedPair) -> LevelResult:
+def _run_variant(case: Case, level: str, pair: ReducedPair, *, setup_time: float) -> LevelResult:
     counts = f"{elastic_count(pair.upper)} + {elastic_count(pair.lower)} modes"
     words = _REDUCED_LABELS[level][1]
     if level == "reduced" and pair.local is None:
         words = f"{case.contact.local_law.kind} law, correction {case.reduction.correction}"
-    return run_reduced(case, pair, level=level, label=f"reduced, {counts}, {words}", setup_time=0.0)
+    return run_reduced(
+        case, pair, level=level, label=f"reduced, {counts}, {words}", setup_time=setup_time
+    )
 
 
 def _deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
@@ -267,13 +276,20 @@ def _body_summary(case: Case, body: ElasticBody, reduced: ReducedBody) -> BodySu
         model="axisymmetric" if body.dimension == 2 else "3-D",
         source=source,
         support="held at " + " and ".join(supports) if supports else "free",
-        material=", ".join(dict.fromkeys(m.name for m in materials.values())),
+        material="; ".join(dict.fromkeys(_in_words(m) for m in materials.values())),
         mass=body.mass,
         nodes=body.mesh.node_count,
         elements=body.mesh.element_count,
         dofs=body.dof_count,
         frequencies=reduced.frequencies[first:last],
         compliance_share=float(reduced.compliance_share[0]),
+    )
+
+
+def _in_words(material: Material) -> str:
+    return (
+        f"{material.name} (E {material.young / 1e9:.4g} GPa, nu {material.poisson:.3g}, "
+        f"rho {material.density:.5g} kg/m3)"
     )
 
 

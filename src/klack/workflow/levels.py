@@ -356,7 +356,7 @@ def run_lumped(problem: ContactProblem) -> LevelResult:
     return _level(
         history,
         level="lumped",
-        label=f"lumped: rigid masses, {case.lumped.stiffness:.3g} N/m",
+        label=f"lumped: rigid masses, {case.lumped.stiffness / 1e6:.4g} N/um",
         dofs=sum(body.mode_count for body in bodies),
         step=case.run.reduced_step,
         wall_time=perf_counter() - begin,
