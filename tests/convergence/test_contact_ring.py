@@ -79,7 +79,7 @@ def force_at(static, approach, parts):
 
 @pytest.mark.slow
 def test_solid_ring_equals_the_axisymmetric_one():
-    """24 against 20 layers per circle; measured 0.3 %.  Element size over half width is 1.1."""
+    """24 against 20 layers per circle; measured 0.2 %.  Element size over half width is 1.1."""
     approach = np.array([1.0e-6, 2.0e-6, 3.0e-6, 4.0e-6])
     flat = problem(20e-6, None).solve(300.0)
     solid = problem(20e-6, (6, 5)).solve(75.0)

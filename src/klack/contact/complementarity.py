@@ -6,7 +6,7 @@ The unknown multipliers obey the linear complementarity problem
 
 with a symmetric positive definite compliance ``A``.  It is solved by guessing the active set:
 solve :math:`A_{aa} \lambda_a = -q_a`, then flip every point that pulls or penetrates (the
-primal-dual active set of Hintermueller, Ito & Kunisch 2003).  That settles in a few rounds but is
+primal-dual active set of Hintermueller, Ito & Kunisch 2002).  That settles in a few rounds but is
 not proven to; when the number of wrong points stops falling, and always after 100 rounds, only the
 last one is flipped, which ends for every positive definite matrix (Murty 1974).
 """
