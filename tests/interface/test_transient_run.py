@@ -10,8 +10,9 @@ from scipy.sparse import csr_array, eye_array
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import available_backends, factorize
 from klack.errors import ConvergenceError, InputError
+from klack.transient import full_order
 from klack.transient.full_order import recommended_step, simulate_full_order
-from klack.transient.inertia import massless_nodes, scalar_mass
+from klack.transient.inertia import InverseMass, massless_nodes, scalar_mass
 from klack.transient.interface_solve import SplitSolve, WholeSolve
 from klack.verification.impacts import STEEL, sphere_over_cylinder
 from klack.verification.rod_bodies import rod_body, rod_contact
@@ -105,6 +106,48 @@ def test_half_and_whole_solves_agree():
     for result in results:
         for got, wanted in zip(result, expected, strict=True):
             np.testing.assert_allclose(got, wanted, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", ["contact-stabilised-newmark", "massless"])
+def test_points_that_close_unwatched_are_found(scheme, monkeypatch):
+    """Watching almost nothing costs repeated steps, not accuracy."""
+    reference = run(scheme=scheme)
+    a, b, space = problem()
+    monkeypatch.setattr(full_order, "_WATCH_STEPS", 0.02)
+
+    blind = simulate_full_order(a, b, space, speed=0.5, duration=20e-6, step=100e-9, scheme=scheme)
+
+    scale = reference.history.force.max()
+    assert scheme != "massless" or blind.statistics.repeats > reference.statistics.repeats
+    assert blind.history.force == pytest.approx(reference.history.force, abs=1e-8 * scale)
+
+
+def test_mobility_adds_up_all_directions():
+    """Columns of G M^-1 G^T against dense algebra, with some directions fixed."""
+    a, _, _ = problem()
+    rng = np.random.default_rng(5)
+    G = np.zeros((4, len(a.free)))
+    G[:, 100:140] = rng.standard_normal((4, 40))
+    points = np.array([0, 3])
+    inverse = InverseMass(a.M, a.free, 2, backend="superlu", threads=None)
+
+    columns = inverse.mobility(csr_array(G), points)
+
+    dense = np.linalg.solve(a.M.toarray()[np.ix_(a.free, a.free)], G.T)
+    np.testing.assert_allclose(columns, (G @ dense)[:, points], rtol=1e-9)
+    np.testing.assert_allclose(inverse.solve(G.T), dense, rtol=0, atol=1e-9 * abs(dense).max())
+    inverse.close()
+
+
+def test_velocity_of_massless_nodes_follows_the_body():
+    """After the impact a compact sphere moves almost rigidly: 10 % of its speed."""
+    _, _, space = problem()
+    nodes = np.unique(space.G_a.indices // 2)
+
+    result = run(scheme="massless")
+
+    end = result.fields[0].end_velocity.reshape(-1, 2)[nodes, 1]
+    assert end == pytest.approx(result.history.velocity_a[-1], rel=0.1)
 
 
 def test_run_ends_early_after_the_separation():

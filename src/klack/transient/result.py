@@ -57,7 +57,8 @@ class FieldsOfBody:
         At the end of the step with the largest contact force, counted from the start of the run.
     end_displacement : array, shape (n_dof,) [m]
     end_velocity : array, shape (n_dof,) [m/s]
-        At the end; its mass-weighted projection on the modes says where the energy went.
+        At the end; its mass-weighted projection on the modes says where the energy went.  Modes
+        that the step does not resolve alternate from step to step, which single contact nodes show.
     """
 
     name: str
