@@ -70,7 +70,7 @@ Variant = Literal["consistent", "attachment", "none"]
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
-_CLASSICAL_SIZE = 8.0  # radius of the contact submodel over the half width of the contact
+_CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
 _PARTICIPATION = {"pool": 100, "upper": 8, "lower": 20}
 
 
