@@ -1,0 +1,123 @@
+"""Every shipped case runs, and one of its numbers is right.
+
+Truth: exact wave theory (two rods), Zener's theory (sphere on rod), and the full order for the reduced
+level of the valve, with the tolerances that the project promises.
+"""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from klack.case import load_case, shipped_cases
+from klack.case.schema import Case
+from klack.workflow.impact import run_impact
+from klack.workflow.study import ImpactStudy
+
+pytestmark = pytest.mark.slow
+
+
+def shipped(name: str) -> Case:
+    return load_case(shipped_cases()[name])
+
+
+def study_of(name: str, *levels: str) -> ImpactStudy:
+    case = shipped(name)
+    # transfer functions have tests of their own
+    run = case.run.model_copy(update={"transfer": None})
+    return run_impact(case.model_copy(update={"run": run}), levels=levels)
+
+
+def test_all_shipped_cases_are_tested_here():
+    assert set(shipped_cases()) == {
+        "demo-valve",
+        "demo-valve-axisymmetric",
+        "needle-from-inp",
+        "sphere-on-rod",
+        "two-rods",
+    }
+
+
+def test_axisymmetric_valve_reduced_against_full():
+    study = study_of("demo-valve-axisymmetric", "reduced", "full")
+    deviation = study.deviations["reduced"]
+    assert abs(deviation.peak_force) < 0.005
+    assert abs(deviation.contact_time) < 0.01
+    assert abs(deviation.impulse) < 0.005
+    assert abs(deviation.restitution) < 0.002
+    assert deviation.history_l2 < 0.015
+    assert deviation.third_octave_max_dB < 1.0
+    assert deviation.third_octave_up_to_Hz > 50e3
+    assert abs(study.levels["reduced"].energy_residual) < 1e-9
+    assert study.levels["full"].history.ledger.contact_dissipation < 1e-3 * (
+        study.levels["full"].history.ledger.initial
+    )
+
+
+def test_two_rods_follow_wave_theory():
+    """St Venant: plateau rho c A v / 2 until 2 L / c of the short rod; restitution 0.5."""
+    study = study_of("two-rods", "reduced", "full")
+    c, area = sqrt(210e9 / 7850), pi * 0.002**2
+    plateau, duration = 7850 * c * area * 1.0 / 2, 2 * 0.040 / c
+    for level in ("reduced", "full"):
+        result = study.levels[level]
+        time = result.history.time - result.measures.first_touch
+        middle = (time > 0.25 * duration) & (time < 0.75 * duration)
+        # the modes end at some hundred kHz and leave ripples; their mean is the plateau
+        assert np.mean(result.history.force[middle]) == pytest.approx(plateau, rel=0.01)
+        assert result.measures.impulse == pytest.approx(plateau * duration, rel=0.005)
+        assert result.measures.restitution == pytest.approx(0.5, abs=0.005)
+
+
+def test_sphere_on_rod_is_near_zener():
+    """Zener's curve for a thin rod: the 8 mm rod under a 4 mm sphere is not quite thin."""
+    study = study_of("sphere-on-rod", "reduced", "full")
+    mass, speed = 7850 * 4 / 3 * pi * 0.002**3, 0.5
+    hertz = 4 / 3 * (210e9 / (2 * (1 - 0.3**2))) * sqrt(0.002)
+    scale = (mass**2 / (hertz**2 * speed)) ** 0.2
+    impedance = 7850 * sqrt(210e9 / 7850) * pi * 0.004**2
+    expected = zener_restitution(mass / (impedance * scale))
+    for level in ("reduced", "full"):
+        assert study.levels[level].measures.restitution == pytest.approx(expected, abs=0.02)
+    deviation = study.deviations["reduced"]
+    assert abs(deviation.peak_force) < 0.005
+    assert abs(deviation.contact_time) < 0.01
+    assert abs(deviation.restitution) < 0.002
+    assert deviation.history_l2 < 0.015
+
+
+def zener_restitution(inelasticity: float) -> float:
+    """Restitution from s'' + (1 + lambda d/dtau) s^1.5 = 0, s(0) = 0, s'(0) = 1 (Zener 1941)."""
+    s, rate, step = 0.0, 1.0, 1e-4
+    while True:
+        force = max(s, 0.0) ** 1.5
+        slope = 1.5 * sqrt(max(s, 0.0)) * rate
+        acceleration = -(force + inelasticity * slope)
+        # the sphere itself is slowed by the force alone; s is the indentation
+        s, rate = s + step * rate + step**2 / 2 * acceleration, rate + step * acceleration
+        if s < 0:
+            break
+    return -rate
+
+
+def test_needle_of_another_program_runs():
+    """Momentum: J = m (v_before + v_after), and the mass is that of the drawing."""
+    study = study_of("needle-from-inp", "reduced")
+    result, needle = study.levels["reduced"], study.bodies[0]
+    # half ball and shank to z = 22, disc on top: 2/3 pi r^3 + pi r^2 20 + pi 4^2 2 mm3
+    volume = (2 / 3 * pi * 8 + pi * 4 * 20 + pi * 16 * 2) * 1e-9
+    assert needle.mass == pytest.approx(7850 * volume, rel=1e-3)
+    rebound = result.measures.restitution * study.speed
+    assert result.measures.impulse == pytest.approx(needle.mass * (study.speed + rebound), rel=1e-3)
+    assert 0.5 < result.measures.restitution < 1.0
+
+
+def test_solid_demo_valve_reduced():
+    """The demo: enough degrees of freedom, an energy ledger that closes, a plausible rebound."""
+    study = study_of("demo-valve", "reduced")
+    result = study.levels["reduced"]
+    assert sum(body.dofs for body in study.bodies) >= 60_000
+    assert abs(result.energy_residual) < 1e-9
+    assert result.measures.sub_contacts == 1
+    assert study.contact.size_ratio < 1.2
+    assert 0.8 < result.measures.restitution < 1.0
