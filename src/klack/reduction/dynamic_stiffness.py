@@ -4,12 +4,12 @@ Above the first eigenfrequency the Cholesky factorisation of the statics does no
 (symmetric indefinite, Bunch-Kaufman pivots) does it where it is installed, SuperLU elsewhere.
 """
 
-from importlib.util import find_spec
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
+
+from klack.elasticity.factorization import available_backends
 
 __all__ = ["solve_symmetric"]
 
@@ -31,7 +31,7 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
     >>> bool(np.allclose(solve_symmetric(A, np.array([[3.0], [3.0]])), 1.0))
     True
     """
-    if find_spec("pypardiso") is None:
+    if "pardiso" not in available_backends():
         return splu(A.tocsc()).solve(B)
     from pypardiso import PyPardisoSolver
 

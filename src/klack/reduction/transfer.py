@@ -18,35 +18,15 @@ and notch is finite; the axis should have at least two points per half-power ban
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError, require_positive
-from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import full_order_receptance
-from klack.reduction.ports import Port
-from klack.reduction.receptance import Receptance, reduced_receptance
-from klack.reduction.reduce import Correction, reduce_body
-from klack.reduction.selection import ByParticipation, ModeSelection
+from klack.reduction.receptance import Receptance
 
-__all__ = [
-    "TransferComparison",
-    "compare_receptances",
-    "compare_reductions",
-    "mean_level_deviation",
-    "valid_up_to",
-]
-
-_CORRECTIONS: tuple[tuple[Correction, bool], ...] = (
-    ("none", False),
-    ("consistent", True),
-    ("attachment", False),
-)
+__all__ = ["TransferComparison", "compare_receptances", "mean_level_deviation", "valid_up_to"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,74 +113,6 @@ def compare_receptances(
         valid_up_to=np.array([valid_up_to(reference.frequencies, m, tolerance) for m in means]),
         loss_factor=loss_factor,
         reference_note=reference_note,
-    )
-
-
-def compare_reductions(
-    body: ElasticBody,
-    port: Port,
-    selections: Sequence[ModeSelection],
-    frequencies: ArrayLike,
-    *,
-    loss_factor: float,
-    modes_pool: Modes,
-    flexibility: Flexibility,
-    tolerance: float = 1.0,
-    checks: int = 1,
-) -> TransferComparison:
-    """Full order against several reductions, each bare, with residual and with attachment mode.
-
-    Parameters
-    ----------
-    body : ElasticBody
-    port : Port
-    selections : sequence of ByCount, ByFrequency or ByParticipation
-    frequencies : array, shape (n,) [Hz]
-    loss_factor : float [-]
-        Structural, the same for all curves.
-    modes_pool : Modes
-        Enough of them for every selection; the full order starts with them as well.
-    flexibility : Flexibility
-    tolerance : float [dB]
-    checks : int
-        Direct solutions that verify the full order; each costs one factorisation.
-    """
-    full = full_order_receptance(
-        body,
-        [port],
-        frequencies,
-        loss_factor=loss_factor,
-        flexibility=flexibility,
-        modes=modes_pool,
-        checks=checks,
-    )
-    candidates = []
-    for selection in selections:
-        for correction, with_residual in _CORRECTIONS:
-            reduced = reduce_body(
-                body,
-                [port],
-                modes=selection,
-                correction=correction,
-                damping=LossFactor(eta=loss_factor),
-                modes_pool=modes_pool,
-                flexibility=flexibility,
-            )
-            curve = reduced_receptance(
-                reduced, frequencies, with_residual=with_residual, loss_factor=loss_factor
-            )
-            if isinstance(selection, ByParticipation):
-                label = curve.label.replace("modes", "modes by participation", 1)
-                curve = replace(curve, label=label)
-            candidates.append(curve)
-    return compare_receptances(
-        full.receptance,
-        candidates,
-        port.name,
-        body=body.name,
-        loss_factor=loss_factor,
-        reference_note=full.note,
-        tolerance=tolerance,
     )
 
 
