@@ -1,7 +1,7 @@
 """Impacts of simple bodies whose outcome is known: rods, a bar without lateral strain, a sphere."""
 
 from dataclasses import replace
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement
+from klack.mesh.swept import sweep
 from klack.transient.full_order import Scheme, simulate_full_order
 from klack.transient.result import FullOrderResult
 from klack.verification.rod_bodies import rod_body, rod_contact
@@ -24,6 +25,7 @@ __all__ = [
     "drop_blocked_bar",
     "drop_rod",
     "drop_sphere",
+    "needle_over_seat",
     "plateau",
     "sphere_over_cylinder",
     "zener_parameter",
@@ -155,6 +157,61 @@ def sphere_over_cylinder(
     a = elastic_body("sphere", upper, {"ball": material})
     b = elastic_body("target", lower, {"block": material})
     return a, b, contact_space(upper, faces[0], lower, faces[1], reach=8e-6)
+
+
+def needle_over_seat(
+    *,
+    size: float,
+    bulk: float,
+    layers: int = 0,
+    length: float = 30e-3,
+    grading: float = 0.4,
+    material: Material = STEEL,
+) -> tuple[ElasticBody, ElasticBody, ContactSpace]:
+    """Needle D4 with a spherical tip that touches a seat cone of 90 degrees in a ring.
+
+    Elements of ``size`` [m] within 60 um of the ring, growing to ``bulk`` [m] far away.  With
+    ``layers`` the same meridian meshes are swept to solids, the seat turned by 0.13 rad so that the
+    two do not match; without, both are axisymmetric.
+    """
+    tip, ring = 2e-3, 2e-3 / sqrt(2.0)
+    needle = Profile(
+        (0.0, -tip),
+        (
+            Arc((tip, 0.0), (0.0, 0.0), "tip"),
+            Line((tip, length - tip), "guide"),
+            Line((0.0, length - tip), "end"),
+            Line((0.0, -tip), "axis"),
+        ),
+    )
+    bore, outer, bottom = 0.7e-3, 6e-3, -9e-3
+    seat = Profile(
+        (bore, bottom),
+        (
+            Line((outer, bottom), "base"),
+            Line((outer, 0.8e-3 - ring), "side"),
+            Line((ring + 0.8e-3, 0.8e-3 - ring), "top"),
+            Line((bore, bore - 2.0 * ring), "cone"),
+            Line((bore, bottom), "bore"),
+        ),
+    )
+    fine = (Refinement(position=(ring, -ring), size=size, radius=60e-6),)
+    upper = mesh_meridian(
+        {"needle": needle}, MeshSizing(size=bulk, refinements=fine, grading=grading)
+    )
+    lower = mesh_meridian(
+        {"seat": seat}, MeshSizing(size=1.6 * bulk, refinements=fine, grading=grading)
+    )
+    if layers:
+        upper, lower = sweep(upper, layers), sweep(lower, layers, start_angle=0.13)
+    faces = upper.surface("tip"), lower.surface("cone")
+    lift = touching_shift(upper, faces[0], lower, faces[1])
+    upper = upper.moved(lift * np.eye(upper.dimension)[-1])
+    return (
+        elastic_body("needle", upper, {"needle": material}),
+        elastic_body("seat", lower, {"seat": material}, fixed_nodes=lower.surface("base").nodes),
+        contact_space(upper, faces[0], lower, faces[1], reach=6e-6),
+    )
 
 
 def drop_sphere(
