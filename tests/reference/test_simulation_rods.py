@@ -49,8 +49,8 @@ def test_truncated_rod_on_a_spring(row):
     m = measure_impact(history)
 
     # the table has four digits, its own step is 2e-5 at most
-    assert m.peak_force == pytest.approx(peak, rel=2e-3)
-    assert abs(history.velocity_a[-1]) == pytest.approx(restitution, abs=5e-4)
+    assert m.peak_force == pytest.approx(peak, rel=3e-4)
+    assert abs(history.velocity_a[-1]) == pytest.approx(restitution, abs=1e-4)
     # 40 and 80 modes on the stiff spring fade out and chatter: the end depends on the threshold
     fading = kappa == 100 and modes >= 5
     assert m.contact_time == pytest.approx(separation, abs=3e-2 if fading else 2e-3)
@@ -67,10 +67,10 @@ def test_needle_in_one_dimension(row):
     history = rod_on_wall(kappa, 300, "static_spring", step=5e-4, duration=14.0)
     m = measure_impact(history)
 
-    # 300 modes with static correction on a wave front that a spring smooths
-    assert m.peak_force == pytest.approx(peak, rel=1e-3)
-    assert m.restitution == pytest.approx(restitution, abs=2e-4)
-    assert m.contact_time == pytest.approx(separation, rel=3e-3)
+    # 300 modes with static correction on a wave front that a spring smooths; table of six digits
+    assert m.peak_force == pytest.approx(peak, rel=2e-4)
+    assert m.restitution == pytest.approx(restitution, abs=2e-6)
+    assert m.contact_time == pytest.approx(separation, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -103,10 +103,11 @@ def test_sphere_on_a_long_rod(row):
     system = ReducedSystem(bodies=(rigid_mass_body("sphere", 1.0), rod), contacts=(pair,))
     m = measure_impact(simulate_impact(system, speed=1.0, step=1e-3, duration=5.5))
 
-    assert m.restitution == pytest.approx(restitution, abs=2e-3)
-    assert m.peak_force == pytest.approx(peak, rel=2e-3)
-    assert m.contact_time == pytest.approx(duration, rel=5e-3)
-    assert m.vibration_share == pytest.approx(1.0 - restitution**2, abs=4e-3)
+    # second order: step over contact 3e-4, squared
+    assert m.restitution == pytest.approx(restitution, abs=1e-6)
+    assert m.peak_force == pytest.approx(peak, rel=2e-6)
+    assert m.contact_time == pytest.approx(duration, rel=2e-4)  # touch between two records
+    assert m.vibration_share == pytest.approx(1.0 - restitution**2, abs=2e-6)
 
 
 def test_table_was_read():

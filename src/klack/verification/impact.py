@@ -1,0 +1,235 @@
+"""Reduced impacts against closed and tabulated solutions."""
+
+from math import gamma, pi, sqrt
+
+import numpy as np
+
+from klack.contact.laws import HertzLaw, HuntCrossley, gonthier_coefficient
+from klack.contact.restitution import measure_impact
+from klack.verification.check import Check, compare
+from klack.verification.one_dimension import (
+    BAR_SPEED,
+    DENSITY,
+    NEEDLE_AREA,
+    mass_on_law,
+    needle_on_spring,
+    sphere_on_rod,
+    st_venant_rods,
+)
+
+__all__ = ["checks"]
+
+GROUP = "impact"
+
+# kappa, restitution, peak force over Z v, first separation [L/c]
+NEEDLE_ON_SPRING = (
+    (0.5, 0.999382, 0.663972, 4.80330),
+    (1.0, 0.974081, 0.869142, 3.63660),
+    (3.0, 0.982917, 0.997523, 2.55920),
+    (11.37, 0.995452, 1.000000, 2.14760),
+)
+NEEDLE_SOURCE = (
+    "exact delay relation v_end = v0 - (F(t) + 2 sum F(t - 2jL/c))/Z, Runge-Kutta, step L/(10000 c)"
+)
+# kappa, elastic modes, static spring, peak force over Z v, restitution
+TRUNCATED = (
+    (1.0, 5, False, 0.8778, 0.97318),
+    (11.37, 10, False, 1.0489, 0.99721),
+    (11.37, 10, True, 1.0292, 0.99586),
+    (11.37, 20, True, 1.0075, 0.99548),
+)
+TRUNCATED_SOURCE = "rod with N exact modes, velocity Verlet with steps below 2e-5 L/c"
+# lambda, restitution, peak force [m v/T0]
+ZENER = ((0.1, 0.8433394, 1.0355460), (0.5, 0.4368953, 0.7502314), (1.0, 0.1841229, 0.5561609))
+ZENER_SOURCE = "Zener 1941, s'' + (1 + lambda d/dt) s^1.5 = 0, integrated with tolerance 1e-11"
+
+
+def checks() -> list[Check]:
+    """Hertz, Gonthier, St Venant, needle on a spring, modal convergence, sphere on a rod."""
+    return [
+        *_hertz(),
+        *_gonthier(),
+        *_st_venant(),
+        *_needle_on_spring(),
+        *_modal_convergence(),
+        *_zener(),
+    ]
+
+
+def _hertz() -> list[Check]:
+    mass, speed, K = 1e-3, 0.5, 4.0 / 3.0 * 115.4e9 * sqrt(2e-3)
+    depth = (5.0 * mass * speed**2 / (4.0 * K)) ** 0.4
+    duration = 4.0 * sqrt(pi) / 5.0 * gamma(0.4) / gamma(0.9) * depth / speed
+    m = measure_impact(
+        mass_on_law(mass, HertzLaw(K), speed=speed, step=2e-9, duration=1.2 * duration)
+    )
+    where = "Johnson 1985, section 11.4, sphere of 1 g and R = 2 mm on a plane at 0.5 m/s"
+    return [
+        compare(
+            GROUP,
+            "Hertz contact time [s]",
+            expected=duration,
+            computed=m.contact_time,
+            tolerance=1e-6,
+            source=where,
+        ),
+        compare(
+            GROUP,
+            "Hertz peak force [N]",
+            expected=K * depth**1.5,
+            computed=m.peak_force,
+            tolerance=1e-6,
+            source=where,
+        ),
+        compare(
+            GROUP,
+            "Hertz restitution [-]",
+            expected=1.0,
+            computed=m.restitution,
+            tolerance=1e-10,
+            source="elastic law",
+        ),
+    ]
+
+
+def _gonthier() -> list[Check]:
+    out = []
+    for e in (0.3, 0.9):
+        law = HuntCrossley(HertzLaw(7e9), gonthier_coefficient(e))
+        m = measure_impact(mass_on_law(1e-3, law, speed=0.5, step=10e-9, duration=1e-3))
+        out.append(
+            compare(
+                GROUP,
+                f"restitution {e:g} prescribed for rigid bodies [-]",
+                expected=e,
+                computed=m.restitution,
+                tolerance=1e-6,
+                source="Gonthier et al. 2004, eq. 29",
+            )
+        )
+    return out
+
+
+def _st_venant() -> list[Check]:
+    Z = DENSITY * BAR_SPEED * NEEDLE_AREA
+    source = "St Venant; Goldsmith 1960, section 3.2: rods of equal section, lengths 1:2"
+    soft, hard = st_venant_rods(1e9, 320, step=10e-9), st_venant_rods(1e12, 320, step=5e-9)
+    m = measure_impact(hard)
+    inside = (soft.time > 6e-6) & (soft.time < 14e-6)
+    coarse = measure_impact(st_venant_rods(1e9, 20, step=10e-9))
+    return [
+        compare(
+            GROUP,
+            "force plateau of two rods, Z v/2 [N]",
+            expected=0.5 * Z,
+            computed=float(np.mean(soft.force[inside])),
+            tolerance=1e-4,
+            source=source,
+        ),
+        compare(
+            GROUP,
+            "restitution of two rods, L1/L2 [-]",
+            expected=0.5,
+            computed=m.restitution,
+            tolerance=2e-3,
+            source=source,
+        ),
+        compare(
+            GROUP,
+            "contact time of two rods, 2 L1/c [s]",
+            expected=0.08 / BAR_SPEED,
+            computed=m.contact_time,
+            tolerance=2e-3,
+            source=source,
+        ),
+        compare(
+            GROUP,
+            "restitution of two rods joined by 1e9 N/m, 20 + 40 modes [-]",
+            expected=measure_impact(soft).restitution,
+            computed=coarse.restitution,
+            tolerance=2e-3,
+            source="the same with 320 + 640 modes",
+            absolute=True,
+        ),
+    ]
+
+
+def _needle_on_spring() -> list[Check]:
+    out = []
+    for kappa, restitution, peak, separation in NEEDLE_ON_SPRING:
+        m = measure_impact(needle_on_spring(kappa, 200, static_spring=True))
+        for what, expected, computed, tolerance, absolute in (
+            ("restitution [-]", restitution, m.restitution, 2e-6, True),
+            ("peak force [Z v]", peak, m.peak_force, 2e-4, False),
+            ("contact time [L/c]", separation, m.contact_time, 5e-5, False),
+        ):
+            out.append(
+                compare(
+                    GROUP,
+                    f"needle on a spring, kL/EA = {kappa:g}: {what}",
+                    expected=expected,
+                    computed=computed,
+                    tolerance=tolerance,
+                    source=NEEDLE_SOURCE,
+                    absolute=absolute,
+                )
+            )
+    return out
+
+
+def _modal_convergence() -> list[Check]:
+    out = []
+    for kappa, modes, static_spring, peak, restitution in TRUNCATED:
+        history = needle_on_spring(kappa, modes, static_spring=static_spring, step=1e-3)
+        kind = "with static spring" if static_spring else "truncated"
+        name = f"needle on a spring, kL/EA = {kappa:g}, {modes} modes {kind}"
+        out.append(
+            compare(
+                GROUP,
+                f"{name}: peak force [Z v]",
+                expected=peak,
+                computed=measure_impact(history).peak_force,
+                tolerance=1e-4,
+                source=TRUNCATED_SOURCE,
+            )
+        )
+        out.append(
+            compare(
+                GROUP,
+                f"{name}: restitution [-]",
+                expected=restitution,
+                computed=abs(float(history.velocity_a[-1])),
+                tolerance=1e-5,
+                source=TRUNCATED_SOURCE,
+                absolute=True,
+            )
+        )
+    return out
+
+
+def _zener() -> list[Check]:
+    out = []
+    for inelasticity, restitution, peak in ZENER:
+        m = measure_impact(sphere_on_rod(inelasticity))
+        out.append(
+            compare(
+                GROUP,
+                f"sphere on a long rod, lambda = {inelasticity:g}: restitution [-]",
+                expected=restitution,
+                computed=m.restitution,
+                tolerance=2e-6,
+                source=ZENER_SOURCE,
+                absolute=True,
+            )
+        )
+        out.append(
+            compare(
+                GROUP,
+                f"sphere on a long rod, lambda = {inelasticity:g}: peak force [m v/T0]",
+                expected=peak,
+                computed=m.peak_force,
+                tolerance=2e-6,
+                source=ZENER_SOURCE,
+            )
+        )
+    return out

@@ -1,0 +1,153 @@
+"""Spectra of pulses and one-third-octave bands."""
+
+from math import cos, pi
+
+import numpy as np
+
+from klack.acoustics.spectrum import energy_spectral_density, impulse_spectrum
+from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
+from klack.contact.laws import HertzLaw
+from klack.signals import Spectrum, TimeSeries
+from klack.verification.check import Check, compare
+from klack.verification.one_dimension import mass_on_law
+
+__all__ = ["checks"]
+
+GROUP = "spectra"
+LENGTH, PEAK, STEP = 15e-6, 250.0, 10e-9  # [s], [N], [s]
+# band number, lower and upper edge [Hz]
+EDGES = ((-17, 17.7828, 22.3872), (0, 891.251, 1122.02), (23, 177828.0, 223872.0))
+# f T, |F|/(F0 T) of a Hertz pulse, integrated numerically
+HERTZ = ((0.0, 0.543612), (0.5, 0.449625), (1.0, 0.240011), (2.5, 0.010565))
+
+
+def checks() -> list[Check]:
+    """Half sine, Hertz pulse, Parseval, band edges, band energies."""
+    return [*_half_sine(), *_hertz(), *_parseval(), *_bands()]
+
+
+def _pulse() -> TimeSeries:
+    """Half sine of 250 N and 15 us as means over steps of 10 ns."""
+    edges = STEP * np.arange(round(25e-6 / STEP) + 1)
+    x = np.clip((edges - 5e-6) / LENGTH, 0.0, 1.0)
+    values = np.diff(PEAK * LENGTH / pi * (1.0 - np.cos(pi * x))) / STEP
+    return TimeSeries(step=STEP, values=values, unit="N", start=0.5 * STEP, name="half sine")
+
+
+def _at(spectrum: Spectrum, frequency: float) -> float:
+    return float(np.abs(np.interp(frequency, spectrum.frequency, spectrum.values)))
+
+
+def _half_sine() -> list[Check]:
+    spectrum = impulse_spectrum(_pulse(), resolution=50.0)
+    out = []
+    for x in (0.0, 0.25, 1.0, 2.0, 4.0):
+        exact = 2.0 / pi * abs(cos(pi * x)) / abs(1.0 - 4.0 * x * x)
+        out.append(
+            compare(
+                GROUP,
+                f"half sine, |F| at f T = {x:g} [F0 T]",
+                expected=exact,
+                computed=_at(spectrum, x / LENGTH) / (PEAK * LENGTH),
+                tolerance=1e-5,
+                source="(2/pi) |cos(pi f T)| / |1 - 4 (f T)^2|",
+            )
+        )
+    out.append(
+        compare(
+            GROUP,
+            "half sine, |F| at its first zero f T = 1.5 [F0 T]",
+            expected=0.0,
+            computed=_at(spectrum, 1.5 / LENGTH) / (PEAK * LENGTH),
+            tolerance=1e-5,
+            source="zeros at f T = 1.5, 2.5, ...",
+        )
+    )
+    return out
+
+
+def _hertz() -> list[Check]:
+    mass, K, speed = 1e-3, 7e9, 0.5
+    depth = (5.0 * mass * speed**2 / (4.0 * K)) ** 0.4
+    duration = 2.9432751844 * depth / speed
+    history = mass_on_law(mass, HertzLaw(K), speed=speed, step=10e-9, duration=1.2 * duration)
+    series = TimeSeries(step=history.step, values=history.force, unit="N", name="Hertz impact")
+    spectrum = impulse_spectrum(series, resolution=50.0)
+    return [
+        compare(
+            GROUP,
+            f"simulated Hertz impact, |F| at f T = {x:g} [F0 T]",
+            expected=expected,
+            computed=_at(spectrum, x / duration) / (K * depth**1.5 * duration),
+            tolerance=2e-5,
+            source="Fourier integral of the Hertz pulse, numerically",
+            absolute=True,
+        )
+        for x, expected in HERTZ
+    ]
+
+
+def _parseval() -> list[Check]:
+    series = _pulse()
+    spectrum = impulse_spectrum(series, resolution=50.0, interval_means=False)
+    density = energy_spectral_density(spectrum)
+    return [
+        compare(
+            GROUP,
+            "integral of the energy density against that of F^2 [N^2 s]",
+            expected=float(np.sum(series.values**2) * series.step),
+            computed=float(np.trapezoid(density.values, density.frequency)),
+            tolerance=1e-6,
+            source="Parseval",
+        ),
+        compare(
+            GROUP,
+            "spectrum at 0 Hz against the impulse [N s]",
+            expected=2.0 / pi * PEAK * LENGTH,
+            computed=float(np.abs(spectrum.values[0])),
+            tolerance=1e-12,
+            source="F(0) = integral of F dt",
+        ),
+    ]
+
+
+def _bands() -> list[Check]:
+    out = []
+    for number, low, high in EDGES:
+        edges = band_edges(np.array([number]))
+        for what, expected, computed in (("lower", low, edges[0]), ("upper", high, edges[1])):
+            out.append(
+                compare(
+                    GROUP,
+                    f"{what} edge of band {number} [Hz]",
+                    expected=expected,
+                    computed=float(computed[0]),
+                    tolerance=5e-6,
+                    source="IEC 61260-1:2014, base ten, six digits",
+                )
+            )
+    out.append(
+        compare(
+            GROUP,
+            "middle frequency of band 23 [Hz]",
+            expected=10.0**5.3,
+            computed=float(middle_frequencies(np.array([23]))[0]),
+            tolerance=1e-12,
+            source="1000 Hz * 10^(0.1 k)",
+        )
+    )
+    f = np.arange(0.0, 30e3, 37.0)
+    line = Spectrum(frequency=f, values=2.0 + 1e-3 * f, unit="(N s)^2")
+    band = band_energies(line, low=800.0, high=1200.0)
+    exact = 2.0 * (band.high - band.low) + 0.5e-3 * (band.high**2 - band.low**2)
+    out.append(
+        compare(
+            GROUP,
+            "energy of a rising density in the band at 1 kHz [N^2 s]",
+            expected=float(exact[0]),
+            computed=float(band.energy[0]),
+            tolerance=1e-12,
+            source="integral with partial steps at both edges",
+        )
+    )
+    return out
