@@ -7,6 +7,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from types import ModuleType, SimpleNamespace
 
 import pytest
@@ -373,7 +374,7 @@ def test_browser_needs_a_screen(monkeypatch):
 
 def test_reader_of_a_pipe_may_leave_early():
     # klack schema | head -1: no traceback, and no error code for the shell to stumble over
-    command = f"{sys.executable} -m klack schema; echo code $? >&2"
+    command = f"{quote(sys.executable)} -m klack schema; echo code $? >&2"
     done = subprocess.run(
         ["bash", "-c", f"({command}) | head -1"],
         check=True,
