@@ -90,7 +90,7 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
     """Local law that carries what the retained modes miss.
 
     A contact narrower than one element is that of single hats, not of the bodies.  The ladder
-    below the first state whose half width exceeds the element size is therefore replaced by the
+    below the first state whose full width exceeds the element size is therefore replaced by the
     power law that continues the curve there with equal value and slope.
 
     Parameters
@@ -148,7 +148,7 @@ def _smooth_start(
     """Ladder with its unresolved beginning replaced by a power law, and where it ends."""
     force, approach = static.force, static.approach
     size = float(np.average(static.space.size, weights=static.pressures[-1]))
-    resolved = static.half_width >= size
+    resolved = 2.0 * static.half_width >= size
     first = int(np.argmax(resolved)) if np.any(resolved) else len(force) - 1
     if first == 0 or len(force) < 4:
         return force, approach, 0, float("nan")
