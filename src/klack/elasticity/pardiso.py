@@ -1,4 +1,4 @@
-"""PARDISO of Intel MKL, called directly through the library that pypardiso finds.
+"""PARDISO of Intel MKL, called directly in the library of the installed mkl package.
 
 pypardiso's own ``solve`` compares (or hashes) the matrix and copies its indices at every call;
 a transient run solves thousands of times, so the library is called here without that.
@@ -11,6 +11,7 @@ statics.
 import ctypes
 import weakref
 from functools import cache
+from importlib.metadata import PackageNotFoundError, PackagePath, files
 from types import TracebackType
 from typing import Any, Self
 
@@ -23,7 +24,7 @@ from klack.errors import ConvergenceError
 
 __all__ = ["PardisoFactorization"]
 
-_SPD = 2
+_SPD, _INDEFINITE = 2, -2
 _ANALYSE_AND_FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 12, 33, 331, 333, -1
 _ERRORS = {
     -2: "not enough memory",
@@ -38,12 +39,20 @@ class PardisoFactorization:
 
     backend = "pardiso"
 
-    def __init__(self, A: Any, threads: int | None = None, precision: Precision = "double") -> None:
+    def __init__(
+        self,
+        A: Any,
+        threads: int | None = None,
+        precision: Precision = "double",
+        *,
+        definite: bool = True,
+    ) -> None:
         self._mkl = _library()
+        self._kind = _SPD if definite else _INDEFINITE
         self._threads = threads
         self._type = np.float32 if precision == "single" else np.float64
         self._handle = np.zeros(64, dtype=np.int64)
-        self._settings = _settings(precision)
+        self._settings = _settings(precision, definite)
         upper = triu(A, format="csr")
         upper.sort_indices()
         self._values = np.ascontiguousarray(upper.data, dtype=self._type)
@@ -51,7 +60,7 @@ class PardisoFactorization:
         self._start = upper.indptr.astype(np.int32, copy=False)
         self.size = A.shape[0]
         self._release = weakref.finalize(
-            self, _free, self._mkl, self._handle, self._settings, self.size
+            self, _free, self._mkl, self._handle, self._settings, self._kind, self.size
         )
         empty = np.zeros(self.size, dtype=self._type)
         error = self._call(_ANALYSE_AND_FACTOR, empty, empty, 1)
@@ -109,6 +118,7 @@ class PardisoFactorization:
             return _pardiso(
                 self._mkl,
                 self._handle,
+                self._kind,
                 phase,
                 self.size,
                 (self._values, self._start, self._indices),
@@ -120,18 +130,32 @@ class PardisoFactorization:
                 self._mkl.MKL_Set_Num_Threads_Local(before)
 
 
-@cache  # pypardiso searches the whole environment for the file, half a second each time
+@cache  # the search of pypardiso takes half a second
 def _library() -> ctypes.CDLL:
+    for file in _files_of_mkl():
+        if "mkl_rt" in file.name:
+            return ctypes.CDLL(str(file.locate()))
     from pypardiso import PyPardisoSolver
 
     return PyPardisoSolver().libmkl
 
 
-def _settings(precision: Precision) -> NDArray[np.int32]:
+def _files_of_mkl() -> list[PackagePath]:
+    """Files of the mkl package, wherever on the path it lies; none if it came by other ways."""
+    try:
+        return files("mkl") or []
+    except PackageNotFoundError:
+        return []
+
+
+def _settings(precision: Precision, definite: bool) -> NDArray[np.int32]:
     """Parameters iparm of PARDISO; the comments count from 1 as its manual does."""
     iparm = np.zeros(64, dtype=np.int32)
     iparm[0] = 1  # iparm(1): take the values below instead of the defaults
     iparm[1] = 3  # iparm(2): nested dissection, parallel version
+    if not definite:
+        iparm[9] = 8  # iparm(10): perturb pivots below 1e-8
+        iparm[10] = iparm[12] = 1  # iparm(11), iparm(13): scaling and matching
     iparm[17] = -1  # iparm(18): report the entries of the factor
     iparm[23] = 1  # iparm(24): two-level factorisation, 10 % less memory here
     iparm[27] = int(precision == "single")  # iparm(28): single-precision input and factor
@@ -142,6 +166,7 @@ def _settings(precision: Precision) -> NDArray[np.int32]:
 def _pardiso(
     mkl: ctypes.CDLL,
     handle: NDArray[np.int64],
+    kind: int,
     phase: int,
     size: int,
     matrix: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
@@ -158,7 +183,7 @@ def _pardiso(
     error = ctypes.c_int32(0)
     permutation = np.zeros(1, dtype=np.int32)
     mkl["pardiso"](  # a fresh function object, without the argument types of pypardiso
-        *(address(handle), integer(1), integer(1), integer(_SPD), integer(phase), integer(size)),
+        *(address(handle), integer(1), integer(1), integer(kind), integer(phase), integer(size)),
         *(address(array) for array in matrix),
         *(address(permutation), integer(columns), address(settings), integer(0)),
         *(address(B), address(X), ctypes.byref(error)),
@@ -167,10 +192,14 @@ def _pardiso(
 
 
 def _free(
-    mkl: ctypes.CDLL, handle: NDArray[np.int64], settings: NDArray[np.int32], size: int
+    mkl: ctypes.CDLL,
+    handle: NDArray[np.int64],
+    settings: NDArray[np.int32],
+    kind: int,
+    size: int,
 ) -> None:
     none, zero = np.zeros(1), np.zeros(1, dtype=np.int32)
-    _pardiso(mkl, handle, _RELEASE, size, (none, zero, zero), settings, (none, none, 1))
+    _pardiso(mkl, handle, kind, _RELEASE, size, (none, zero, zero), settings, (none, none, 1))
 
 
 def _failure(error: int) -> Exception:

@@ -6,14 +6,12 @@ Above the first eigenfrequency the Cholesky factorisation of the statics does no
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, csr_matrix, triu
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 from klack.elasticity.factorization import available_backends
 
 __all__ = ["solve_symmetric"]
-
-_SYMMETRIC_INDEFINITE = -2
 
 
 def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -33,10 +31,7 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
     """
     if "pardiso" not in available_backends():
         return splu(A.tocsc()).solve(B)
-    from pypardiso import PyPardisoSolver
+    from klack.elasticity.pardiso import PardisoFactorization
 
-    solver = PyPardisoSolver(mtype=_SYMMETRIC_INDEFINITE)
-    try:
-        return solver.solve(csr_matrix(triu(A, format="csr")), np.asfortranarray(B))
-    finally:
-        solver.free_memory(everything=True)
+    with PardisoFactorization(A, definite=False) as factor:
+        return factor.solve(B)
