@@ -330,5 +330,8 @@ def test_names_that_do_not_exist_are_refused():
     good = needle_on_wall(1e-3, LinearLaw(1e9))
     with pytest.raises(InputError, match="supported body"):
         simulate(good, velocities={"seat": 1.0}, step=1e-8, duration=1e-6)
+    walls = system(fixed_body("needle"), fixed_body("seat"), LinearLaw(1e9))
+    with pytest.raises(InputError, match="without a single mode"):
+        simulate(walls, velocities={}, step=1e-8, duration=1e-6)
     with pytest.raises(InputError, match="speed"):
         simulate_impact(good, speed=-1.0, duration=1e-6)

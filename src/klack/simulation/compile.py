@@ -69,7 +69,6 @@ class FlatSystem:
     G: NDArray[np.float64]
     push_index: NDArray[np.int64]
     push: NDArray[np.float64]
-    push_gap: NDArray[np.float64]
     law_kind: NDArray[np.int64]
     law_data: NDArray[np.float64]
     law_start: NDArray[np.int64]
@@ -138,7 +137,6 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
         G=(rows * B[0]) @ rows.T,
         push_index=push_index,
         push=B[:, push_index] * force[push_index],
-        push_gap=rows @ (B[0] * force),
         law_kind=np.array([law.kind for law in laws]),
         law_data=np.concatenate([law.parameters for law in laws]),
         law_start=np.concatenate(([0], np.cumsum(sizes)[:-1])).astype(np.int64),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from klack.contact.laws import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
 
-__all__ = ["law_potential", "mean_force", "solve_step"]
+__all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 
 Vector = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def mean_force(
 
 
 @njit(cache=True)
-def _solve_linear(k: float, G: float, d0: float, df: float) -> float:
+def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     """Closed form of the elastic step for ``F = k d``: both closed, release, onset."""
     a = 1.0 + 0.5 * G * k
     if d0 >= 0.0:
@@ -181,7 +181,7 @@ def solve_step(
     if d0 <= 0.0 and df <= 0.0:
         return 0.0, hint, 0.0
     if kind == _LINEAR and chi_over_h == 0.0:
-        return _solve_linear(p[start], G, d0, df), hint, 0.0
+        return solve_linear(p[start], G, d0, df), hint, 0.0
     low, high = -np.inf, df
     d1 = df - G * guess
     force = 0.0

@@ -12,6 +12,7 @@ from klack.errors import ConvergenceError, InputError, require_positive
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
 from klack.simulation.contact_step import law_potential
 from klack.simulation.kernel import STATUS_FINE, run_steps
+from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
 
 __all__ = ["SystemRecord", "simulate", "simulate_impact"]
@@ -123,6 +124,13 @@ def simulate(
                 hint="only bodies without support can move as a whole.",
             )
     flat = flatten(system, velocities, step)
+    if flat.v.size == 0:
+        raise InputError(
+            "simulate: system",
+            got="bodies without a single mode",
+            expected="at least one body that can move",
+            hint="a wall needs a needle that hits it.",
+        )
     records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
     contacts, bodies = len(system.contacts), len(system.bodies)
     q, v = np.zeros(flat.v.size), flat.v.copy()
@@ -130,7 +138,8 @@ def simulate(
     out_q, out_v = np.zeros((records + 1, 2 * contacts)), np.zeros((records + 1, bodies))
     out_v[0] = flat.watch_v @ v
     books = np.zeros(3 + 2 * contacts)
-    status = run_steps(
+    run = run_one_contact if contacts == 1 else run_steps
+    status = run(
         int(steps_per_record),
         q,
         v,
@@ -142,7 +151,6 @@ def simulate(
         flat.G,
         flat.push_index,
         flat.push,
-        flat.push_gap,
         flat.law_kind,
         flat.law_data,
         flat.law_start,

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from klack.simulation.contact_step import solve_step
 
-__all__ = ["STATUS_CONTACTS", "STATUS_FINE", "run_steps"]
+__all__ = [
+    "FAST",
+    "SEPARATED",
+    "STATUS_CONTACTS",
+    "STATUS_FINE",
+    "push_on",
+    "run_steps",
+    "watch_all",
+]
 
 Vector = NDArray[np.float64]  # one axis
 Matrix = NDArray[np.float64]  # two axes
@@ -19,11 +27,11 @@ Matrix = NDArray[np.float64]  # two axes
 STATUS_FINE, STATUS_CONTACTS = 0, 1
 _SWEEP_LIMIT = 500
 _SWEEP_ACCEPTED = 1e-17  # [m]
-_SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
-_FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
+SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
+FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _free(q: Vector, v: Vector, A: Matrix, row: Vector) -> float:
     """Free motion over a step, in place; returns ``row . q``."""
     y = 0.0
@@ -35,7 +43,7 @@ def _free(q: Vector, v: Vector, A: Matrix, row: Vector) -> float:
     return y
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _forced(q: Vector, v: Vector, A: Matrix, row: Vector, P: Matrix, F: float) -> float:
     """Free motion after the modal force ``F P`` of the step before; returns ``row . q``."""
     y = 0.0
@@ -47,7 +55,7 @@ def _forced(q: Vector, v: Vector, A: Matrix, row: Vector, P: Matrix, F: float) -
     return y
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _dot(a: Vector, b: Vector) -> float:
     y = 0.0
     for i in range(a.size):
@@ -55,22 +63,51 @@ def _dot(a: Vector, b: Vector) -> float:
     return y
 
 
-@njit(cache=True, fastmath=_FAST)
-def _watch(row: Vector, first: int, last: int, state: Vector) -> float:
+@njit(cache=True, fastmath=FAST)
+def _watch(rows: Matrix, k: int, first: int, last: int, state: Vector) -> float:
     y = 0.0
     for i in range(first, last):
-        y += row[i] * state[i]
+        y += rows[k, i] * state[i]
     return y
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
+def push_on(
+    index: NDArray[np.int64], push: Matrix, A: Matrix, pushed_q: Vector, pushed_v: Vector
+) -> None:
+    """One step of the motion that constant forces alone give to rigid modes."""
+    for k in range(index.size):
+        i, pq, pv = index[k], pushed_q[k], pushed_v[k]
+        pushed_q[k] = A[0, i] * pq + A[1, i] * pv + push[0, k]
+        pushed_v[k] = A[2, i] * pq + A[3, i] * pv + push[1, k]
+
+
+@njit(cache=True)
+def watch_all(
+    rows: Matrix,
+    ranges: NDArray[np.int64],
+    force_rows: Matrix,
+    state: Vector,
+    F: Vector,
+    out: Matrix,
+    place: int,
+) -> None:
+    """Record displacements or velocities; the forces ``F`` of the last step are still pending."""
+    for k in range(rows.shape[0]):
+        y = _watch(rows, k, ranges[k, 0], ranges[k, 1], state)
+        for c in range(F.size):
+            y += force_rows[k, c] * F[c]
+        out[place, k] = y
+
+
+@njit(cache=True, fastmath=FAST)
 def _copy(q: Vector, v: Vector, q0: Vector, v0: Vector) -> None:
     for i in range(q.size):
         q0[i] = q[i]
         v0[i] = v[i]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
     for i in range(f.size):
         f[i] = rows[0, i] * F[0]
@@ -79,7 +116,7 @@ def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
             f[i] += rows[c, i] * F[c]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> float:
     """Energy of the damped modes after the pending modal force ``f``."""
     total = 0.0
@@ -90,7 +127,7 @@ def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> flo
     return total
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _damping_loss(q: Vector, v: Vector, B: Matrix, f_before: Vector, f: Vector, Q: Matrix) -> float:
     """Loss of a step that started after the pending ``f_before`` and had the modal force ``f``."""
     total = 0.0
@@ -115,7 +152,6 @@ def run_steps(
     G: Matrix,
     push_index: NDArray[np.int64],
     push: Matrix,
-    push_gap: Vector,
     law_kind: NDArray[np.int64],
     law_data: Vector,
     law_start: NDArray[np.int64],
@@ -152,8 +188,10 @@ def run_steps(
     gap_offset : array (c,)
     G : array (c, c)
         ``rows B1 rows^T``: gap at the end of a step from unit forces during the step.
-    push_index, push, push_gap : int array (p,), array (2, p), array (c,)
-        Modes with a constant force, what it adds to ``q, v`` in a step, and to the free gaps.
+    push_index, push : int array (p,), array (2, p)
+        Rigid modes with a constant force, and what it adds to their ``q, v`` in a step.  Within a
+        record their motion under it runs beside that of all modes (superposition), because
+        single numbers written into ``q`` stall the vector loads; at its end it is added.
     law_kind, law_data, law_start, alpha, series : arrays
         One law per contact as flat numbers; dissipation factor; compliance in series [m/N].
     damped : bool
@@ -195,14 +233,9 @@ def run_steps(
     approaching = np.ones(contacts, np.bool_)
     row0 = rows[0]
     pushes = push_index.size
-    one = contacts == 1
-    if one:
-        for i in range(modes):
-            pending_rows[0, i] = P[0, i] * row0[i]
-            pending_rows[1, i] = P[1, i] * row0[i]
+    pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
     for c in range(contacts):
         gap[c] = gap_offset[c] + _dot(rows[c], q)
-    offset0 = gap_offset[0] + push_gap[0]
     pending = False
     in_flight = True
     flight_energy = _damped_energy(q, v, B, f, damped_weight) if damped else 0.0
@@ -216,20 +249,17 @@ def run_steps(
                 _copy(q, v, q0, v0)
             if not pending:
                 y = _free(q, v, A, row0)
-            elif one:
-                y = _forced(q, v, A, row0, pending_rows, F[0])
             else:
                 for i in range(modes):
                     pending_rows[0, i] = P[0, i] * f[i]
                     pending_rows[1, i] = P[1, i] * f[i]
                 y = _forced(q, v, A, row0, pending_rows, 1.0)
-            for k in range(pushes):
-                q[push_index[k]] += push[0, k]
-                v[push_index[k]] += push[1, k]
-            free[0] = offset0 + y
-            near = free[0] < e[0] or gap[0] + e[0] < 0.0
-            for c in range(1, contacts):
-                free[c] = gap_offset[c] + _dot(rows[c], q)
+            push_on(push_index, push, A, pushed_q, pushed_v)
+            near = False
+            for c in range(contacts):
+                free[c] = gap_offset[c] + (y if c == 0 else _dot(rows[c], q))
+                for k in range(pushes):
+                    free[c] += rows[c, push_index[k]] * pushed_q[k]
                 near = near or free[c] < e[c] or gap[c] + e[c] < 0.0
 
             closed = False
@@ -265,7 +295,7 @@ def run_steps(
                         lost += loss
                         F[c] = force
                         closed = closed or force > 0.0
-                    if one or change < _SWEEP_ACCEPTED:
+                    if contacts == 1 or change < _SWEEP_ACCEPTED:
                         break
                     if sweep == _SWEEP_LIMIT - 1:
                         return STATUS_CONTACTS
@@ -291,7 +321,7 @@ def run_steps(
                     flight_energy = _damped_energy(q0, v0, B, f, damped_weight)
                     in_flight = True
                     f[:] = 0.0
-            elif closed and not one:
+            elif closed:
                 _modal_force(rows, F, f)
             pending = closed
 
@@ -310,7 +340,7 @@ def run_steps(
                     elif e[c] != 0.0:
                         release_loss += 0.5 * e[c] * e[c] / series[c]
                         e[c] = 0.0
-                if after > _SEPARATED:
+                if after > SEPARATED:
                     approaching[c] = True
                     chi[c] = 0.0
 
@@ -318,18 +348,12 @@ def run_steps(
             out_force[record, c] = sum_force[c] / steps_per_record
             out_peak[record, c] = peak[c]
             out_gap[record, c] = sum_gap[c] / steps_per_record
-        for k in range(watch_q.shape[0]):
-            y = _watch(watch_q[k], watch_q_range[k, 0], watch_q_range[k, 1], q)
-            if pending:
-                for c in range(contacts):
-                    y += watch_q_force[k, c] * F[c]
-            out_q[record + 1, k] = y
-        for k in range(watch_v.shape[0]):
-            y = _watch(watch_v[k], watch_v_range[k, 0], watch_v_range[k, 1], v)
-            if pending:
-                for c in range(contacts):
-                    y += watch_v_force[k, c] * F[c]
-            out_v[record + 1, k] = y
+        for k in range(pushes):
+            q[push_index[k]] += pushed_q[k]
+            v[push_index[k]] += pushed_v[k]
+            pushed_q[k] = pushed_v[k] = 0.0
+        watch_all(watch_q, watch_q_range, watch_q_force, q, F, out_q, record + 1)
+        watch_all(watch_v, watch_v_range, watch_v_force, v, F, out_v, record + 1)
 
     if pending:
         _modal_force(rows, F, f)
