@@ -1,6 +1,6 @@
 """Every shipped case runs, and one of its numbers is right.
 
-Truth: exact wave theory (two rods), Zener's theory (sphere on rod), and the full order for the reduced
+Truth: exact wave theory (two rods), Zener (sphere on rod), and the full order for the reduced
 level of the valve, with the tolerances that the project promises.
 """
 

@@ -18,7 +18,8 @@ __all__ = ["block_lanczos"]
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-8
+_BETWEEN_TESTS = 3  # blocks; each test solves a dense eigenproblem
 _RANK = 1e-10
 
 
@@ -88,19 +89,24 @@ def block_lanczos(
     space = _Subspace(M, np.empty((len(start), 12 * b), order="F"), np.zeros((0, 0)))
     Q, _, _ = space.orthonormalised(start)
     T = np.zeros((0, 0))
+    steps = 0
     while True:
         space.append(Q)
         Q, C, B = space.orthonormalised(operator(space.V[:, space.size - Q.shape[1] : space.size]))
         T = _bordered(T, C)
+        steps += 1
+        exhausted = Q.shape[1] == 0
+        full = space.size + Q.shape[1] > largest_subspace
+        if steps % _BETWEEN_TESTS and not exhausted and not full:
+            continue
         values, S = scipy.linalg.eigh(T)
         values, S = values[::-1], S[:, ::-1]
         residual = np.linalg.norm(B @ S[-C.shape[1] :], axis=0)
         converged = residual <= _TOLERANCE * np.abs(values)
         leading = len(values) if converged.all() else int(np.argmin(converged))
-        exhausted = Q.shape[1] == 0
         if exhausted or enough(values[:leading]):
             return values[:leading], space.basis @ S[:, :leading]
-        if space.size + Q.shape[1] > largest_subspace:
+        if full:
             raise ConvergenceError(
                 f"block Lanczos: {leading} modes settled in {space.size} vectors, which is not "
                 "enough.\nTry: fewer modes or a lower max_frequency."

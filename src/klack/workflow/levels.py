@@ -1,6 +1,7 @@
 """One impact at one level: lumped, reduced in its variants, or full order."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal
@@ -111,14 +112,18 @@ def mode_pools(
     problem: ContactProblem, *, at_least: int, progress: Progress
 ) -> Mapping[str, Modes]:
     """Elastic modes of both bodies: as many as the case needs, and no fewer than ``at_least``."""
-    pools = {}
     bodies = (problem.pair.upper, problem.pair.lower)
     flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
-    for i, (body, flexibility) in enumerate(zip(bodies, flexibilities, strict=True)):
-        progress("modes", i / 2)
-        pools[body.name] = _pool(problem.case, body, flexibility, at_least)
+    progress("modes", 0.0)
+    # the triangular solves run outside of the interpreter: two bodies keep two cores busy
+    with ThreadPoolExecutor(max_workers=len(bodies)) as workers:
+        jobs = [
+            workers.submit(_pool, problem.case, body, flexibility, at_least)
+            for body, flexibility in zip(bodies, flexibilities, strict=True)
+        ]
+        pools = [job.result() for job in jobs]
     progress("modes", 1.0)
-    return pools
+    return {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
 
 
 def _pool(case: Case, body: ElasticBody, flexibility: Flexibility, at_least: int) -> Modes:
