@@ -1,7 +1,7 @@
 """Elastic rods with one degree of freedom per node: bodies whose impacts are known exactly."""
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array, eye_array
 
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
@@ -28,13 +28,11 @@ def rod_body(
         Height of node 0.
     """
     size = length / elements
-    ends = np.full(elements + 1, 2.0)
-    ends[[0, -1]] = 1.0
-    side = np.ones(elements)
-    K = diags_array([-side, ends, -side], offsets=[-1, 0, 1]) * (material.young * area / size)
-    M = diags_array([side, 2.0 * ends, side], offsets=[-1, 0, 1]) * (
-        material.density * area * size / 6.0
-    )
+    lower, upper = eye_array(elements, elements + 1), eye_array(elements, elements + 1, k=1)
+    stretch, mean = csr_array(upper - lower), csr_array(upper + lower)
+    K = stretch.T @ stretch * (material.young * area / size)
+    # [[2, 1], [1, 2]] rho A h / 6 per element
+    M = (3.0 * (mean.T @ mean) + stretch.T @ stretch) * (material.density * area * size / 12.0)
     return ElasticBody(
         name=name,
         mesh=Mesh(points=bottom + size * np.arange(elements + 1.0)[:, None], blocks=()),
