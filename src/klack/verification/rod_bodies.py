@@ -1,7 +1,7 @@
 """Elastic rods with one degree of freedom per node: bodies whose impacts are known exactly."""
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array
+from scipy.sparse import csr_array
 
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
@@ -28,7 +28,7 @@ def rod_body(
         Height of node 0.
     """
     size = length / elements
-    lower, upper = eye_array(elements, elements + 1), eye_array(elements, elements + 1, k=1)
+    lower, upper = np.eye(elements, elements + 1), np.eye(elements, elements + 1, k=1)
     stretch, mean = csr_array(upper - lower), csr_array(upper + lower)
     K = stretch.T @ stretch * (material.young * area / size)
     # [[2, 1], [1, 2]] rho A h / 6 per element
