@@ -19,7 +19,6 @@ from klack.errors import InputError
 __all__ = [
     "KINDS",
     "Angle",
-    "Damping",
     "Density",
     "Force",
     "Frequency",
@@ -78,7 +77,6 @@ FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
 STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"))
 PRESSURE = Kind("a pressure", "Pa", "210 GPa", ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"))
 DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3", ("kg/m^3", "g/cm^3", "kg/dm^3"))
-DAMPING = Kind("a viscous damping", "N s/m", "20 N s/m", ("N s/m", "N s/mm", "kg/s"))
 ANGLE = Kind(
     "an angle",
     "rad",
@@ -117,7 +115,6 @@ KINDS = (
     STIFFNESS,
     PRESSURE,
     DENSITY,
-    DAMPING,
     ANGLE,
     FREQUENCY,
     RATE,
@@ -289,7 +286,6 @@ Force = Annotated[float, *_typed(FORCE)]
 Stiffness = Annotated[float, *_typed(STIFFNESS)]
 Pressure = Annotated[float, *_typed(PRESSURE)]
 Density = Annotated[float, *_typed(DENSITY)]
-Damping = Annotated[float, *_typed(DAMPING)]
 Angle = Annotated[float, *_typed(ANGLE)]
 Frequency = Annotated[float, *_typed(FREQUENCY)]
 Rate = Annotated[float, *_typed(RATE)]

@@ -31,7 +31,6 @@ GOOD = [
     ("PRESSURE", "1 N/mm**2", 1e6),
     ("PRESSURE", "1 psi", 6894.757293168361),
     ("DENSITY", "7.85 g/cm^3", 7850.0),
-    ("DAMPING", "20 N s/m", 20.0),
     ("ANGLE", "40 deg", math.radians(40)),
     ("ANGLE", "40°", math.radians(40)),
     ("FREQUENCY", "900 kHz", 9e5),

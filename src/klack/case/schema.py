@@ -24,7 +24,6 @@ from klack.case.section import Count, Name, Section, Text
 from klack.errors import InputError
 from klack.materials import Material
 from klack.units import (
-    Damping,
     Density,
     Force,
     Frequency,
@@ -389,16 +388,13 @@ class Lumped(Section):
     """Rigid masses on one spring: the baseline."""
 
     stiffness: Stiffness = Field(gt=0, description="Contact spring; 1e9 N/m is usual.")
-    damping: Damping | None = Field(default=None, ge=0, description="Dashpot beside it.")
     restitution: Ratio | None = Field(
-        default=None, gt=0, le=1, description="Instead of damping: the measured speed ratio."
+        default=None,
+        gt=0,
+        le=1,
+        description="Dashpot in parallel (Hunt and Crossley 1975), given by the speed ratio that "
+        "it leaves; no loss without.",
     )
-
-    @model_validator(mode="after")
-    def _at_most_one(self) -> Self:
-        if self.damping is not None:
-            self._refuse_with(("restitution",), "damping", "each determines the other")
-        return self
 
 
 class Case(Section):
