@@ -23,6 +23,7 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
 from klack.workflow.levels import (
+    PARTICIPATION_POOL,
     ReducedPair,
     Variant,
     classical_stiffness,
@@ -93,8 +94,12 @@ def run_impact(
     clock = _Clock(progress)
     with _collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
-        with_transfer = case.run.transfer is not None
-        pools = mode_pools(problem, at_least=TRANSFER_MODES if with_transfer else 1, progress=clock)
+        needed = [1]
+        if case.run.transfer is not None:
+            needed.append(TRANSFER_MODES)
+        if "reduced-participation" in wanted:
+            needed.append(PARTICIPATION_POOL)
+        pools = mode_pools(problem, at_least=max(needed), progress=clock)
         clock("reduced", 0.0)
         preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)

@@ -47,6 +47,7 @@ from klack.workflow.progress import Progress
 from klack.workflow.study import LevelResult, ModalEnergy
 
 __all__ = [
+    "PARTICIPATION_POOL",
     "PORT",
     "ReducedPair",
     "Variant",
@@ -72,7 +73,10 @@ Variant = Literal["consistent", "attachment", "none"]
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
 _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
-_PARTICIPATION = {"pool": 100, "upper": 8, "lower": 20}
+PARTICIPATION_POOL = 100
+"""Modes of each body from which the level ``reduced-participation`` chooses."""
+
+_PARTICIPATING = (8, 20)  # of the upper and of the lower body
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,8 +137,6 @@ def _pool(case: Case, body: ElasticBody, flexibility: Flexibility, at_least: int
         count = max(count, choice.count)
     elif isinstance(choice, ByParticipation):
         count = max(count, choice.pool)
-    if "reduced-participation" in case.run.levels:
-        count = max(count, _PARTICIPATION["pool"])
     count = min(count, len(body.free) - body.rigid_modes.shape[1])
     pool = eigenmodes(body, count=count, flexibility=flexibility)
     if isinstance(choice, ByFrequency) and pool.frequency[-1] < choice.maximum:
@@ -472,11 +474,9 @@ def _steps(history: ImpactHistory, step: float) -> int:
 
 def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
     """The 8 + 20 modes of 100 that carry most of the compliance at the contact."""
-    upper, lower = pair_names
-    pool = _PARTICIPATION["pool"]
     return {
-        upper: ByParticipation(_PARTICIPATION["upper"], pool),
-        lower: ByParticipation(_PARTICIPATION["lower"], pool),
+        name: ByParticipation(count, PARTICIPATION_POOL)
+        for name, count in zip(pair_names, _PARTICIPATING, strict=True)
     }
 
 
