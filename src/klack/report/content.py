@@ -146,6 +146,9 @@ def _number_table(study: ImpactStudy) -> Table:
     return Table(columns=("", *heads), rows=tuple(rows))
 
 
+_ROUND_OFF = 1e-12
+"""Share of the initial energy below which an energy is zero."""
+
 _KEY_NUMBERS: tuple[
     tuple[
         str,
@@ -268,6 +271,8 @@ def _energy_table(study: ImpactStudy) -> Table:
         for result in results:
             initial = next(iter(result.energies.values()))
             value = result.energies.get(name)
+            if value is not None and abs(value) < _ROUND_OFF * initial:
+                value = 0.0
             text = "–" if value is None else quantity(value, "J")
             if value is not None and initial > 0:
                 text += f"\n{share(value / initial, 2)}"
