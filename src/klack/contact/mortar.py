@@ -86,6 +86,9 @@ class ContactSpace:
         Distance that a has to move to -z, rigidly, until the surfaces themselves touch.  The
         weighted gaps close a little later (:attr:`touch`), by about h^2/(50 R) on elements of
         size h and surfaces of relative radius R.
+    beyond : float [m]
+        No point that was left out has a smaller gap.  As long as the bodies approach by less, a
+        contact at the rim is complete all the same: elements may be wider than the reach.
     """
 
     G_a: csr_array
@@ -100,6 +103,7 @@ class ContactSpace:
     nodes: NDArray[np.int64]
     reach: float
     clearance: float
+    beyond: float = -np.inf
 
     @property
     def count(self) -> int:
@@ -130,8 +134,18 @@ class ContactSpace:
         First order; rebuild the space after moves that are not small against the element size.
         """
         return replace(
-            self, gap=self.gap + distance * self.axial, clearance=self.clearance + distance
+            self,
+            gap=self.gap + distance * self.axial,
+            clearance=self.clearance + distance,
+            beyond=self.beyond + distance * float(np.min(self.axial)),
         )
+
+    def complete_at(self, travel: float) -> bool:
+        """Tell whether no left-out point can have closed after a has moved by ``travel`` to -z [m].
+
+        The deformation under contact forces only opens the gaps of points without a force.
+        """
+        return travel * float(np.max(self.axial)) < self.beyond
 
     def restricted(self, keep: NDArray[np.bool_]) -> Self:
         """Only the contact points ``keep``, shape (nc,); the new border becomes the rim."""
@@ -144,6 +158,7 @@ class ContactSpace:
             self,
             **{name: getattr(self, name)[keep] for name in _ROWS if name != "rim"},
             rim=rim[keep],
+            beyond=min(self.beyond, float(np.min(self.gap[~keep], initial=np.inf))),
         )
 
 
@@ -458,6 +473,7 @@ def _assemble(
         nodes=nodes,
         reach=reach,
         clearance=_clearance(sums, nodes, axial),
+        beyond=limit,
     )
 
 

@@ -272,7 +272,10 @@ def check_rim(static: StaticContact) -> None:
     InputError
         It names the reach and the highest force without contact at the rim.
     """
-    touched = (static.pressures[:, static.space.rim] > 0).any(axis=1)
+    space = static.space
+    travel = static.approach + min(space.clearance, space.touch)
+    touched = (static.pressures[:, space.rim] > 0).any(axis=1)
+    touched = touched & np.array([not space.complete_at(distance) for distance in travel])
     if not np.any(touched):
         return
     first = int(np.argmax(touched))

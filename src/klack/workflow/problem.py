@@ -108,9 +108,7 @@ def _static_contact(
     if case.contact.reach is None:
         reach = _REACH_MARGIN * 2.0 * energy / force
     for attempt in range(_ATTEMPTS):
-        if reach > space.reach:
-            space = contact_space(*surfaces, reach=reach)
-        candidates = space.restricted(space.gap <= space.gap.min() + reach)
+        candidates = contact_space(*surfaces, reach=reach)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)
