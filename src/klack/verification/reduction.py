@@ -8,7 +8,7 @@ from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import full_order_receptance
+from klack.reduction.full_order import direct_receptance, full_order_receptance
 from klack.reduction.ports import Port, surface_port
 from klack.reduction.receptance import reduced_receptance
 from klack.reduction.reduce import reduce_body
@@ -176,6 +176,17 @@ def _receptance_checks(
             computed=float(full.checked_deviations.max()),
             tolerance=1e-6,
             source="K - w^2 M factorised at two frequencies",
+        )
+    )
+    direct = direct_receptance(body, [lower, upper], np.array([20e3, 300e3])).values
+    checks.append(
+        compare(
+            _GROUP,
+            "reciprocity: end-to-end receptance there and back, largest relative difference",
+            expected=0.0,
+            computed=float(np.max(np.abs(direct[:, 0, 1] / direct[:, 1, 0] - 1))),
+            tolerance=1e-8,
+            source="Maxwell-Betti; each direction has its own direct solution",
         )
     )
     return checks
