@@ -1,15 +1,16 @@
 """Sparse Cholesky of NGSolve: free of MKL, about as fast as PARDISO on one thread."""
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.elasticity.closing import Closing
+
 __all__ = ["NgsolveFactorization"]
 
 
-class NgsolveFactorization:
+class NgsolveFactorization(Closing):
     """Cholesky factor; see :class:`klack.elasticity.factorization.Factorization`."""
 
     backend = "ngsolve"
@@ -54,14 +55,3 @@ class NgsolveFactorization:
     def close(self) -> None:
         """Drop the factor."""
         self._inverse = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()

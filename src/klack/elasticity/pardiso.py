@@ -12,13 +12,13 @@ import ctypes
 import weakref
 from functools import cache
 from importlib.metadata import PackageNotFoundError, PackagePath, files
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import triu
 
+from klack.elasticity.closing import Closing
 from klack.elasticity.factorization import Precision, not_positive_definite
 from klack.errors import ConvergenceError
 
@@ -34,7 +34,7 @@ _ERRORS = {
 }
 
 
-class PardisoFactorization:
+class PardisoFactorization(Closing):
     """Cholesky factor held by MKL; see :class:`klack.elasticity.factorization.Factorization`."""
 
     backend = "pardiso"
@@ -98,17 +98,6 @@ class PardisoFactorization:
         """Give the memory back to the system."""
         self._release()
         self._values = self._indices = self._start = np.empty(0)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _call(self, phase: int, B: NDArray[Any], X: NDArray[Any], columns: int) -> int:
         before = None

@@ -12,14 +12,12 @@ three distant nodes (one of a body of revolution) are held, which costs no react
 the load is in balance.
 """
 
-from types import TracebackType
-from typing import Self
-
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
 from klack.elasticity.body import ElasticBody
+from klack.elasticity.closing import Closing
 from klack.elasticity.factorization import Backend, Factorization, factorize
 from klack.errors import InputError
 
@@ -28,7 +26,7 @@ __all__ = ["Flexibility"]
 _CHUNK = 64
 
 
-class Flexibility:
+class Flexibility(Closing):
     """Elastic static answer of a body to loads; one factorisation, many right-hand sides.
 
     Parameters
@@ -84,17 +82,6 @@ class Flexibility:
     def close(self) -> None:
         """Give back the memory of the factorisation."""
         self.factorization.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _solve_block(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         R, MR = self._R, self._MR

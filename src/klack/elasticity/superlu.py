@@ -1,18 +1,18 @@
 """SuperLU as it comes with scipy: always there, slow and large for 3-D meshes."""
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from klack.elasticity.closing import Closing
 from klack.elasticity.factorization import not_positive_definite
 
 __all__ = ["SuperluFactorization"]
 
 
-class SuperluFactorization:
+class SuperluFactorization(Closing):
     """LU factor; see :class:`klack.elasticity.factorization.Factorization`."""
 
     backend = "superlu"
@@ -43,14 +43,3 @@ class SuperluFactorization:
     def close(self) -> None:
         """Drop the factor."""
         self._factor = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
