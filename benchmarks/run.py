@@ -134,7 +134,7 @@ def reduction_rows() -> list[Row]:
     from klack.workflow.levels import first_stiffness, mode_pools, own_pair
     from klack.workflow.problem import build_problem
 
-    case = finer(load_case(shipped_cases()["demo-valve"]), 0.55, 24)
+    case = finer(load_case(shipped_cases()["demo-valve"]), 0.55, 28)
     begin = perf_counter()
     problem = build_problem(case, _say)
     pools = mode_pools(problem, at_least=50, progress=_say)
@@ -151,7 +151,7 @@ def reduction_rows() -> list[Row]:
 
 def large_full_order_rows() -> list[Row]:
     """Full order with 250 000 degrees of freedom and 1000 steps."""
-    case = finer(load_case(shipped_cases()["demo-valve"]), 0.45, 30)
+    case = finer(load_case(shipped_cases()["demo-valve"]), 0.45, 40)
     run = case.run.model_copy(update={"duration": 1000 * case.run.full_step})
     study = run_impact(case.model_copy(update={"run": run}), levels=("full",), progress=_say)
     full = study.levels["full"]
