@@ -175,6 +175,24 @@ def raising(error: BaseException) -> Callable[..., object]:
 
 
 @pytest.mark.parametrize(
+    "words",
+    [["--level", "full,reduced"], ["--level", "reduced", "full"], ["--level=reduced,full"]],
+    ids=["with a comma", "with a space", "with an equals sign"],
+)
+def test_several_levels_in_one_option(words, monkeypatch):
+    asked = []
+
+    def run(case: object, *, levels: object, progress: object, threads: object) -> object:
+        asked.append(levels)
+        raise ConvergenceError("far enough")
+
+    play(monkeypatch, run)
+
+    assert main(["impact", str(DRAWN), *words]) == 1
+    assert asked == [("reduced", "full")]
+
+
+@pytest.mark.parametrize(
     ("error", "code", "words"),
     [
         (KeyboardInterrupt(), 130, "klack impact: stopped; nothing was written."),

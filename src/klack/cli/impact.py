@@ -29,13 +29,15 @@ def impact(
     quiet: Quiet = False,
 ) -> int:
     """Compute one impact; several levels are compared with each other."""
-    run_case(case, level, report=report, out=out, json=json, threads=threads, quiet=quiet)
+    # both "--level a,b" and "--level a --level b"
+    levels = [name for item in level or () for name in item.split(",") if name]
+    run_case(case, levels, report=report, out=out, json=json, threads=threads, quiet=quiet)
     return 0
 
 
 def run_case(
     case: Path,
-    level: list[str] | None,
+    level: list[str],
     *,
     report: bool,
     out: Path | None,

@@ -37,7 +37,7 @@ Levels = Annotated[
         consume_multiple=True,
         negative="",
         help="lumped, reduced, reduced-attachment, reduced-none, reduced-participation, full; "
-        "several are compared. [default: as in the case]",
+        "several (a,b,c) are compared. [default: as in the case]",
     ),
 ]
 
