@@ -62,8 +62,9 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     """Mesh, place, factorise, and solve the static contact.
 
     The highest force is bounded without knowing the contact: an impact of relative speed v and
-    effective mass m stores at most m v^2 / 2 in the contact, and the static curve gives the force
-    and the approach at which that much is stored.  The candidate points reach further than that.
+    effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
+    the static curve gives the force and the approach at which that much is stored.  The candidate
+    points reach further than that.
     """
     pair = build_bodies(case, progress)
     progress("factorise", 0.0)
@@ -87,12 +88,16 @@ def _effective_mass(pair: BodyPair) -> float:
     return 1.0 / sum(1.0 / m for m in masses)
 
 
+def _closing_force(case: Case) -> float:
+    """Outside force that presses the bodies together [N]."""
+    spring = case.motion.spring
+    return max(case.motion.force + (spring.preload if spring else 0.0), 0.0)
+
+
 def _impact_energy(case: Case, pair: BodyPair) -> float:
-    """Bound of the energy that the contact can store [J]: kinetic, and work of closing forces."""
-    motion = case.motion
-    energy = 0.5 * _effective_mass(pair) * motion.speed**2
-    closing = max(motion.force, 0.0) + (motion.spring.preload if motion.spring else 0.0)
-    return energy + closing * (case.contact.gap or 0.0)
+    """Bound of the energy at first touch [J]: kinetic, and work of closing forces on the way."""
+    kinetic = 0.5 * _effective_mass(pair) * case.motion.speed**2
+    return kinetic + _closing_force(case) * (case.contact.gap or 0.0)
 
 
 def _static_contact(
@@ -104,16 +109,20 @@ def _static_contact(
     progress("static contact", 0.0)
     space = contact_space(*surfaces, reach=case.contact.reach)
     reach = space.reach
-    force = sqrt(2.0 * energy / _first_compliance(space, upper, lower))
+    closing = _closing_force(case)
+    compliance = _first_compliance(space, upper, lower)
+    # a linear spring stores E + closing * approach at the turning point
+    approach = compliance * closing + sqrt((compliance * closing) ** 2 + 2.0 * energy * compliance)
+    force = approach / compliance
     if case.contact.reach is None:
-        reach = _REACH_MARGIN * 2.0 * energy / force
+        reach = _REACH_MARGIN * approach
     for attempt in range(_ATTEMPTS):
         candidates = contact_space(*surfaces, reach=reach)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)
         try:
-            static = _ladder(candidates, C, energy, force)
+            static = _ladder(candidates, C, energy, closing, force)
         except ReachError:
             if case.contact.reach is not None or attempt == _ATTEMPTS - 1:
                 raise
@@ -139,9 +148,13 @@ def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibilit
 
 
 def _ladder(
-    space: ContactSpace, C: NDArray[np.float64], energy: float, force: float
+    space: ContactSpace, C: NDArray[np.float64], energy: float, closing: float, force: float
 ) -> StaticContact:
-    """Static contact up to a force above that of a quasi-static impact of this energy."""
+    """Static contact up to a force above that of a quasi-static impact of this energy.
+
+    The closing force goes on working while the bodies approach: the turning point is where the
+    stored energy has reached ``energy + closing * approach``.
+    """
     while True:
         static = static_contact(space, C, force)
         # energy stored along the ladder, by the trapezoidal rule from first touch
@@ -149,8 +162,11 @@ def _ladder(
         stored = np.concatenate(
             [[0.0], np.cumsum(np.diff(approach) * (load[1:] + load[:-1]) / 2.0)]
         )
-        if stored[-1] >= energy:
+        surplus = stored - closing * approach
+        if surplus[-1] >= energy:
             break
         force *= 1.5
-    needed = _LOAD_MARGIN * float(np.interp(energy, stored, load))
+    # falls up to the closing force, rises from there
+    rising = load >= closing
+    needed = _LOAD_MARGIN * float(np.interp(energy, surplus[rising], load[rising]))
     return static_contact(space, C, needed)
