@@ -54,6 +54,29 @@ def test_axisymmetric_valve_reduced_against_full():
     )
 
 
+def test_valve_pressed_shut_reduced_against_full():
+    """A closing force goes on working during the approach: the ladder must reach that far."""
+    case = shipped("demo-valve-axisymmetric")
+    run = case.run.model_copy(update={"transfer": None, "duration": 75e-6})
+    motion = case.motion.model_copy(update={"force": 150.0})
+    case = case.model_copy(update={"run": run, "motion": motion})
+    study = run_impact(case, levels=("reduced", "full"))
+    deviation = study.deviations["reduced"]
+    assert study.levels["full"].measures.peak_force > 2 * 150.0
+    assert study.contact.force[-1] > study.levels["full"].measures.peak_force
+    assert abs(deviation.peak_force) < 0.005
+    assert abs(deviation.contact_time) < 0.01
+
+
+def test_levels_are_named_by_what_they_are_and_the_best_is_the_reference():
+    study = study_of("demo-valve-axisymmetric", "lumped", "reduced-attachment", "reduced")
+    assert study.reference == "reduced"
+    assert set(study.deviations) == {"lumped", "reduced-attachment"}
+    labels = {name: level.label for name, level in study.levels.items()}
+    assert labels["reduced"] == "reduced, 20 + 40 modes, consistent law"
+    assert labels["reduced-attachment"] == "reduced, 20 + 40 modes, attachment modes, 1000 N/um"
+
+
 def test_two_rods_follow_wave_theory():
     """St Venant: plateau rho c A v / 2 until 2 L / c of the short rod; restitution 0.5."""
     study = study_of("two-rods", "reduced", "full")

@@ -11,7 +11,8 @@ import numpy as np
 
 from klack import __version__
 from klack.acoustics.comparison import compare_histories
-from klack.case.schema import Case
+from klack.case.schema import Case, SubmodelLocalLaw
+from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
 from klack.contact.statics import check_resolution
 from klack.contact.submodel import LocalStiffness
@@ -19,13 +20,13 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
 from klack.materials import Material
+from klack.reduction.reduce import Correction
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
 from klack.workflow.levels import (
     PARTICIPATION_POOL,
     ReducedPair,
-    Variant,
     classical_stiffness,
     elastic_count,
     first_stiffness,
@@ -57,11 +58,10 @@ __all__ = ["run_impact"]
 _LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 # What a reduced level needs before it can run, beyond meshes and matrices.
 _SET_UP = ("factorise", "static contact", "modes", "reduced")
-_REDUCED_LABELS: Mapping[str, tuple[Variant, str]] = {
-    "reduced": ("consistent", "consistent law"),
-    "reduced-participation": ("consistent", "consistent law, modes by participation"),
-    "reduced-attachment": ("attachment", "attachment modes, 1000 N/um"),
-    "reduced-none": ("none", "no correction, 1000 N/um"),
+_CORRECTIONS: Mapping[str, Correction] = {
+    "reduced-participation": "consistent",
+    "reduced-attachment": "attachment",
+    "reduced-none": "none",
 }
 _USUAL_STIFFNESS = 1e9
 """Contact stiffness [N/m] that the literature puts beside modes, corrected or not."""
@@ -106,7 +106,9 @@ def run_impact(
         preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
         classical = classical_stiffness(problem, peak)
-        own = own_pair(problem, pools, stiffness=classical.stiffness)
+        own = preview
+        if isinstance(case.contact.local_law, SubmodelLocalLaw):  # no other law asks for it
+            own = own_pair(problem, pools, stiffness=classical.stiffness)
         results: dict[str, LevelResult] = {}
         for level in wanted:
             if level == "lumped":
@@ -124,7 +126,8 @@ def run_impact(
         if "full" in wanted:
             results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
             sections = _sections(problem, run)
-    reference = "full" if "full" in results else next(iter(results))
+    # the best of what was run; the lumped model is nobody's reference
+    reference = next((name for name in ("full", "reduced") if name in results), next(iter(results)))
     return ImpactStudy(
         case=case.name,
         title=case.title,
@@ -214,7 +217,7 @@ def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) ->
     return reduce_pair(
         problem,
         pools,
-        correction=_REDUCED_LABELS[level][0],
+        correction=_CORRECTIONS[level],
         selection=selection,
         stiffness=_USUAL_STIFFNESS,
     )
@@ -222,12 +225,23 @@ def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) ->
 
 def _run_variant(case: Case, level: str, pair: ReducedPair, *, setup_time: float) -> LevelResult:
     counts = f"{elastic_count(pair.upper)} + {elastic_count(pair.lower)} modes"
-    words = _REDUCED_LABELS[level][1]
-    if level == "reduced" and pair.local is None:
-        words = f"{case.contact.local_law.kind} law, correction {case.reduction.correction}"
+    words = ", ".join(filter(None, (_CORRECTION_WORDS[pair.upper.correction], _law_words(pair))))
+    if level == "reduced-participation":
+        words += ", modes by participation"
     return run_reduced(
         case, pair, level=level, label=f"reduced, {counts}, {words}", setup_time=setup_time
     )
+
+
+_CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none": "no correction"}
+
+
+def _law_words(pair: ReducedPair) -> str:
+    if pair.local is not None:
+        return "consistent law"
+    if isinstance(pair.law, LinearLaw):
+        return f"{pair.law.stiffness / 1e6:.4g} N/um"
+    return "Hertz law"
 
 
 def _deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,6 @@ __all__ = [
     "PARTICIPATION_POOL",
     "PORT",
     "ReducedPair",
-    "Variant",
     "classical_stiffness",
     "elastic_count",
     "first_stiffness",
@@ -67,8 +65,6 @@ __all__ = [
 
 PORT = "contact"
 """Name of the contact port of both bodies."""
-
-Variant = Literal["consistent", "attachment", "none"]
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
