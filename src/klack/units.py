@@ -8,29 +8,47 @@ taken from short tables instead of by dimension, so that one cannot pass for the
 
 import re
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from math import isfinite, pi
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
 from klack.errors import InputError
 
 __all__ = [
     "KINDS",
+    "Acceleration",
     "Angle",
+    "Area",
+    "Compliance",
+    "Conductivity",
+    "Current",
+    "DampingCoefficient",
     "Density",
+    "DynamicViscosity",
+    "FieldStrength",
+    "Flux",
+    "FluxDensity",
     "Force",
     "Frequency",
     "Kind",
+    "KinematicViscosity",
     "Length",
     "LengthUnit",
+    "Mass",
+    "Permeance",
     "Pressure",
     "Rate",
     "Ratio",
+    "Resistance",
     "Speed",
     "Stiffness",
+    "Temperature",
     "Time",
+    "Voltage",
+    "Volume",
+    "VolumeFlow",
     "format_si",
     "parse_quantity",
 ]
@@ -98,6 +116,30 @@ RATE = Kind(
     ("1/s", "1/ms"),
     {"1/s": 1.0, "s^-1": 1.0, "1/ms": 1e3, "1/us": 1e6},
 )
+AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"))
+VOLUME = Kind("a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"))
+MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"))
+ACCELERATION = Kind("an acceleration", "m/s^2", "9.81 m/s^2", ("m/s^2",))
+DAMPING = Kind("a damping coefficient", "N*s/m", "0.5 N*s/m", ("N*s/m", "N*s/mm"))
+COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"))
+VOLUME_FLOW = Kind("a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"))
+DYNAMIC_VISCOSITY = Kind("a dynamic viscosity", "Pa*s", "0.4 mPa*s", ("Pa*s", "mPa*s"))
+KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/s", "mm^2/s"))
+VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
+CURRENT = Kind("a current", "A", "2.5 A", ("A", "mA"))
+RESISTANCE = Kind("a resistance", "ohm", "1.2 ohm", ("ohm", "mohm"))
+CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"))
+FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
+FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
+PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"))
+FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"))
+TEMPERATURE = Kind(
+    "a temperature",
+    "K",
+    "293.15 K",
+    ("K",),
+    {"K": 1.0},
+)
 RATIO = Kind(
     "a number without unit",
     "-",
@@ -118,6 +160,24 @@ KINDS = (
     ANGLE,
     FREQUENCY,
     RATE,
+    AREA,
+    VOLUME,
+    MASS,
+    ACCELERATION,
+    DAMPING,
+    COMPLIANCE,
+    VOLUME_FLOW,
+    DYNAMIC_VISCOSITY,
+    KINEMATIC_VISCOSITY,
+    VOLTAGE,
+    CURRENT,
+    RESISTANCE,
+    CONDUCTIVITY,
+    FLUX_DENSITY,
+    FIELD_STRENGTH,
+    PERMEANCE,
+    FLUX,
+    TEMPERATURE,
     RATIO,
 )
 
@@ -268,7 +328,28 @@ def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
         "description": f"{kind.name}, e.g. {kind.example}",
         "examples": [kind.example],
     }
-    return BeforeValidator(lambda value: parse_quantity(value, kind)), WithJsonSchema(schema)
+    return BeforeValidator(partial(_read, kind=kind)), WithJsonSchema(schema)
+
+
+def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
+    """In a file every number needs its unit; numbers given in Python (no context) are SI."""
+    if info.context is None and isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    return parse_quantity(value, kind)
+
+
+def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
+    """Metadata of a temperature in K; a file may also write ``20 degC``."""
+
+    def read(value: object, info: ValidationInfo) -> float:
+        if isinstance(value, str):
+            match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
+            if match:
+                return round(float(match[1]) + 273.15, 6)
+        return _read(value, info, kind=TEMPERATURE)
+
+    metadata = {"type": ["string", "number"], "description": "a temperature, e.g. 20 degC"}
+    return BeforeValidator(read), WithJsonSchema({**metadata, "examples": ["20 degC", "293 K"]})
 
 
 def _length_unit(value: object) -> float:
@@ -289,6 +370,24 @@ Density = Annotated[float, *_typed(DENSITY)]
 Angle = Annotated[float, *_typed(ANGLE)]
 Frequency = Annotated[float, *_typed(FREQUENCY)]
 Rate = Annotated[float, *_typed(RATE)]
+Area = Annotated[float, *_typed(AREA)]
+Volume = Annotated[float, *_typed(VOLUME)]
+Mass = Annotated[float, *_typed(MASS)]
+Acceleration = Annotated[float, *_typed(ACCELERATION)]
+DampingCoefficient = Annotated[float, *_typed(DAMPING)]
+Compliance = Annotated[float, *_typed(COMPLIANCE)]
+VolumeFlow = Annotated[float, *_typed(VOLUME_FLOW)]
+DynamicViscosity = Annotated[float, *_typed(DYNAMIC_VISCOSITY)]
+KinematicViscosity = Annotated[float, *_typed(KINEMATIC_VISCOSITY)]
+Voltage = Annotated[float, *_typed(VOLTAGE)]
+Current = Annotated[float, *_typed(CURRENT)]
+Resistance = Annotated[float, *_typed(RESISTANCE)]
+Conductivity = Annotated[float, *_typed(CONDUCTIVITY)]
+FluxDensity = Annotated[float, *_typed(FLUX_DENSITY)]
+FieldStrength = Annotated[float, *_typed(FIELD_STRENGTH)]
+Permeance = Annotated[float, *_typed(PERMEANCE)]
+Flux = Annotated[float, *_typed(FLUX)]
+Temperature = Annotated[float, *_temperature()]
 Ratio = Annotated[float, *_typed(RATIO)]
 LengthUnit = Annotated[
     float,

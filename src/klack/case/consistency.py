@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from klack.case.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of
 
 if TYPE_CHECKING:
     from klack.case.schema import Case, SurfaceName

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
-from klack.case.problem import CaseProblem
-from klack.case.section import Count, Name, Number, Section
 from klack.errors import InputError
+from klack.input.problem import CaseProblem
+from klack.input.section import Count, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
 from klack.units import Angle, Length, LengthUnit, format_si
 

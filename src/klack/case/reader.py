@@ -13,9 +13,9 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from klack.case.problem import CaseProblem, Key, key_text, nearest
 from klack.case.schema import Case
 from klack.errors import InputError
+from klack.input.problem import CaseProblem, Key, key_text, nearest
 
 __all__ = ["case_schema", "load_case", "read_case"]
 

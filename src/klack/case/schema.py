@@ -19,9 +19,9 @@ from pydantic import (
 
 from klack.case.consistency import check_consistency
 from klack.case.geometry import Geometry, MeshSettings, Support
-from klack.case.problem import CaseProblem, nearest, one_of
-from klack.case.section import Count, Name, Section, Text
 from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Count, Name, Section, Text
 from klack.materials import Material
 from klack.units import (
     Density,

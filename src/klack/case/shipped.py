@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from klack.case.problem import nearest, one_of
 from klack.errors import InputError
+from klack.input.problem import nearest, one_of
 
 __all__ = ["find_case", "shipped_cases"]
 

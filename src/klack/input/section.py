@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, StringConstraints, model_validator
 
-from klack.case.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of
 
 __all__ = ["Count", "Name", "Number", "Section", "Text"]
 

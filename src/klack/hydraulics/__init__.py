@@ -1,0 +1,1 @@
+"""Fluids and hydraulic components: restrictions, chambers, lines, films; one per file."""

@@ -1,0 +1,1 @@
+"""Magnetic circuits, coils and their drivers; one component per file."""

@@ -1,0 +1,1 @@
+"""Mechanical components: bodies, springs, forces, friction, end stops; one per file."""

@@ -1,0 +1,63 @@
+"""What every component of a network is: documented parameters, ports, and the rows it adds."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from pydantic import ValidationError
+
+from klack.errors import InputError
+from klack.input.section import Section
+from klack.network.port import Port
+from klack.network.rows import Rows
+
+__all__ = ["Component"]
+
+
+class Component(Section):
+    """A part of a valve with ports.
+
+    A component type is one class in one file: its fields are the keys of a case file (with units
+    there, SI numbers in Python), ``ports`` says where it can be joined, and :meth:`add_rows`
+    translates it into rows of the solver.  Register it in :mod:`klack.network.catalogue`.
+
+    Attributes
+    ----------
+    type : str
+        Word after ``type:`` in a case file.
+    ports : mapping of str to Port
+        Override :meth:`port_kinds` when they depend on parameters.
+    """
+
+    type: ClassVar[str]
+    ports: ClassVar[Mapping[str, Port]] = {}
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise _first_problem(type(self).__name__, error) from None
+
+    def port_kinds(self) -> Mapping[str, Port]:
+        """Return the ports of this component."""
+        return self.ports
+
+    @abstractmethod
+    def add_rows(self, rows: Rows) -> None:
+        """Add what this component contributes to the solver; ``rows`` knows its connections."""
+
+
+def _first_problem(name: str, error: ValidationError) -> InputError:
+    first = error.errors()[0]
+    cause = first.get("ctx", {}).get("error")
+    where = ".".join([name, *(str(part) for part in first["loc"])])
+    if isinstance(cause, InputError):
+        key = getattr(cause, "key", ())
+        where = ".".join([where, *(str(part) for part in key)])
+        return InputError(where, got=cause.got, expected=cause.expected, hint=cause.hint)
+    return InputError(
+        where,
+        got=f"{first.get('input')!r}"[:80],
+        expected=first["msg"],
+        hint="klack schema describes every key; numbers in Python are SI.",
+    )

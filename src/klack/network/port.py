@@ -1,0 +1,45 @@
+"""Kinds of ports: what two components may be joined in, and who of them rules the common node."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = ["COIL", "COMPLIANCE", "ELEMENT", "FLOW", "MOTION", "PRESSURE", "VOLTAGE", "Port", "Role"]
+
+
+class Role(Enum):
+    """Part that a port plays in its node."""
+
+    MOTION = "moves"  # port of a body: rules the displacement of a mechanical node
+    ELEMENT = "pushes"  # exchanges force with a body
+    COMPLIANCE = "stores fluid"  # volume with compliance: rules the pressure of a hydraulic node
+    PRESSURE = "prescribes pressure"
+    FLOW = "carries flow"
+    VOLTAGE = "drives"
+    COIL = "is driven"
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """One port of a component.
+
+    Parameters
+    ----------
+    domain : str
+        ``"mechanical"``, ``"hydraulic"`` or ``"electric"``; only equal domains can be joined.
+    role : Role
+    optional : bool
+        Whether it may stay unconnected.
+    """
+
+    domain: str
+    role: Role
+    optional: bool = False
+
+
+MOTION = Port("mechanical", Role.MOTION)
+ELEMENT = Port("mechanical", Role.ELEMENT)
+COMPLIANCE = Port("hydraulic", Role.COMPLIANCE)
+PRESSURE = Port("hydraulic", Role.PRESSURE)
+FLOW = Port("hydraulic", Role.FLOW)
+VOLTAGE = Port("electric", Role.VOLTAGE)
+COIL = Port("electric", Role.COIL)

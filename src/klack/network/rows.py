@@ -1,0 +1,381 @@
+"""What the solver runs, as rows that components add; the solver turns them into flat arrays.
+
+Handles are plain integers: of a mechanical port (a degree of freedom along +z of some body) and of
+a hydraulic node (one pressure).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.network.step_function import StepFunction
+
+if TYPE_CHECKING:
+    from klack.contact.laws import ContactLaw
+    from klack.hydraulics.fluid import Fluid
+    from klack.network.component import Component
+    from klack.reduction.reduced_body import ReducedBody
+
+__all__ = [
+    "GROUND",
+    "Ambient",
+    "BodyRow",
+    "Book",
+    "BranchRow",
+    "Channel",
+    "ElementRow",
+    "FilmRow",
+    "InterfaceRow",
+    "LineRow",
+    "NodeRow",
+    "Rows",
+    "WallRow",
+]
+
+GROUND = -1
+"""Handle of the immovable ground as a mechanical port."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ambient:
+    """Surroundings.
+
+    Parameters
+    ----------
+    pressure : float [Pa]
+        Absolute; pressure forces count from here.
+    temperature : float [K]
+    """
+
+    pressure: float = 101_325.0
+    temperature: float = 293.15
+
+
+@dataclass(frozen=True, slots=True)
+class Book:
+    """One entry of the energy ledger that a row keeps itself; see ``step_function``."""
+
+    label: str
+    kind: Literal["store", "supply", "loss"]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A state that is recorded under ``<component> <label>``; ``index`` counts in the state."""
+
+    label: str
+    unit: str
+    index: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyRow:
+    """A body in modal form; ``ports`` are handles of its ``port_shapes`` columns, in order.
+
+    ``moving`` says that it is the armature and needle, whose lift is recorded.
+    """
+
+    component: str
+    body: "ReducedBody"
+    ports: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ElementRow:
+    """Something that pushes ports; see :mod:`klack.network.step_function`."""
+
+    component: str
+    label: str
+    step: StepFunction
+    ports: tuple[int, ...]
+    parameters: NDArray[np.float64]
+    state: NDArray[np.float64]
+    books: tuple[Book, ...]
+    channels: tuple[Channel, ...]
+    failures: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BranchRow:
+    """Flow between two hydraulic nodes, perhaps pushing mechanical ports."""
+
+    component: str
+    label: str
+    step: StepFunction
+    a: int
+    b: int
+    ports: tuple[int, ...]
+    parameters: NDArray[np.float64]
+    state: NDArray[np.float64]
+    books: tuple[Book, ...]
+    channels: tuple[Channel, ...]
+    failures: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NodeRow:
+    """One pressure: a volume with compliance, or a prescribed pressure over time.
+
+    ``volume`` [m^3] at zero displacements; 0 for a prescribed pressure, whose ``time`` [s] and
+    ``pressure`` [Pa] are a table (constant beyond its ends).
+    """
+
+    component: str
+    volume: float
+    time: NDArray[np.float64]
+    pressure: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WallRow:
+    """A wall that moves with a port: ``V += area y``, ``F = area (p - p_ambient)`` along +z."""
+
+    component: str
+    node: int
+    port: int
+    area: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmRow:
+    """Squeeze film ``F = (cubic / h^3 + linear / h) V`` over the gap ``h = max(gap, 0) + cut_off``.
+
+    Parameters
+    ----------
+    cubic : float [N s m^2]
+    linear : float [N s]
+    cut_off : float [m]
+        Above zero; from the roughness.
+    suction : float [N]
+        Greatest pull while the gap opens, ``(p_ambient - p_cavitation) area``.
+    """
+
+    cubic: float
+    linear: float
+    cut_off: float
+    suction: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceRow:
+    """Contact and film, parallel, in series with a massless compliance.
+
+    ``gap = gap_0 + y_upper - y_lower``; the force, above zero when it presses, pushes the upper
+    port along +z and the lower one along -z.
+    """
+
+    component: str
+    upper: int
+    lower: int
+    gap: float
+    law: "ContactLaw | None"
+    series_compliance: float
+    film: FilmRow | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineRow:
+    """Delay line between two nodes, in segments with friction between them.
+
+    Parameters
+    ----------
+    a, b : int
+    delay : float [s]
+        Of the whole line.
+    impedance : float [Pa s/m^3]
+        Of a wave, ``rho a / A``.
+    segments : int
+        Friction acts between segments and, half each, at both ends.
+    resistance : float [Pa s/m^3]
+        Steady laminar friction of the whole line.
+    unsteady_gain, unsteady_rate : array (k,) [Pa s/m^3], [1/s]
+        Terms of the frequency-dependent friction of the whole line:
+        ``dp = resistance q + sum_k gain_k int exp(-rate_k (t - s)) dq/ds ds``.
+    vapour_pressure : float [Pa]
+        Below it a cavity opens between two segments.
+    """
+
+    component: str
+    a: int
+    b: int
+    delay: float
+    impedance: float
+    segments: int
+    resistance: float
+    unsteady_gain: NDArray[np.float64]
+    unsteady_rate: NDArray[np.float64]
+    vapour_pressure: float
+
+
+@dataclass(eq=False)
+class Rows:
+    """Collects the rows of a network, one component after the other.
+
+    ``ambient`` and ``fluid`` hold for the whole network.  While a component adds its rows,
+    ``component`` is its name and ``handles`` maps its port names to handles.
+    """
+
+    ambient: Ambient
+    fluid: "Fluid | None" = None
+    component: str = ""
+    handles: Mapping[str, int] = field(default_factory=dict)
+    partners: Mapping[str, tuple["Component", ...]] = field(default_factory=dict)
+    bodies: list[BodyRow] = field(default_factory=list)
+    elements: list[ElementRow] = field(default_factory=list)
+    branches: list[BranchRow] = field(default_factory=list)
+    nodes: dict[int, NodeRow] = field(default_factory=dict)
+    walls: list[WallRow] = field(default_factory=list)
+    interfaces: list[InterfaceRow] = field(default_factory=list)
+    lines: list[LineRow] = field(default_factory=list)
+
+    def port(self, name: str) -> int:
+        """Handle of the node that the port ``name`` of the present component is joined to.
+
+        Mechanical: the port of the body there, or :data:`GROUND`; hydraulic: the node.
+        """
+        return self.handles[name]
+
+    def partner(self, name: str) -> tuple["Component", ...]:
+        """Return the other components at the node of the port ``name``."""
+        return self.partners.get(name, ())
+
+    def body(self, body: "ReducedBody", ports: Sequence[str]) -> None:
+        """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
+        handles = tuple(self.handles[name] for name in ports)
+        self.bodies.append(BodyRow(component=self.component, body=body, ports=handles))
+
+    def element(
+        self,
+        step: StepFunction,
+        *,
+        ports: Sequence[int],
+        parameters: ArrayLike,
+        state: ArrayLike = (),
+        books: Sequence[Book] = (),
+        channels: Sequence[Channel] = (),
+        failures: Mapping[int, str] | None = None,
+        label: str = "",
+    ) -> None:
+        """Add something that pushes ports; its forces are recorded by component and port."""
+        self.elements.append(
+            ElementRow(
+                component=self.component,
+                label=label,
+                step=step,
+                ports=tuple(ports),
+                parameters=np.array(parameters, dtype=float),
+                state=np.array(state, dtype=float),
+                books=tuple(books),
+                channels=tuple(channels),
+                failures=failures or {},
+            )
+        )
+
+    def branch(
+        self,
+        step: StepFunction,
+        *,
+        a: int,
+        b: int,
+        parameters: ArrayLike,
+        ports: Sequence[int] = (),
+        state: ArrayLike = (),
+        books: Sequence[Book] = (),
+        channels: Sequence[Channel] = (),
+        failures: Mapping[int, str] | None = None,
+        label: str = "",
+    ) -> None:
+        """Add a flow between the nodes ``a`` and ``b``; its mass flow is recorded."""
+        self.branches.append(
+            BranchRow(
+                component=self.component,
+                label=label,
+                step=step,
+                a=a,
+                b=b,
+                ports=tuple(ports),
+                parameters=np.array(parameters, dtype=float),
+                state=np.array(state, dtype=float),
+                books=tuple(books),
+                channels=tuple(channels),
+                failures=failures or {},
+            )
+        )
+
+    def chamber(self, node: int, *, volume: float, pressure: float) -> None:
+        """Make a node a volume [m^3] with a start pressure [Pa]; adds to a volume already there."""
+        before = self.nodes.get(node)
+        self.nodes[node] = NodeRow(
+            component=self.component,
+            volume=volume + (before.volume if before else 0.0),
+            time=np.zeros(1),
+            pressure=np.array([pressure]),
+        )
+
+    def pressure(self, node: int, *, time: ArrayLike, pressure: ArrayLike) -> None:
+        """Prescribe the pressure [Pa] of a node over time [s], constant beyond the table."""
+        self.nodes[node] = NodeRow(
+            component=self.component,
+            volume=0.0,
+            time=np.array(time, dtype=float),
+            pressure=np.array(pressure, dtype=float),
+        )
+
+    def wall(self, node: int, port: int, area: float) -> None:
+        """Let a pressure push a port along +z over ``area`` [m^2] (negative: along -z)."""
+        self.walls.append(WallRow(component=self.component, node=node, port=port, area=area))
+
+    def interface(
+        self,
+        *,
+        upper: int,
+        lower: int,
+        gap: float,
+        law: "ContactLaw | None",
+        series_compliance: float = 0.0,
+        film: FilmRow | None = None,
+    ) -> None:
+        """Add a contact, a film, or both in parallel."""
+        self.interfaces.append(
+            InterfaceRow(
+                component=self.component,
+                upper=upper,
+                lower=lower,
+                gap=gap,
+                law=law,
+                series_compliance=series_compliance,
+                film=film,
+            )
+        )
+
+    def line(
+        self,
+        *,
+        a: int,
+        b: int,
+        delay: float,
+        impedance: float,
+        segments: int = 1,
+        resistance: float = 0.0,
+        unsteady_gain: ArrayLike = (),
+        unsteady_rate: ArrayLike = (),
+        vapour_pressure: float = 0.0,
+    ) -> None:
+        """Add a delay line; see :class:`LineRow`."""
+        self.lines.append(
+            LineRow(
+                component=self.component,
+                a=a,
+                b=b,
+                delay=delay,
+                impedance=impedance,
+                segments=segments,
+                resistance=resistance,
+                unsteady_gain=np.array(unsteady_gain, dtype=float),
+                unsteady_rate=np.array(unsteady_rate, dtype=float),
+                vapour_pressure=vapour_pressure,
+            )
+        )

@@ -1,0 +1,141 @@
+r"""The one signature of everything that acts in a time step, compiled or in plain Python.
+
+A component hands the solver functions ``step(par, state, inp, out) -> status``; all four are
+pointers to ``float64``.
+
+===========  =====================================================================================
+``par``      constants that the component chose
+``state``    its state at the start of the step; never written
+``inp``      element: ``t, h, y0, y1`` and ``y0, y1`` of further ports;
+             branch: ``t, h, p_a, p_b, rho_a, rho_b``, then ``y0, y1`` of each mechanical port
+``out``      element: ``forces | next state | books``;
+             branch: ``mdot, dmdot/dp_a, dmdot/dp_b | forces | next state | books``
+===========  =====================================================================================
+
+``t`` [s] is the start of the step and ``h`` [s] its length; ``y0`` and ``y1`` [m] are the
+displacements of a port at both ends of the step, along +z.  A force [N] is the mean over the step,
+positive along +z, *on the body*: the work done on the body is exactly ``F (y1 - y0)``.  Pressures
+[Pa] are absolute, densities [kg/m^3] belong to them, both *at the end* of the step (implicit); the
+mass flow ``mdot`` [kg/s] runs from a to b.
+
+Books [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
+outside during it; a *loss* what was turned into heat.  An element must satisfy, to round-off,
+``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch books only what it stores and
+supplies; the solver books the rest of the hydraulic power as its loss.
+
+The solver calls a function several times in a step, with better and better ``y1`` and pressures,
+and takes over the next state of the last call.  Before the first step it calls once with ``h = 0``
+and ``y0 = y1``: then only the stores are read; nothing may be divided by ``h``.  Status 0 is
+success; any other number stops the run, and the component says in words what it means.
+"""
+
+import ctypes
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+__all__ = ["STEP", "StepFunction", "evaluate", "pointer", "python_step", "step_function"]
+
+_POINTER = types.CPointer(types.float64)
+STEP = types.int64(_POINTER, _POINTER, _POINTER, _POINTER)
+"""Signature of all step functions."""
+
+StepFunction = Any
+"""What :func:`step_function` and :func:`python_step` return."""
+
+PythonStep = Callable[
+    [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    int | None,
+]
+
+# the solver keeps its functions in a table, which numba still calls an experiment
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
+
+def step_function(function: Callable[..., int]) -> StepFunction:
+    """Compile a step function; it may call other compiled functions and index its pointers."""
+    return njit(STEP, cache=True, error_model="numpy")(function)
+
+
+@intrinsic
+def pointer(typingctx: Any, array: Any, offset: Any) -> Any:
+    """Pointer to ``array[offset]``, in compiled code."""
+    signature = _POINTER(array, offset)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        view = context.make_array(sig.args[0])(context, builder, args[0])
+        return builder.gep(view.data, [args[1]])
+
+    return signature, codegen
+
+
+Vector = NDArray[np.float64]
+
+
+@njit(cache=True)
+def _call(table: Any, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
+    return int(table[0](pointer(par, 0), pointer(state, 0), pointer(inp, 0), pointer(out, 0)))
+
+
+def evaluate(
+    step: StepFunction, parameters: Any, state: Any, inputs: Any, outputs: int
+) -> tuple[int, Vector]:
+    """Call a step function once from Python: its status and ``out``; for tests and pictures."""
+    arrays = [np.array([*values, 0.0], dtype=float) for values in (parameters, state, inputs)]
+    out = np.zeros(outputs)
+    return _call((step,), *arrays, out), out
+
+
+class _PythonStep(types.WrapperAddressProtocol):
+    """A Python function behind a C address, so that it can stand in the solver's table."""
+
+    def __init__(self, function: PythonStep, sizes: tuple[int, int, int, int]) -> None:
+        self.errors: list[BaseException] = []
+        pointer = ctypes.POINTER(ctypes.c_double)
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int64, pointer, pointer, pointer, pointer)
+
+        def call(*addresses: Any) -> int:
+            arrays = [
+                np.ctypeslib.as_array(address, (size,))
+                for address, size in zip(addresses, sizes, strict=True)
+            ]
+            for array in arrays[:3]:
+                array.flags.writeable = False
+            try:
+                return int(function(*arrays) or 0)
+            except BaseException as error:  # an exception cannot pass through the compiled loop
+                self.errors.append(error)
+                return -1
+
+        self._callback = prototype(call)
+
+    def __wrapper_address__(self) -> int:
+        address = ctypes.cast(self._callback, ctypes.c_void_p).value
+        assert address is not None
+        return address
+
+    def signature(self) -> Any:
+        """Tell numba the signature."""
+        return STEP
+
+
+def python_step(
+    function: PythonStep, *, parameters: int, states: int, inputs: int, outputs: int
+) -> StepFunction:
+    """Let a plain Python function act in the time loop: about 2 us per call.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(par, state, inp, out)`` with numpy arrays, the first three read-only; writes
+        ``out`` and returns a status or None.  An exception stops the run and is raised again.
+    parameters, states, inputs, outputs : int
+        Lengths of the arrays; see the module text for their contents.
+    """
+    return _PythonStep(function, (parameters, states, inputs, outputs))

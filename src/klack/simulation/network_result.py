@@ -1,0 +1,159 @@
+"""What a run of a network leaves behind: channels, impacts, books, and the state to go on from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ChannelData", "EnergyBooks", "ImpactEvent", "InterfaceRecord", "NetworkResult"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ChannelData:
+    """One recorded quantity.
+
+    Parameters
+    ----------
+    unit : str
+        SI.
+    values : array, shape (n,)
+        At :attr:`NetworkResult.time`; forces and flows are means over the record before.
+    """
+
+    unit: str
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceRecord:
+    """Every fine step in which an interface carried force.
+
+    Parameters
+    ----------
+    time : array, shape (k,) [s]
+        Start of the step.
+    step : array, shape (k,) [s]
+    contact_force, film_force : array, shape (k,) [N]
+        Means over the step, above zero when they press; a film may pull.
+    gap : array, shape (k,) [m]
+        At the end of the step, negative when closed; of the bodies, without the series compliance.
+    complete : bool
+        False when the memory set aside was too small: the latest steps are missing.
+    """
+
+    time: NDArray[np.float64]
+    step: NDArray[np.float64]
+    contact_force: NDArray[np.float64]
+    film_force: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    complete: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImpactEvent:
+    """One impact: contacts closer together than the longest period of the needle are one.
+
+    Parameters
+    ----------
+    stop : str
+        Component of the interface.
+    time : float [s]
+        First touch.
+    approach_speed : float [m/s]
+        Relative speed of the centres of mass at first touch.
+    peak_force : float [N]
+        Of contact and film together.
+    peak_time : float [s]
+    contact_time : float [s]
+        Closed, all contacts of the impact together.
+    separation_time : float [s]
+        End of the last contact; nan if it stays closed to the end of the run.
+    impulse : float [N s]
+        Of contact and film.
+    restitution : float [-]
+        ``-v_after / v_before`` of the centres of mass; nan without separation.
+    energy_loss : float [J]
+        Kinetic energy of the centre of mass before less after; nan without separation.
+    """
+
+    stop: str
+    time: float
+    approach_speed: float
+    peak_force: float
+    peak_time: float
+    contact_time: float
+    separation_time: float
+    impulse: float
+    restitution: float
+    energy_loss: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EnergyBooks:
+    """Energy over the whole run [J], every entry named ``<component> <label>``.
+
+    ``supplies - losses = stores_after - stores_before + residual``.
+    """
+
+    supplies: Mapping[str, float]
+    losses: Mapping[str, float]
+    stores_before: Mapping[str, float]
+    stores_after: Mapping[str, float]
+
+    @property
+    def residual(self) -> float:
+        """What does not balance [J]."""
+        change = sum(self.stores_after.values()) - sum(self.stores_before.values())
+        return sum(self.supplies.values()) - sum(self.losses.values()) - change
+
+    @property
+    def throughput(self) -> float:
+        """Larger of what came in and what was spent or stored [J]: the scale of the residual."""
+        rises = {key: self.stores_after[key] - self.stores_before[key] for key in self.stores_after}
+        incoming = [*self.supplies.values(), *(-x for x in self.losses.values())]
+        incoming += [-x for x in rises.values()]
+        return sum(x for x in incoming if x > 0.0)
+
+    @property
+    def relative_residual(self) -> float:
+        """Residual over throughput [-]."""
+        return abs(self.residual) / self.throughput if self.throughput > 0.0 else 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NetworkResult:
+    """Everything that a run of a network leaves behind.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Records, evenly spaced from the start.
+    channels : mapping of str to ChannelData
+        ``"<component> <label>"``, for example ``"needle velocity"`` (centre of mass),
+        ``"needle.tip displacement"``, ``"seat contact force"``, ``"seat film force"``,
+        ``"seat gap"``, ``"coil current"``, ``"sac pressure"``, ``"spring.end force"``.
+    interfaces : mapping of str to InterfaceRecord
+        By component.
+    events : tuple of ImpactEvent
+        In order of time.
+    books : EnergyBooks
+    step : float [s]
+        Fine step.
+    fine_steps, coarse_steps : int
+    wall_time : float [s]
+        Of the time loop.
+    state : mapping of str to array
+        Everything needed to go on: the run continues to the same bits.
+    """
+
+    time: NDArray[np.float64]
+    channels: Mapping[str, ChannelData]
+    interfaces: Mapping[str, InterfaceRecord]
+    events: tuple[ImpactEvent, ...]
+    books: EnergyBooks
+    step: float
+    fine_steps: int
+    coarse_steps: int
+    wall_time: float
+    state: Mapping[str, NDArray[np.generic]]
