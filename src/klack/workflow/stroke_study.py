@@ -1,0 +1,267 @@
+"""What one stroke study leaves behind: the same valve in several variants, side by side.
+
+The numbers are plain arrays and small frozen records, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
+from klack.workflow.study import BodySummary
+
+__all__ = [
+    "FluidSummary",
+    "LineSummary",
+    "StopSummary",
+    "StrokeChannels",
+    "StrokeStudy",
+    "StrokeVariant",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FluidSummary:
+    """The fluid at its working temperature.
+
+    Parameters
+    ----------
+    name : str
+    temperature : float [K]
+    pressure : float [Pa]
+        Absolute, at which the numbers below hold: the highest start pressure of the valve.
+    density : float [kg/m^3]
+    bulk_modulus : float [Pa]
+        With its entrained gas.
+    sound_speed : float [m/s]
+    viscosity : float [Pa s]
+        Dynamic.
+    vapour_pressure : float [Pa]
+        Absolute.
+    """
+
+    name: str
+    temperature: float
+    pressure: float
+    density: float
+    bulk_modulus: float
+    sound_speed: float
+    viscosity: float
+    vapour_pressure: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineSummary:
+    """One line of the valve.
+
+    Parameters
+    ----------
+    name : str
+        Component.
+    length : float [m]
+    sound_speed : float [m/s]
+        Of its waves, with the elasticity of the wall.
+    echo_time : float [s]
+        ``2 L / a``: spacing of the stairs in pressure and rebound velocity.
+    """
+
+    name: str
+    length: float
+    sound_speed: float
+    echo_time: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StopSummary:
+    """One end stop: its surfaces, static contact and local law.
+
+    Parameters
+    ----------
+    name : str
+        Component of the network, for example ``"seat"``.
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``; empty for a stop without surfaces.
+    kind : str
+        ``"consistent"`` if the law was computed, else the kind that the case gives.
+    gap : float [m]
+        At the start; of the opening stop, the lift.
+    film : bool
+        Whether a squeeze film acts beside the contact.
+    indentation, force : array, shape (k,) [m], [N]
+        Local law; empty for a law that is given.
+    share : array, shape (k,) [-]
+        Share of the static compliance that the law carries, at each force.
+    approach, static_force, area : array, shape (n,) [m], [N], [m^2]
+        Static contact of the two full bodies, from first touch.
+    pattern_force : float [N]
+        Force whose pressure pattern the ports carry; nan for a law that is given.
+    half_width : float [m]
+        Of the contact at that force.
+    size_ratio : float [-]
+        Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    """
+
+    name: str
+    surfaces: str
+    kind: str
+    gap: float
+    film: bool
+    indentation: NDArray[np.float64]
+    force: NDArray[np.float64]
+    share: NDArray[np.float64]
+    approach: NDArray[np.float64]
+    static_force: NDArray[np.float64]
+    area: NDArray[np.float64]
+    pattern_force: float
+    half_width: float
+    size_ratio: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class StrokeChannels:
+    """Names of the channels that tell the story of a stroke, in every variant that has them.
+
+    Parameters
+    ----------
+    lift : str
+        Displacement of the port at which the lift is measured, for example
+        ``"needle.tip displacement"``; ``lift_velocity`` is its rate.
+    velocity : str
+        Of the centre of mass of the needle.
+    voltage, current, magnetic_force : tuple of str
+        One per solenoid.
+    pressures, flows : tuple of str
+    opening_stop, seat : str
+        Components of the two stops; empty if the valve has none.
+    """
+
+    lift: str
+    lift_velocity: str
+    velocity: str
+    voltage: tuple[str, ...]
+    current: tuple[str, ...]
+    magnetic_force: tuple[str, ...]
+    pressures: tuple[str, ...]
+    flows: tuple[str, ...]
+    opening_stop: str
+    seat: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StrokeVariant:
+    """One run of the valve.
+
+    Parameters
+    ----------
+    name : str
+        ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
+    label : str
+        What a legend says, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
+    wet, flexible : bool
+    modes : int
+        Degrees of freedom of all bodies.
+    opening_time : float [s]
+        From the start of the run to the first touch of the opening stop; nan if never.
+    closing_time : float [s]
+        From the start of the run to the first touch of the seat after that (after the needle
+        left it, if it never reached the opening stop); nan if never.
+    result : NetworkResult
+    setup_time : float [s]
+        Wall time of everything before the time loop that is this variant's own.
+    """
+
+    name: str
+    label: str
+    wet: bool
+    flexible: bool
+    modes: int
+    opening_time: float
+    closing_time: float
+    result: NetworkResult
+    setup_time: float
+
+    def impacts(self, stop: str, *, slowest: float = 0.0) -> tuple[ImpactEvent, ...]:
+        """Impacts on one stop, faster than ``slowest`` [m/s], in order of time."""
+        return tuple(
+            event
+            for event in self.result.events
+            if event.stop == stop and event.approach_speed >= slowest
+        )
+
+    def channel(self, name: str) -> ChannelData | None:
+        """Return a recorded channel; None if this variant has none of this name."""
+        return self.result.channels.get(name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StrokeStudy:
+    """All variants of one actuation, side by side.
+
+    Parameters
+    ----------
+    case, title, description, case_text : str
+    version : str
+        Of klack; ``versions`` holds those of the libraries.
+    created : str
+        ISO 8601.
+    wall_time : float [s]
+        Of the whole study.
+    stage_times : mapping of str to float [s]
+    needle : str
+        Component of the body that moves.
+    lift : float [m]
+        Travel from the seat to the opening stop, both unloaded.
+    switch_off : float [s]
+        When the drivers' command ends; nan if no driver says.
+    duration, step : float [s]
+    variants : mapping of name to StrokeVariant
+        The first one is the one to compare with.
+    channels : StrokeChannels
+    bodies : tuple of BodySummary
+        Their ``compliance_share`` is the smallest of all contact ports.
+    stops : tuple of StopSummary
+    fluid : FluidSummary or None
+        None for a case without fluid.
+    lines : tuple of LineSummary
+    warnings : tuple of str
+    """
+
+    case: str
+    title: str
+    description: str
+    case_text: str
+    version: str
+    versions: Mapping[str, str]
+    created: str
+    wall_time: float
+    stage_times: Mapping[str, float]
+    needle: str
+    lift: float
+    switch_off: float
+    duration: float
+    step: float
+    variants: Mapping[str, StrokeVariant]
+    channels: StrokeChannels
+    bodies: tuple[BodySummary, ...]
+    stops: tuple[StopSummary, ...]
+    fluid: FluidSummary | None = None
+    lines: tuple[LineSummary, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def reference(self) -> StrokeVariant:
+        """First variant: the one that the others are compared with."""
+        return next(iter(self.variants.values()))
+
+    @property
+    def opening_time(self) -> float:
+        """Opening time of the reference [s]."""
+        return self.reference.opening_time
+
+    @property
+    def closing_time(self) -> float:
+        """Closing time of the reference [s]."""
+        return self.reference.closing_time
