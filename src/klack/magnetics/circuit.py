@@ -1,0 +1,166 @@
+r"""A magnetic circuit as branches and loops: what a solenoid is before any time passes.
+
+Branch fluxes follow from loop fluxes, :math:`\varphi_b = C\,\varphi`; each loop balances
+
+.. math:: C^T\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b} + S_b\,\dot\varphi_b - N_b\, i\bigr] = 0 ,
+
+and the coil sees the linkage :math:`\psi = N_b^T C \varphi`.  ``x`` is the working gap, one number
+for the whole circuit; ``C`` is :attr:`MagneticCircuit.loops`.  Loop fluxes as unknowns satisfy
+Kirchhoff's node law by construction, and make the stored energy a convex function of the unknowns.
+
+Limits: lumped flux tubes, no hysteresis (a constant magnetomotive force stands for remanence),
+one coil, one moving direction.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, require_nonnegative
+from klack.magnetics.reluctance import GapReluctance, LinearReluctance, ReluctanceLaw
+
+__all__ = ["MOST_LOOPS", "BranchKind", "MagneticBranch", "MagneticCircuit"]
+
+MOST_LOOPS = 6
+"""Most loops that the compiled time step solves."""
+
+BranchKind = Literal["linear", "gap", "iron"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MagneticBranch:
+    r"""One flux tube: :math:`\Theta = \Theta_b(\varphi, x) - \Theta_0 + S\,\dot\varphi - N i`.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"main gap"`` or ``"leakage"``.
+    law : LinearReluctance, GapReluctance or IronReluctance
+        :math:`\Theta_b` as callables (``law.mmf``, ``law.slope``, ``law.energy``,
+        ``law.energy_slope``, each of flux and gap) and as flat numbers (``law.table()``): ``[R]``
+        or piecewise cubics with six numbers per interval, see :mod:`klack.magnetics.reluctance`.
+    eddy : float [S]
+        ``S``: eddy currents around the tube oppose its change with the mmf ``S dflux/dt``
+        (``1/R_e`` of a shorted turn); the loss is ``S (dflux/dt)^2``.
+    turns : float [-]
+        ``N``: turns of the coil around this branch, signed by the direction of the branch.
+    remanence : float [A]
+        :math:`\Theta_0`: constant magnetomotive force along the branch (remanence of the iron, a
+        magnet).  It belongs to the stored energy: ``law.energy - remanence * flux``.
+    """
+
+    name: str
+    law: ReluctanceLaw
+    eddy: float = 0.0
+    turns: float = 0.0
+    remanence: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_nonnegative(f"MagneticBranch '{self.name}': eddy", self.eddy, "S")
+
+    @property
+    def kind(self) -> BranchKind:
+        """Which of the three laws the branch has."""
+        if isinstance(self.law, LinearReluctance):
+            return "linear"
+        return "gap" if isinstance(self.law, GapReluctance) else "iron"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MagneticCircuit:
+    """Branches, and the loops through them.
+
+    Parameters
+    ----------
+    branches : tuple of MagneticBranch
+    loops : array, shape (n_branches, n_loops) [-]
+        0, +1 or -1: ``branch flux = loops @ loop fluxes``.  Independent columns, at most
+        :data:`MOST_LOOPS`.
+    main : str
+        Branch whose flux is shown as *the* flux: usually the working gap.
+    """
+
+    branches: tuple[MagneticBranch, ...]
+    loops: NDArray[np.int64]
+    main: str
+
+    def __post_init__(self) -> None:
+        loops = np.array(self.loops, dtype=np.int64)
+        object.__setattr__(self, "loops", loops)
+        rows, columns = loops.shape if loops.ndim == 2 else (0, 0)
+        if rows != len(self.branches) or not 1 <= columns <= MOST_LOOPS:
+            raise InputError(
+                "MagneticCircuit.loops",
+                got=f"shape {loops.shape} for {len(self.branches)} branches",
+                expected=f"one row per branch and 1 to {MOST_LOOPS} columns",
+                hint="write +1 or -1 where a loop runs through a branch, else 0.",
+            )
+        if np.any(np.abs(loops) > 1) or np.linalg.matrix_rank(loops) < columns:
+            raise InputError(
+                "MagneticCircuit.loops",
+                got=f"{loops.tolist()}",
+                expected="independent columns of 0, +1 and -1",
+                hint="drop the loop that is a sum of others.",
+            )
+        names = [branch.name for branch in self.branches]
+        if self.main not in names or len(set(names)) < len(names):
+            raise InputError(
+                "MagneticCircuit.branches",
+                got=f"the names {', '.join(names)} and the main branch '{self.main}'",
+                expected="different names, among them the main branch",
+                hint="rename a branch.",
+            )
+        if not np.any(loops.T @ self.turns):
+            raise InputError(
+                "MagneticCircuit.branches",
+                got="no loop around turns of the coil",
+                expected="at least one branch with turns in a loop",
+                hint="give the branch through the coil its number of turns.",
+            )
+
+    @property
+    def turns(self) -> NDArray[np.float64]:
+        """Turns of the coil per branch, shape (n_branches,) [-]."""
+        return np.array([branch.turns for branch in self.branches], dtype=float)
+
+    @property
+    def loop_turns(self) -> NDArray[np.float64]:
+        """Turns of the coil per loop, shape (n_loops,): ``linkage = loop_turns @ loop fluxes``."""
+        return np.asarray(self.loops.T @ self.turns, dtype=float)
+
+    @property
+    def eddy(self) -> NDArray[np.float64]:
+        """Eddy conductance per branch, shape (n_branches,) [S]."""
+        return np.array([branch.eddy for branch in self.branches], dtype=float)
+
+    @property
+    def remanence(self) -> NDArray[np.float64]:
+        """Constant magnetomotive force per branch, shape (n_branches,) [A]."""
+        return np.array([branch.remanence for branch in self.branches], dtype=float)
+
+    def branch_index(self, name: str) -> int:
+        """Position of a branch."""
+        return [branch.name for branch in self.branches].index(name)
+
+    def mmf(self, fluxes: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+        """Magnetomotive force of each branch [A] at branch fluxes [Wb], without eddy currents."""
+        pairs = zip(self.branches, fluxes, strict=True)
+        return np.array([float(b.law.mmf(f, gap)) - b.remanence for b, f in pairs])
+
+    def slope(self, fluxes: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+        """Differential reluctance of each branch [A/Wb] at branch fluxes [Wb]."""
+        return np.array(
+            [float(b.law.slope(f, gap)) for b, f in zip(self.branches, fluxes, strict=True)]
+        )
+
+    def energy(self, fluxes: NDArray[np.float64], gap: float) -> float:
+        """Stored energy [J] at branch fluxes [Wb]."""
+        pairs = zip(self.branches, fluxes, strict=True)
+        return float(sum(float(b.law.energy(f, gap)) - b.remanence * f for b, f in pairs))
+
+    def force(self, fluxes: NDArray[np.float64], gap: float) -> float:
+        """Force along the working gap, -dW/dx at constant flux [N]; negative closes the gap."""
+        pairs = zip(self.branches, fluxes, strict=True)
+        return -float(sum(float(b.law.energy_slope(f, gap)) for b, f in pairs))
