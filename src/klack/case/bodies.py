@@ -1,0 +1,279 @@
+"""Materials, bodies and their reduction: the parts that every kind of case shares."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from klack.case.geometry import Geometry, MeshSettings, Support
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Count, Name, Section, Text
+from klack.materials import Material
+from klack.units import Density, Frequency, Pressure, Rate, Ratio, Time
+
+__all__ = [
+    "BodyDamping",
+    "BodySurface",
+    "CaseBody",
+    "CaseFile",
+    "CaseMaterial",
+    "ModeChoice",
+    "RayleighCoefficients",
+    "Reduction",
+    "SurfaceName",
+]
+
+
+class SurfaceName(NamedTuple):
+    """A surface of a body, written ``needle.tip``."""
+
+    body: str
+    surface: str
+
+    def __str__(self) -> str:
+        return f"{self.body}.{self.surface}"
+
+
+def _surface_name(value: Any) -> SurfaceName:
+    if isinstance(value, SurfaceName):
+        return value
+    body, dot, surface = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if not (body and dot and surface):
+        hint = "join the names of the body and of its surface with a point."
+        raise CaseProblem((), got=f"'{value}'", expected="text such as needle.tip", hint=hint)
+    return SurfaceName(body, surface)
+
+
+BodySurface = Annotated[
+    SurfaceName,
+    BeforeValidator(_surface_name),
+    WithJsonSchema({"type": "string", "pattern": r"^[^.]+\..+$", "examples": ["needle.tip"]}),
+]
+
+
+class CaseMaterial(Section):
+    """Isotropic linear elastic material."""
+
+    young: Pressure = Field(gt=0, description="Young's modulus; steel 210 GPa.")
+    poisson: Ratio = Field(gt=-1, lt=0.5, description="Poisson's ratio; steel 0.3.")
+    density: Density = Field(gt=0, description="Density; steel 7850 kg/m^3.")
+
+
+class RayleighCoefficients(Section):
+    """Damping matrix alpha M + beta K."""
+
+    alpha: Rate = Field(default=0.0, ge=0, description="Share of the mass matrix.")
+    beta: Time = Field(default=0.0, ge=0, description="Share of the stiffness matrix.")
+
+
+class BodyDamping(Section):
+    """Material and mounting losses: exactly one of the three."""
+
+    loss_factor: Ratio | None = Field(
+        default=None, ge=0, lt=1, description="eta; modal ratio eta / 2."
+    )
+    modal: Ratio | None = Field(
+        default=None, ge=0, lt=1, description="Damping ratio of every mode."
+    )
+    rayleigh: RayleighCoefficients | None = Field(default=None, description="alpha M + beta K.")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        self._exactly_one(("loss_factor", "modal", "rayleigh"), "how the body is damped")
+        return self
+
+
+class CaseBody(Section):
+    """An elastic body."""
+
+    geometry: Geometry = Field(description="Shape: profile, step or mesh.")
+    material: Name | dict[Name, Name] = Field(
+        description="Name of a material, or solid: material for a body of several."
+    )
+    mesh: MeshSettings | None = Field(
+        default=None, description="Element sizes; needed unless the geometry is a finished mesh."
+    )
+    fixed: tuple[Support, ...] | None = Field(
+        default=None, min_length=1, description="Held surfaces; none: the body is free."
+    )
+    damping: BodyDamping = Field(
+        default=BodyDamping(loss_factor=0.0), description="Losses inside the body; none by default."
+    )
+
+    @field_validator("material", mode="before")
+    @classmethod
+    def _material_names(cls, value: Any) -> Any:
+        pairs = value.items() if isinstance(value, Mapping) else [((), value)]
+        for key, name in pairs:
+            if not isinstance(name, str):
+                raise CaseProblem(
+                    (key,) if isinstance(key, str) else (),
+                    got=f"'{name}'",
+                    expected="the name of a material, or a mapping solid: material",
+                    hint="the properties belong into 'materials'; give their name here.",
+                )
+        return dict(value) if isinstance(value, Mapping) else value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.geometry.mesh is not None:
+            self._refuse_with(("mesh",), "a finished mesh", "its elements are there already")
+        elif self.mesh is None:
+            hint = "start with a tenth of the body's length for 'size'."
+            raise CaseProblem((), got="no key 'mesh'", expected="mesh: {size: ...}", hint=hint)
+        if self.geometry.dimension == 2:
+            for i, support in enumerate(self.fixed or ()):
+                if support.sectors is not None:
+                    raise CaseProblem(
+                        ("fixed", i, "sectors"),
+                        got="sectors on an axisymmetric body",
+                        expected="a support all round",
+                        hint="remove 'sectors', or take 'model: swept' with 'layers: 18'.",
+                        on_key=True,
+                    )
+        return self
+
+
+class ModeChoice(Section):
+    """Which elastic modes a body keeps: exactly one of count, frequency and participation."""
+
+    count: Count | None = Field(default=None, description="The so many lowest elastic modes.")
+    frequency: Frequency | None = Field(
+        default=None, gt=0, description="All elastic modes up to here."
+    )
+    participation: Count | None = Field(
+        default=None,
+        description="The so many modes of a pool with the largest share of compliance.",
+    )
+    pool: Count | None = Field(
+        default=None, description="Modes to choose from, with participation."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _some_modes(cls, value: Any) -> Any:
+        for key in ("count", "participation", "pool"):
+            if isinstance(value, Mapping) and value.get(key) == 0:
+                raise CaseProblem(
+                    (key,),
+                    got="0 modes",
+                    expected="1 or more",
+                    hint="a rigid body is the level 'lumped'; 20 modes are a good start here.",
+                )
+        return value
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        kind = self._exactly_one(("count", "frequency", "participation"), "which modes to keep")
+        if kind != "participation":
+            return self._refuse_with(("pool",), kind, "only participation chooses from a pool")
+        if self.pool is None or self.participation is None or self.pool < self.participation:
+            raise CaseProblem(
+                ("pool",) if self.pool is not None else (),
+                got=f"a pool of {self.pool or 'no'} modes for {self.participation}",
+                expected=f"pool: {self.participation} or more",
+                hint="pool: 100 finds what matters in most bodies.",
+            )
+        return self
+
+
+class Reduction(Section):
+    """How the bodies are reduced."""
+
+    correction: Literal["consistent", "attachment", "none"] = Field(
+        default="consistent",
+        description="What makes up for the modes left out. consistent: the local law carries their "
+        "compliance; attachment: attachment modes, as usual; none: nothing, for comparison.",
+    )
+    modes: Mapping[Name, ModeChoice] = Field(
+        default_factory=dict, description="Kept modes of each body; 40 where none is given."
+    )
+
+    def choice(self, body: str) -> ModeChoice:
+        """Modes to keep of one body."""
+        return self.modes.get(body, ModeChoice(count=40))
+
+
+class CaseFile(Section):
+    """What every case has: a title, materials, elastic bodies, and the file that it came from."""
+
+    klack: Literal[1] = Field(description="Format version of the file: 1.")
+    title: Text = Field(min_length=1, description="One line.")
+    description: Text = Field(
+        default="", description="What it shows and where the numbers come from."
+    )
+    materials: Mapping[Name, CaseMaterial] = Field(min_length=1, description="name: properties.")
+    bodies: Mapping[Name, CaseBody] = Field(description="name: body.")
+
+    _path: Path | None = PrivateAttr(None)
+    _source: str = PrivateAttr("")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Remember the file that the case was read from."""
+        if context:
+            self._path, self._source = context.get("path"), context.get("source", "")
+
+    @field_validator("klack", mode="before")
+    @classmethod
+    def _known_version(cls, version: Any) -> Any:
+        if isinstance(version, bool) or version != 1:
+            raise CaseProblem(
+                (),
+                got=f"the format version {version}",
+                expected="1",
+                hint="this klack reads version 1; a later klack may know others.",
+            )
+        return version
+
+    @property
+    def path(self) -> Path | None:
+        """File that the case was read from; None for one made in Python."""
+        return self._path
+
+    @property
+    def folder(self) -> Path:
+        """Folder of that file."""
+        return self._path.parent if self._path is not None else Path.cwd()
+
+    @property
+    def source(self) -> str:
+        """Text of that file."""
+        return self._source
+
+    @property
+    def name(self) -> str:
+        """Short name: of the file, or of its folder if the file is just called ``case.yaml``."""
+        if self._path is None:
+            return "case"
+        return self._path.resolve().parent.name if self._path.stem == "case" else self._path.stem
+
+    def materials_of(self, body: str, solids: Iterable[str]) -> dict[str, Material]:
+        """Material of each solid of a body, as the finite elements need it.
+
+        Raises :class:`InputError` for a solid that the case gives no material.
+        """
+        chosen = self.bodies[body].material
+        result = {}
+        for solid in solids:
+            if not isinstance(chosen, str) and solid not in chosen:
+                raise InputError(
+                    f"{self._path or 'case'}: bodies.{body}.material",
+                    got=f"no material for the solid '{solid}'",
+                    expected=f"one for each solid (given: {one_of(chosen)})",
+                    hint=nearest(solid, chosen, f"add '{solid}: ...' there."),
+                )
+            name = chosen if isinstance(chosen, str) else chosen[solid]
+            data = self.materials[name]
+            result[solid] = Material(
+                name=name, young=data.young, poisson=data.poisson, density=data.density
+            )
+        return result
