@@ -38,9 +38,29 @@ class Component(Section):
         except ValidationError as error:
             raise _first_problem(type(self).__name__, error) from None
 
+    # pydantic's mark of an ordinary constructor: else reading a file would lose its context, and
+    # with it the demand for units
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
     def port_kinds(self) -> Mapping[str, Port]:
         """Return the ports of this component."""
         return self.ports
+
+    def dry(self) -> "Component | None":
+        """Return this part without any fluid; None if nothing is left of it.
+
+        Whatever has a hydraulic port goes, a section ``film`` goes, all else stays.
+        """
+        if any(port.domain == "hydraulic" for port in self.port_kinds().values()):
+            return None
+        return self.model_copy(update={"film": None}) if hasattr(self, "film") else self
+
+    def lumped(self, stiffness: float, restitution: float | None) -> "Component | None":
+        """Return this part of the lumped baseline; None becomes ground.
+
+        Bodies become rigid, an end stop one spring [N/m] and one dashpot; all else stays.
+        """
+        return self
 
     @abstractmethod
     def add_rows(self, rows: Rows) -> None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from klack.reduction.reduced_body import ReducedBody
 
 __all__ = [
+    "AMBIENT",
     "GROUND",
     "Ambient",
     "BodyRow",
@@ -37,6 +38,9 @@ __all__ = [
 
 GROUND = -1
 """Handle of the immovable ground as a mechanical port."""
+
+AMBIENT = 0
+"""Handle of the surroundings as a hydraulic node; always there when anything is hydraulic."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +79,14 @@ class Channel:
 class BodyRow:
     """A body in modal form; ``ports`` are handles of its ``port_shapes`` columns, in order.
 
-    ``moving`` says that it is the armature and needle, whose lift is recorded.
+    ``speed`` [m/s] along +z is that of the whole free body at the start, undeformed: the rigid
+    modal velocities are ``speed * rigid_axial``.
     """
 
     component: str
     body: "ReducedBody"
     ports: tuple[int, ...]
+    speed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -234,7 +240,8 @@ class Rows:
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.
 
-        Mechanical: the port of the body there, or :data:`GROUND`; hydraulic: the node.
+        Mechanical: the port of the body there, or :data:`GROUND`; hydraulic: the node, or
+        :data:`AMBIENT`.  An optional port that is not joined is at the ground or the surroundings.
         """
         return self.handles[name]
 
@@ -242,10 +249,11 @@ class Rows:
         """Return the other components at the node of the port ``name``."""
         return self.partners.get(name, ())
 
-    def body(self, body: "ReducedBody", ports: Sequence[str]) -> None:
+    def body(self, body: "ReducedBody", ports: Sequence[str], speed: float = 0.0) -> None:
         """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
         handles = tuple(self.handles[name] for name in ports)
-        self.bodies.append(BodyRow(component=self.component, body=body, ports=handles))
+        row = BodyRow(component=self.component, body=body, ports=handles, speed=speed)
+        self.bodies.append(row)
 
     def element(
         self,
