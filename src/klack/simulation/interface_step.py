@@ -1,0 +1,349 @@
+r"""One time step of an interface: contact and squeeze film, parallel, in series with a compliance.
+
+With a constant force ``F`` over a step the modes move exactly, so the gap between the bodies ends
+at ``g1 = g_free + G F`` and the work taken from them is exactly ``-F (g1 - g0)``.  All laws act on
+the gap ``z = g + e`` between the surfaces; ``e`` is the compression of a massless series compliance
+``D``.  Contact force, film force and compression are discrete gradients (Gonzalez 1996):
+
+.. math::
+    F_c = \frac{V(-z_1) - V(-z_0)}{z_0 - z_1}\,\Bigl(1 + \chi\frac{z_0 - z_1}{h}\Bigr), \qquad
+    F_f = \max\Bigl(\frac{\Pi(z_1) - \Pi(z_0)}{h},\, -F_s\Bigr), \qquad
+    \theta e_1 + (1 - \theta) e_0 = D F,
+
+with the film impulse ``Pi(z) = cubic/(2 x^2) + linear ln(1/x)``, ``x = max(z, 0) + cut_off``.  Then
+
+.. math:: -F (g_1 - g_0) = \Delta V + \Delta\frac{e^2}{2D} + \text{contact loss} + \text{film loss}
+
+for every step size, and no loss is negative.  All of it is one equation for ``z1``, whose left side
+rises with a slope of 1 or more.
+
+``theta`` is 1/2 (second order, no loss) while the contact is closed.  While it is open, the
+compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
+1/2 would let ``e`` change its sign in every step for ever.  ``theta = 1 - D c / h`` is the smallest
+value that does not; without a film it is 1, and a compression left at release vanishes with its
+energy booked.
+"""
+
+from math import log
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from klack.contact.laws import LAW_LINEAR, LAW_TABLE
+from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
+
+__all__ = ["NO_LAW", "film_force", "interface_store", "solve_interface"]
+
+Vector = NDArray[np.float64]
+
+NO_LAW = -1
+"""``kind`` of an interface without a contact: only a film."""
+
+_LINEAR, _TABLE = LAW_LINEAR, LAW_TABLE
+_FORCE_LEFT = 1e-9  # [N] accepted error of a force
+_STEP_LEFT = 1e-17  # [m] Newton step that is round-off
+_UNKNOWN = 1e16  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-13 m
+_NEWTON_LIMIT = 100
+_SERIES = 0.05  # below it the logarithm is a short series
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def film_force(
+    cubic: float, linear: float, cut_off: float, h: float, z0: float, z1: float
+) -> float:
+    """Mean force [N] of a squeeze film whose gap goes from ``z0`` to ``z1`` [m] in ``h`` [s].
+
+    ``[Pi(z1) - Pi(z0)]/h``, without the subtraction; not yet limited by cavitation.
+    """
+    x0, x1 = max(z0, 0.0) + cut_off, max(z1, 0.0) + cut_off
+    closed = max(z0, 0.0) - max(z1, 0.0)
+    total = x0 + x1
+    product = x0 * x1
+    damping = 0.5 * cubic * total / (product * product)
+    if linear != 0.0:
+        r = closed / total
+        if abs(r) < _SERIES:
+            r2 = r * r
+            log_mean = 2.0 + r2 * (2 / 3 + r2 * (2 / 5 + r2 * (2 / 7 + r2 * (2 / 9 + r2 * 2 / 11))))
+            damping += linear * log_mean / total
+        else:
+            damping += linear * log(x0 / x1) / closed
+    return closed / h * damping
+
+
+@njit(cache=True, error_model="numpy")
+def interface_store(
+    kind: int, law_data: Vector, law_start: int, series: float, g: float, e: float
+) -> float:
+    """Energy [J] held by the contact law and the series compliance.
+
+    Parameters
+    ----------
+    kind, law_data, law_start
+        As in :func:`solve_interface`.
+    series : float [m/N]
+    g, e : float [m]
+        Gap of the bodies and compression of the series compliance.
+    """
+    stored = 0.0
+    if kind != NO_LAW:
+        stored = law_potential(kind, law_data, law_start, -(g + e))
+    if series > 0.0:
+        stored += 0.5 * e * e / series
+    return stored
+
+
+@njit(cache=True, error_model="numpy")
+def solve_interface(
+    kind: int,
+    law_data: Vector,
+    law_start: int,
+    chi_over_h: float,
+    cubic: float,
+    linear: float,
+    cut_off: float,
+    suction: float,
+    h: float,
+    G: float,
+    series: float,
+    g0: float,
+    g_free: float,
+    e0: float,
+    guess: float,
+    hint: int,
+) -> tuple[float, float, float, float, int, float, float]:
+    """Forces of an interface over one step, and where it ends.
+
+    A pure function: it may be called again for the same step with another ``g_free``.
+
+    Parameters
+    ----------
+    kind, law_data, law_start
+        A contact law as flat numbers, see :class:`klack.contact.laws.FlatLaw`, from
+        ``law_data[law_start]`` on; :data:`NO_LAW` for none.
+    chi_over_h : float [1/m]
+        Dissipation factor of Hunt and Crossley, ``alpha / (v0 h)``; 0 for an elastic law.
+    cubic, linear, cut_off, suction
+        Film, see :class:`klack.network.rows.FilmRow`; ``cubic = linear = 0`` for none.
+    h : float [s]
+        Step, above 0.
+    G : float [m/N]
+        Change of the gap at the end of the step by a unit force during it, above 0.
+    series : float [m/N]
+        Compliance in series; 0 for none.
+    g0, g_free : float [m]
+        Gap of the bodies at the start, and at the end without this interface's force.
+    e0 : float [m]
+        Compression of the series compliance at the start.
+    guess : float [N]
+        Total force, from the last step or sweep.
+    hint : int
+        Interval of a table law that was used last.
+
+    Returns
+    -------
+    contact_force, film_force : float [N]
+        Means over the step, above zero when they press the bodies apart.
+    g1, e1 : float [m]
+        Gap and compression at the end.
+    hint : int
+    contact_loss, film_loss : float [J]
+        What a compression that relaxes in the open contact loses belongs to the film, or, where
+        there is none, to the contact.
+    """
+    z0 = g0 + e0
+    filmed = cubic > 0.0 or linear > 0.0
+    theta = 0.5
+    S, base = G, g_free
+    if series > 0.0:
+        if z0 > 0.0 or (not filmed and z0 >= 0.0):
+            theta = _relaxing(filmed, cubic, linear, cut_off, h, series, z0, g_free - e0)
+        S = G + series / theta
+        base = g_free - (1.0 - theta) / theta * e0
+    if filmed:
+        contact, film, hint = _both(
+            kind,
+            law_data,
+            law_start,
+            chi_over_h,
+            cubic,
+            linear,
+            cut_off,
+            suction,
+            h,
+            S,
+            z0,
+            base,
+            guess,
+            hint,
+        )
+    else:
+        film = 0.0
+        contact, hint = _contact_alone(
+            kind, law_data, law_start, chi_over_h, S, z0, base, guess, hint
+        )
+        if contact == 0.0 and e0 != 0.0 and theta < 1.0:  # clipped damping: let e vanish
+            theta = 1.0
+            contact, hint = _contact_alone(
+                kind, law_data, law_start, chi_over_h, G + series, z0, g_free, 0.0, hint
+            )
+    force = contact + film
+    g1 = g_free + G * force
+    e1, relaxed = 0.0, 0.0
+    if series > 0.0:
+        e1 = (series * force - (1.0 - theta) * e0) / theta
+        relaxed = (theta - 0.5) * (e1 - e0) * (e1 - e0) / series
+    contact_loss, film_loss = 0.0, 0.0
+    if chi_over_h != 0.0:
+        contact_loss = _damping_loss(kind, law_data, law_start, chi_over_h, z0, g1 + e1, hint)
+    if filmed:
+        film_loss = film * (z0 - (g1 + e1)) + relaxed
+    else:
+        contact_loss += relaxed
+    return contact, film, g1, e1, hint, contact_loss, film_loss
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _relaxing(
+    filmed: bool,
+    cubic: float,
+    linear: float,
+    cut_off: float,
+    h: float,
+    series: float,
+    z0: float,
+    reach: float,
+) -> float:
+    """``theta`` of a step that starts open; falls to 1/2 as the step comes to close the gap."""
+    if not filmed:
+        return 1.0 if reach >= 0.0 else 0.5
+    x0 = z0 + cut_off
+    damping = (cubic / (x0 * x0) + linear) / x0
+    most = 0.5 - series * damping / h
+    if most <= 0.0:
+        return 0.5
+    return 0.5 + most * min(max(reach / z0, 0.0), 1.0)
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _contact_alone(
+    kind: int,
+    p: Vector,
+    start: int,
+    chi_over_h: float,
+    S: float,
+    z0: float,
+    base: float,
+    guess: float,
+    hint: int,
+) -> tuple[float, int]:
+    if kind == NO_LAW or (z0 >= 0.0 and base >= 0.0):
+        return 0.0, hint
+    if kind == _LINEAR and chi_over_h == 0.0:
+        return solve_linear(p[start], S, -z0, -base), hint
+    force, hint, _ = solve_step(kind, p, start, chi_over_h, S, -z0, -base, guess, hint)
+    return force, hint
+
+
+@njit(cache=True, error_model="numpy")
+def _both(
+    kind: int,
+    p: Vector,
+    start: int,
+    chi_over_h: float,
+    cubic: float,
+    linear: float,
+    cut_off: float,
+    suction: float,
+    h: float,
+    S: float,
+    z0: float,
+    base: float,
+    guess: float,
+    hint: int,
+) -> tuple[float, float, int]:
+    """Contact and film force: root ``z`` of ``excess = z - base - S (F_c + F_f) = 0``.
+
+    ``excess`` rises with a slope of 1 or more, so the root lies within ``|excess|`` of any ``z``.
+    A Newton step that would cross ``z = 0``, where the film ends with a kink, stops there: beyond
+    it ``excess`` is concave over ``z``, and Newton's method cannot fail from that end.
+    """
+    z = base + S * guess
+    low, high = -np.inf, np.inf
+    contact, film = 0.0, 0.0
+    for _ in range(_NEWTON_LIMIT):
+        contact, stiffness, curvature = 0.0, 0.0, 0.0
+        if (z0 < 0.0 or z < 0.0) and kind != NO_LAW:
+            contact, stiffness, curvature, hint = _contact(
+                kind, p, start, chi_over_h, z0, z, hint
+            )
+        film = film_force(cubic, linear, cut_off, h, z0, z)
+        pulled = film <= -suction
+        if pulled:
+            film = -suction
+        excess = z - base - S * (contact + film)
+        if not pulled and (z > 0.0 or (z == 0.0 and excess < 0.0)):
+            x = z + cut_off
+            damper = cubic / (x * x)
+            stiffness += (damper + linear) / (x * h)
+            curvature += (3.0 * damper + linear) / (x * x * h)
+        step = excess / (1.0 + S * stiffness)
+        after = z - step
+        crosses = z != 0.0 and (z > 0.0) != (after > 0.0)
+        released = pulled and step > 0.0
+        # taken without a look back, and before the bracket test: both its ends are round-off then
+        if abs(step) < _STEP_LEFT or (
+            curvature * step * step < _FORCE_LEFT and not crosses and not released
+        ):
+            film_step = 0.0
+            if not pulled and z > 0.0:
+                x = z + cut_off
+                film_step = (cubic / (x * x) + linear) / (x * h) * step
+            if film + film_step >= -suction:
+                contact_step = (stiffness * step - film_step) if stiffness > 0.0 else 0.0
+                return max(contact + contact_step, 0.0), film + film_step, hint
+        if excess > 0.0:
+            low, high = max(low, z - excess), z
+        else:
+            low, high = z, min(high, z - excess)
+        if crosses and low < 0.0 < high:
+            after = 0.0
+        if not low <= after <= high:
+            after = 0.5 * (low + high)
+        z = after
+    return contact, film, hint
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _contact(
+    kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z: float, hint: int
+) -> tuple[float, float, float, int]:
+    """Contact force, its slope over the indentation, its curvature, table interval."""
+    curvature = _UNKNOWN
+    if kind == _LINEAR and z0 <= 0.0 and z <= 0.0:
+        mean, slope = -0.5 * p[start] * (z0 + z), 0.5 * p[start]
+        curvature = 0.0 if chi_over_h == 0.0 else _UNKNOWN
+    else:
+        mean, slope, hint = mean_force(kind, p, start, -z0, -z, hint)
+    if chi_over_h == 0.0:
+        return mean, slope, curvature, hint
+    factor = 1.0 + chi_over_h * (z0 - z)
+    if factor <= 0.0:
+        return 0.0, 0.0, curvature, hint  # the law would pull
+    return mean * factor, slope * factor + mean * chi_over_h, curvature, hint
+
+
+@njit(cache=True, error_model="numpy")
+def _damping_loss(
+    kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z1: float, hint: int
+) -> float:
+    """Part of the work that the dissipation of Hunt and Crossley takes, never negative."""
+    if kind == NO_LAW or (z0 >= 0.0 and z1 >= 0.0):
+        return 0.0
+    mean, _, _ = mean_force(kind, p, start, -z0, -z1, hint)
+    stored = mean * (z0 - z1)
+    rate = chi_over_h * (z0 - z1)
+    if rate <= -1.0:
+        return -stored  # clipped: the store empties without doing work
+    return stored * rate
