@@ -1,32 +1,117 @@
-"""Fluids: see the class."""
+"""The fluid of a network at one temperature: liquid, entrained gas and vapour as one density."""
 
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from klack.errors import InputError, require_nonnegative, require_positive
+from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, barus_viscosity
+from klack.hydraulics.mixture import LOWEST_PRESSURE, EntrainedGas, Vapour
+
 __all__ = ["Fluid"]
 
+Values = NDArray[np.float64]
 
-class Fluid(Protocol):
-    """A fluid at one temperature."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fluid:
+    r"""A fluid at one temperature, homogeneous and barotropic: pressure alone gives the density.
+
+    A volume that holds 1 m^3 of mixture at the reference pressure ``p_0`` of the gas takes
+
+    .. math:: V(p) = (1 - \alpha)\,\frac{\rho_l(p_0)}{\rho_c(p)}
+              + \alpha\,\theta(p)\Bigl(\frac{p_0}{p}\Bigr)^{1/n}, \qquad
+              \rho = \frac{(1 - \alpha)\,\rho_l(p_0) + m_g}{V(p)}, \qquad
+              K = -V \frac{dp}{dV}
+
+    with ``rho_c`` of :class:`~klack.hydraulics.mixture.Vapour` and the gas of
+    :class:`~klack.hydraulics.mixture.EntrainedGas`.  ``rho`` and ``K`` come from the same ``V``,
+    so mass is conserved; formulas that adjust ``K`` alone lose it.  The density rises strictly
+    with pressure from 1 Pa on.
+
+    Parameters
+    ----------
+    name : str
+    temperature : float [K]
+    liquid : LiquidLaw
+    base_viscosity : float [Pa s]
+        Dynamic, of the liquid at one atmosphere.
+    pressure_viscosity : float [1/Pa]
+        ``alpha`` of :func:`~klack.hydraulics.liquid.barus_viscosity`.
+    gas : EntrainedGas
+    vapour : Vapour
+
+    Examples
+    --------
+    >>> from klack.hydraulics.fluid_library import library_fluid
+    >>> heptane = library_fluid("n-heptane").at(293.15)
+    >>> round(float(heptane.sound_speed(6e5)))
+    1153
+    """
 
     name: str
     temperature: float
-    vapour_pressure: float
+    liquid: LiquidLaw
+    base_viscosity: float
+    vapour: Vapour
+    gas: EntrainedGas = EntrainedGas()
+    pressure_viscosity: float = 0.0
 
-    def density(self, pressure: ArrayLike) -> NDArray[np.float64]:
+    def __post_init__(self) -> None:
+        require_positive("Fluid.temperature", self.temperature, "K")
+        require_nonnegative("Fluid.base_viscosity", self.base_viscosity, "Pa s")
+        top = max(self.vapour.kinks)
+        if float(self.liquid.density(LOWEST_PRESSURE)) <= self.vapour.density * max(
+            1.0, top / self.vapour.pressure
+        ):
+            raise InputError(
+                f"fluid '{self.name}': vapour density",
+                got=f"{self.vapour.density:g} kg/m^3",
+                expected="far less than the density of the liquid",
+                hint="leave it out: an ideal gas of 0.1 kg/mol is assumed.",
+            )
+
+    @property
+    def vapour_pressure(self) -> float:
+        """Pressure [Pa] at which it boils."""
+        return self.vapour.pressure
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Pressures [Pa] where the second derivative of the density jumps, increasing."""
+        places = {*self.liquid.kinks, *self.gas.kinks, *self.vapour.kinks}
+        return tuple(sorted(places))
+
+    def density(self, pressure: ArrayLike) -> Values:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
-        ...
+        return 1.0 / self.specific_volume(pressure)[0]
 
-    def bulk_modulus(self, pressure: ArrayLike) -> NDArray[np.float64]:
+    def bulk_modulus(self, pressure: ArrayLike) -> Values:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
-        ...
+        v, slope = self.specific_volume(pressure)
+        return -v / slope
 
-    def sound_speed(self, pressure: ArrayLike) -> NDArray[np.float64]:
-        """Speed of pressure waves [m/s] at the absolute pressure [Pa]."""
-        ...
+    def sound_speed(self, pressure: ArrayLike) -> Values:
+        """Speed of pressure waves [m/s] in an unbounded fluid at the absolute pressure [Pa]."""
+        v, slope = self.specific_volume(pressure)
+        return v / np.sqrt(-slope)
 
-    def viscosity(self, pressure: ArrayLike) -> NDArray[np.float64]:
-        """Dynamic viscosity [Pa s] at the absolute pressure [Pa]."""
-        ...
+    def viscosity(self, pressure: ArrayLike) -> Values:
+        """Dynamic viscosity [Pa s] of the liquid at the absolute pressure [Pa]."""
+        return barus_viscosity(self.base_viscosity, self.pressure_viscosity, pressure, ATMOSPHERE)
+
+    def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+        """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)] at the absolute pressure [Pa].
+
+        Pressures below 1 Pa are taken as 1 Pa.
+        """
+        p = np.maximum(np.asarray(pressure, dtype=float), LOWEST_PRESSURE)
+        condensable = (1.0 - self.gas.fraction) * float(
+            self.liquid.density(self.gas.reference_pressure)
+        )
+        rho, slope = self.vapour.density_with(self.liquid, p)
+        gas, gas_slope = self.gas.volume(p)
+        mass = condensable + self.gas.mass
+        volume = condensable / rho + gas
+        return volume / mass, (gas_slope - condensable * slope / rho**2) / mass
