@@ -1,12 +1,14 @@
-"""From a case to two meshed, placed and supported elastic bodies."""
+"""From a case to meshed, placed and supported elastic bodies."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
-from klack.case.schema import Case, CaseBody
+from klack.case.schema import Case
 from klack.contact.mortar import touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
@@ -21,7 +23,7 @@ from klack.mesh.swept import sweep
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
 
-__all__ = ["BodyPair", "build_bodies"]
+__all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,9 +58,9 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     """
     progress("mesh", 0.0)
     moving, stop = case.contact.moving, case.contact.stop
-    touch = _first_touch(case)
-    upper = _mesh(case.moving_body, moving.body, touch.upper if touch else ())
-    lower = _mesh(case.stop_body, stop.body, touch.lower if touch else ())
+    touch = find_touch(case.bodies, moving, stop)
+    upper = mesh_body(case.moving_body, moving.body, touch.upper if touch else ())
+    lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
     shift = _shift(case, upper, upper_surface, lower, lower_surface)
@@ -67,14 +69,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     progress("assemble", 0.0)
     bodies = []
     for i, (name, mesh) in enumerate(((moving.body, upper), (stop.body, lower))):
-        bodies.append(
-            elastic_body(
-                name,
-                mesh,
-                case.materials_of(name, mesh.solids),
-                fixed_nodes=_fixed_nodes(case.bodies[name], mesh),
-            )
-        )
+        bodies.append(assemble_body(case, name, mesh))
         progress("assemble", (i + 1) / 2)
     return BodyPair(
         upper=bodies[0],
@@ -85,30 +80,38 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     )
 
 
-def _first_touch(case: Case) -> Touch | None:
-    """Where to refine; None when no body asks for a refinement at the contact."""
-    extents = [b.mesh.contact.extent for b in case.bodies.values() if b.mesh and b.mesh.contact]
+def find_touch(
+    bodies: Mapping[str, CaseBody], upper: SurfaceName, lower: SurfaceName
+) -> Touch | None:
+    """Find where two surfaces first touch; None when neither body asks for a refinement there."""
+    pair = (bodies[upper.body], bodies[lower.body])
+    extents = [body.mesh.contact.extent for body in pair if body.mesh and body.mesh.contact]
     if not extents:
         return None
-    moving, stop = case.contact.moving, case.contact.stop
-    upper, lower = case.moving_body.geometry.profile, case.stop_body.geometry.profile
-    if upper is not None and lower is not None:
+    above, below = (body.geometry.profile for body in pair)
+    if above is not None and below is not None:
         return first_touch_of_profiles(
-            upper.profiles().values(), moving.surface, lower.profiles().values(), stop.surface
+            above.profiles().values(), upper.surface, below.profiles().values(), lower.surface
         )
     # a first mesh without refinement tells where to refine
-    meshes = [_mesh(case.bodies[name], name, ()) for name in (moving.body, stop.body)]
+    meshes = [mesh_body(bodies[name], name, ()) for name in (upper.body, lower.body)]
     return first_touch_of_meshes(
         meshes[0],
-        meshes[0].surface(moving.surface),
+        meshes[0].surface(upper.surface),
         meshes[1],
-        meshes[1].surface(stop.surface),
+        meshes[1].surface(lower.surface),
         tolerance=min(extents) / 5.0,
     )
 
 
-def _mesh(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
-    """Mesh of one body, refined at the given places ((r, z) or (x, y, z))."""
+def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
+    """Assemble stiffness and mass of a body of the case, with its supports."""
+    materials = case.materials_of(name, mesh.solids)
+    return elastic_body(name, mesh, materials, fixed_nodes=_fixed_nodes(case.bodies[name], mesh))
+
+
+def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
+    """Mesh one body, refined at the given places ((r, z) or (x, y, z))."""
     geometry = body.geometry
     if geometry.mesh is not None:
         solids = tuple(body.material) if isinstance(body.material, dict) else None

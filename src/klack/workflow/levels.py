@@ -50,8 +50,10 @@ __all__ = [
     "PORT",
     "ReducedPair",
     "classical_stiffness",
+    "damping_of",
     "elastic_count",
     "first_stiffness",
+    "mode_pool",
     "mode_pools",
     "own_pair",
     "participating",
@@ -118,7 +120,13 @@ def mode_pools(
     # the triangular solves run outside of the interpreter: two bodies keep two cores busy
     with ThreadPoolExecutor(max_workers=len(bodies)) as workers:
         jobs = [
-            workers.submit(_pool, problem.case, body, flexibility, at_least)
+            workers.submit(
+                mode_pool,
+                selection_of(problem.case.reduction.choice(body.name)),
+                body,
+                flexibility,
+                at_least=at_least,
+            )
             for body, flexibility in zip(bodies, flexibilities, strict=True)
         ]
         pools = [job.result() for job in jobs]
@@ -126,8 +134,10 @@ def mode_pools(
     return {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
 
 
-def _pool(case: Case, body: ElasticBody, flexibility: Flexibility, at_least: int) -> Modes:
-    choice = selection_of(case.reduction.choice(body.name))
+def mode_pool(
+    choice: ModeSelection, body: ElasticBody, flexibility: Flexibility, *, at_least: int = 1
+) -> Modes:
+    """Elastic modes of a body that a selection can choose from."""
     count = at_least
     if isinstance(choice, ByCount):
         count = max(count, choice.count)

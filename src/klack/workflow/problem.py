@@ -18,7 +18,7 @@ from klack.elasticity.statics import Flexibility
 from klack.workflow.bodies import BodyPair, build_bodies
 from klack.workflow.progress import Progress
 
-__all__ = ["ContactProblem", "build_problem"]
+__all__ = ["ContactProblem", "build_problem", "effective_mass", "static_ladder"]
 
 # The first estimate of the compliance loads the points that touch first.
 _FIRST_POINTS = 48
@@ -72,7 +72,15 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     progress("factorise", 0.5)
     lower = Flexibility(pair.lower, threads=threads)
     progress("factorise", 1.0)
-    static = _static_contact(case, pair, upper, lower, progress)
+    static = static_ladder(
+        pair,
+        upper,
+        lower,
+        energy=_impact_energy(case, pair),
+        closing=_closing_force(case),
+        reach=case.contact.reach,
+        progress=progress,
+    )
     return ContactProblem(
         case=case,
         pair=pair,
@@ -83,7 +91,8 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     )
 
 
-def _effective_mass(pair: BodyPair) -> float:
+def effective_mass(pair: BodyPair) -> float:
+    """Mass [kg] whose kinetic energy at the closing speed an impact can use."""
     masses = [body.mass for body in (pair.upper, pair.lower) if not body.is_fixed]
     return 1.0 / sum(1.0 / m for m in masses)
 
@@ -96,25 +105,45 @@ def _closing_force(case: Case) -> float:
 
 def _impact_energy(case: Case, pair: BodyPair) -> float:
     """Bound of the energy at first touch [J]: kinetic, and work of closing forces on the way."""
-    kinetic = 0.5 * _effective_mass(pair) * case.motion.speed**2
+    kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
     return kinetic + _closing_force(case) * (case.contact.gap or 0.0)
 
 
-def _static_contact(
-    case: Case, pair: BodyPair, upper: Flexibility, lower: Flexibility, progress: Progress
+def static_ladder(
+    pair: BodyPair,
+    upper: Flexibility,
+    lower: Flexibility,
+    *,
+    energy: float,
+    closing: float,
+    reach: float | None,
+    progress: Progress,
 ) -> StaticContact:
-    """Static contact on as many candidate points as the impact can reach."""
+    """Static contact on as many candidate points as the impact can reach.
+
+    Parameters
+    ----------
+    pair : BodyPair
+        Only the meshes and surfaces matter; they need not touch.
+    upper, lower : Flexibility
+    energy : float [J]
+        That the contact must be able to store.
+    closing : float [N]
+        Force that goes on working while the bodies approach.
+    reach : float or None [m]
+        Largest gap of candidate points; found when None.
+    progress : callable
+    """
     surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
-    energy = _impact_energy(case, pair)
     progress("static contact", 0.0)
-    space = contact_space(*surfaces, reach=case.contact.reach)
+    given = reach
+    space = contact_space(*surfaces, reach=given)
     reach = space.reach
-    closing = _closing_force(case)
     compliance = _first_compliance(space, upper, lower)
     # a linear spring stores E + closing * approach at the turning point
     approach = compliance * closing + sqrt((compliance * closing) ** 2 + 2.0 * energy * compliance)
     force = approach / compliance
-    if case.contact.reach is None:
+    if given is None:
         reach = _REACH_MARGIN * approach
     for attempt in range(_ATTEMPTS):
         candidates = contact_space(*surfaces, reach=reach)
@@ -124,7 +153,7 @@ def _static_contact(
         try:
             static = _ladder(candidates, C, energy, closing, force)
         except ReachError:
-            if case.contact.reach is not None or attempt == _ATTEMPTS - 1:
+            if given is not None or attempt == _ATTEMPTS - 1:
                 raise
             reach *= 1.5
             continue
