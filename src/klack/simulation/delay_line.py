@@ -1,0 +1,500 @@
+r"""Lines with water hammer as pure delays: two waves per segment, exact in volume and energy.
+
+A wave that enters a segment at one end leaves it at the other after the delay ``T`` (d'Alembert).
+With ``P`` the pressure about ambient and ``q`` the flow *into* the segment, both means over a
+step, and ``Z`` the impedance,
+
+.. math:: P = c + Z q, \qquad w = P + Z q = c + 2 Z q, \qquad c_b(t) = w_a(t - T),
+
+``c`` is the wave that arrives at an end and ``w`` the one that leaves it.  Waves are kept as means
+over fine steps ``h``; a delay that is no multiple of ``h`` is read by linear interpolation, and a
+step of ``m`` fine steps reads the mean of ``m`` samples and writes ``m`` equal ones.  Every read
+is a mean with weights that add up to one, so the volume of a pulse is kept, and by convexity the
+energy ``h w^2 / (4 Z)`` per sample can only fall: what it loses is booked.
+
+Friction sits between segments and, half each, at both ends: ``R q`` and resistance-inductance
+pairs ``dp_k = gain_k (q - i_k)``, ``di_k/dt = rate_k (q - i_k)``, advanced exactly for a flow that
+is constant over the step.  Between two segments a cavity opens when the pressure would fall below
+``P_v``; differential and common mode of such a junction are independent, so both have closed forms.
+
+``P`` is ``rho_ref g(p)`` with ``g`` the integral of ``dp/rho`` from ambient pressure and
+``rho_ref`` the density at ambient pressure; ``q`` is the mass flow over ``rho_ref``.  Then ``P q``
+is the power ``g mdot`` that the hydraulic nodes count with.
+
+In a time loop: :func:`compile_lines` and :func:`start_lines` once; then per step
+:func:`lines_incoming`, the solution of the nodes with ``P = c + Z q``, :func:`lines_commit`.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+from klack.network.rows import LineRow
+from klack.units import format_si
+
+__all__ = [
+    "LINE_LOSSES",
+    "LineState",
+    "Lines",
+    "compile_lines",
+    "line_cavity",
+    "line_store",
+    "line_volume",
+    "lines_commit",
+    "lines_incoming",
+    "start_lines",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LINE_LOSSES = ("friction", "interpolation", "cavity collapse")
+"""Columns of the books of :func:`lines_commit`."""
+
+_FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over friction terms use registers
+_A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as whole
+
+
+class Lines(NamedTuple):
+    """Constants of all lines, ``n`` lines with ``s`` segments in all.
+
+    End ``e = 2 line`` is port a of a line, end ``e = 2 line + 1`` its port b.  A lump is what
+    carries the friction between two segments (whole) or at an end (half).
+
+    Parameters
+    ----------
+    step : float [s]
+        Fine step.
+    coarse : int
+        Fine steps of a coarse step.
+    node : array of int, shape (2 n,)
+        Hydraulic node of each end.
+    impedance : array, shape (n,) [Pa s/m^3]
+    resistance : array, shape (n,) [Pa s/m^3]
+        Steady friction of one whole lump.
+    vapour : array, shape (n,) [Pa]
+        ``P`` in an open cavity, about ambient.
+    first_segment : array of int, shape (n + 1,)
+        The segments of a line, from a to b, are ``first_segment[line] : first_segment[line + 1]``.
+    depth : array of int, shape (s,)
+        Samples in each ring: whole steps of the delay, plus one.
+    fraction : array, shape (s,) [-]
+        Rest of the delay, in steps.
+    start : array of int, shape (s, 2)
+        Where the rings of the wave towards b (0) and towards a (1) start in the samples.
+    first_term : array of int, shape (n + 1,)
+        Terms of frequency-dependent friction of each line.
+    first_memory : array of int, shape (n,)
+        Where the memories of a line start; ordered by lump, then by term.
+    impedance_of_term : array, shape (2, k) [Pa s/m^3]
+        Mean ``dp / (q - i)`` of one whole lump over a fine step (0) and a coarse step (1).
+    decay : array, shape (2, k) [-]
+        Share of ``q - i`` left after a fine step (0) and a coarse step (1).
+    inductance : array, shape (k,) [Pa s^2/m^3]
+        Of one whole lump, ``gain / rate``.
+    """
+
+    step: float
+    coarse: int
+    node: Integers
+    impedance: Vector
+    resistance: Vector
+    vapour: Vector
+    first_segment: Integers
+    depth: Integers
+    fraction: Vector
+    start: Integers
+    first_term: Integers
+    first_memory: Integers
+    impedance_of_term: Matrix
+    decay: Matrix
+    inductance: Vector
+
+
+class LineState(NamedTuple):
+    """State of all lines; the first four are enough to continue to the same bits.
+
+    Parameters
+    ----------
+    samples : array [Pa]
+        Rings of all waves ``w``, means over fine steps.
+    head : array of int, shape (s,)
+        Oldest sample in both rings of a segment.
+    memory : array [m^3/s]
+        Flows ``i_k`` of the friction terms; counted into the line at its ends, towards b inside.
+    cavity : array, shape (s,) [m^3]
+        Vapour between a segment and the next one of its line.
+    incoming : array, shape (s, 2) [Pa]
+        Scratch: waves that leave each segment in the present step, as in ``Lines.start``.
+    scatter : array, shape (n,) [J]
+        Scratch: energy that interpolation and averaging take in the present step.
+    """
+
+    samples: Vector
+    head: Integers
+    memory: Vector
+    cavity: Vector
+    incoming: Matrix
+    scatter: Vector
+
+
+def compile_lines(
+    rows: Sequence[LineRow], *, step: float, coarse: int, ambient_pressure: float
+) -> tuple[Lines, LineState]:
+    """Lay out lines for steps of 1 and of ``coarse`` fine steps; at rest and at ambient pressure.
+
+    Segments have equal delays up to ``coarse`` steps, so that coarse steps find their own samples
+    again and lose nothing; only the last segment of a line has a fraction of a step.
+
+    Parameters
+    ----------
+    rows : sequence of LineRow
+    step : float [s]
+        Fine step.
+    coarse : int
+        Fine steps of a coarse step; 1 without coarse steps.
+    ambient_pressure : float [Pa]
+        From which ``P`` counts.
+
+    Raises
+    ------
+    InputError
+        If a segment is shorter than a coarse step.
+    """
+    whole, fraction = [], []
+    for row in rows:
+        for steps in _segment_steps(row, step, coarse):
+            nearest = round(steps)
+            if abs(steps - nearest) < _A_WHOLE * steps:
+                steps = float(nearest)
+            whole.append(int(steps))
+            fraction.append(steps - int(steps))
+    depth = np.array(whole, dtype=np.int64) + 1
+    ends = np.cumsum(np.repeat(depth, 2))
+    start = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+    segments = np.array([row.segments for row in rows], dtype=np.int64)
+    terms = np.array([len(row.unsteady_gain) for row in rows], dtype=np.int64)
+    memories = terms * (segments + 1)
+    gain = _concatenate([row.unsteady_gain / row.segments for row in rows])
+    rate = _concatenate([row.unsteady_rate for row in rows])
+    durations = rate * np.array([[step], [coarse * step]])
+    lines = Lines(
+        step=float(step),
+        coarse=int(coarse),
+        node=np.array([node for row in rows for node in (row.a, row.b)], dtype=np.int64),
+        impedance=np.array([row.impedance for row in rows], dtype=float),
+        resistance=np.array([row.resistance / row.segments for row in rows], dtype=float),
+        vapour=np.array([row.vapour_pressure - ambient_pressure for row in rows], dtype=float),
+        first_segment=_offsets(segments),
+        depth=depth,
+        fraction=np.array(fraction, dtype=float),
+        start=np.ascontiguousarray(start, dtype=np.int64).reshape(-1, 2),
+        first_term=_offsets(terms),
+        first_memory=_offsets(memories)[:-1],
+        impedance_of_term=gain * -np.expm1(-durations) / durations,
+        decay=np.exp(-durations),
+        inductance=gain / rate,
+    )
+    state = LineState(
+        samples=np.zeros(2 * int(depth.sum())),
+        head=np.zeros(len(depth), dtype=np.int64),
+        memory=np.zeros(int(memories.sum())),
+        cavity=np.zeros(len(depth)),
+        incoming=np.zeros((len(depth), 2)),
+        scatter=np.zeros(len(rows)),
+    )
+    return lines, state
+
+
+def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: ArrayLike = 0.0) -> None:
+    """Fill all lines with a steady flow, in place; the rest of the pressure drop is linear.
+
+    Parameters
+    ----------
+    pressure : array, shape (2 n,) [Pa]
+        ``P`` at the ends, about ambient: a and b of each line.
+    flow : array, shape (n,) [m^3/s]
+        From a to b; 0 starts a line at rest.
+    """
+    ends = np.broadcast_to(np.asarray(pressure, dtype=float), lines.node.shape)
+    flows = np.broadcast_to(np.asarray(flow, dtype=float), lines.impedance.shape)
+    state.head[:] = 0
+    state.cavity[:] = 0.0
+    for line, Q in enumerate(flows):
+        segments = range(lines.first_segment[line], lines.first_segment[line + 1])
+        P_a, P_b = ends[2 * line : 2 * line + 2]
+        drop = lines.resistance[line] * Q
+        delays = lines.depth[segments.start : segments.stop] - 1.0
+        delays += lines.fraction[segments.start : segments.stop]
+        slope = (P_b - P_a + drop * len(segments)) / delays.sum()
+        before = 0.0
+        for k, segment in enumerate(segments):
+            level = P_a - (k + 0.5) * drop
+            depth = lines.depth[segment]
+            age = np.clip(depth - 0.5 - np.arange(depth), 0.0, delays[k])
+            places = (before + age, before + delays[k] - age)
+            for wave, sign in ((0, 1.0), (1, -1.0)):
+                ring = slice(lines.start[segment, wave], lines.start[segment, wave] + depth)
+                Z = lines.impedance[line]
+                state.samples[ring] = level + slope * places[wave] + sign * Z * Q
+            before += delays[k]
+        K = lines.first_term[line + 1] - lines.first_term[line]
+        first = lines.first_memory[line]
+        memory = state.memory[first : first + K * (len(segments) + 1)].reshape(len(segments) + 1, K)
+        memory[:] = Q
+        memory[-1:] = -Q
+
+
+def _segment_steps(row: LineRow, step: float, coarse: int) -> Vector:
+    """Delays of the segments of a line in fine steps, all but the last multiples of ``coarse``."""
+    total = row.delay / step
+    blocks = total / (row.segments * coarse)
+    if blocks < 1.0 - _A_WHOLE:
+        fewer = int(total / coarse)
+        longest = format_si(row.delay / (row.segments * coarse), "s", 3)
+        cure = f"take a fine step of {longest} or less, or fewer fine steps in a coarse one"
+        raise InputError(
+            f"line '{row.component}'",
+            got=f"segments that a wave crosses in {format_si(row.delay / row.segments, 's')}",
+            expected=f"at least one step of {format_si(coarse * step, 's')}",
+            hint=f"use {fewer} segments, or {cure}." if fewer else f"{cure}.",
+        )
+    marks = coarse * np.floor(np.arange(row.segments) * blocks * (1.0 + _A_WHOLE))
+    return np.diff(np.append(marks, total))
+
+
+def _offsets(counts: Integers) -> Integers:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _concatenate(parts: Sequence[Vector]) -> Vector:
+    return np.concatenate([np.zeros(0), *parts])
+
+
+@njit(cache=True, fastmath=_FAST)
+def _read(
+    samples: Vector, start: int, depth: int, head: int, m: int, f: float
+) -> tuple[float, float]:
+    """Mean of ``m`` delayed samples, and the sum of squares that they lose by it [Pa^2]."""
+    lost = 0.0
+    total = 0.0
+    i = head
+    before = samples[start + i]
+    for _ in range(m):
+        i += 1
+        if i == depth:
+            i = 0
+        x = samples[start + i]
+        total += f * before + (1.0 - f) * x
+        lost += (x - before) ** 2
+        before = x
+    lost *= f * (1.0 - f)
+    mean = total / m
+    i = head
+    before = samples[start + i]
+    for _ in range(m):
+        i += 1
+        if i == depth:
+            i = 0
+        x = samples[start + i]
+        lost += (f * before + (1.0 - f) * x - mean) ** 2
+        before = x
+    return mean, lost
+
+
+@njit(cache=True)
+def _write(samples: Vector, start: int, depth: int, head: int, m: int, w: float) -> None:
+    i = head
+    for _ in range(m):
+        samples[start + i] = w
+        i += 1
+        if i == depth:
+            i = 0
+
+
+@njit(cache=True, fastmath=_FAST)
+def _lump(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> tuple[float, float]:
+    """Unsteady friction of a lump as ``offset + slope q``."""
+    offset, slope = 0.0, 0.0
+    for k in range(k0, k1):
+        offset -= z[k] * memory[first + k - k0]
+        slope += z[k]
+    return offset, slope
+
+
+@njit(cache=True, fastmath=_FAST)
+def _rub(
+    memory: Vector, first: int, decay: Vector, inductance: Vector, k0: int, k1: int, q: float
+) -> float:
+    """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]."""
+    heat = 0.0
+    for k in range(k0, k1):
+        E = decay[k]
+        d = q - memory[first + k - k0]
+        memory[first + k - k0] = q - E * d
+        heat += 0.5 * inductance[k] * (1.0 - E * E) * d * d
+    return heat
+
+
+@njit(cache=True)
+def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
+    """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
+
+    Then ``P = c[e] + Z[e] q`` at the node of the end, means over the step, with end friction
+    included and ``q`` into the line.  Changes only the scratch of ``state``: a step that is given
+    up is repeated by calling this again, with another ``m`` if wanted.
+
+    Parameters
+    ----------
+    m : int
+        Fine steps of this step: 1 or ``lines.coarse``.
+    c, Z : array, shape (2 n,)
+        Written.
+    """
+    level = 0 if m == 1 else 1
+    for line in range(lines.impedance.size):
+        s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
+        lost = 0.0
+        for s in range(s0, s1):
+            depth, head, f = lines.depth[s], state.head[s], lines.fraction[s]
+            after = head + 1 if head + 1 < depth else 0
+            for wave in range(2):
+                start = lines.start[s, wave]
+                if m == 1:
+                    before, x = state.samples[start + head], state.samples[start + after]
+                    state.incoming[s, wave] = x + f * (before - x)
+                    lost += f * (1.0 - f) * (x - before) ** 2
+                else:
+                    mean, more = _read(state.samples, start, depth, head, m, f)
+                    state.incoming[s, wave] = mean
+                    lost += more
+        impedance = lines.impedance[line]
+        state.scatter[line] = lines.step / (4.0 * impedance) * lost
+        k0, k1 = lines.first_term[line], lines.first_term[line + 1]
+        c[2 * line], c[2 * line + 1] = state.incoming[s0, 1], state.incoming[s1 - 1, 0]
+        Z[2 * line] = Z[2 * line + 1] = impedance + 0.5 * lines.resistance[line]
+        if k1 > k0:
+            z = lines.impedance_of_term[level]
+            first = lines.first_memory[line]
+            for end, at in ((2 * line, first), (2 * line + 1, first + (s1 - s0) * (k1 - k0))):
+                offset, slope = _lump(state.memory, at, z, k0, k1)
+                c[end] += 0.5 * offset
+                Z[end] += 0.5 * slope
+
+
+@njit(cache=True)
+def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matrix) -> None:
+    """Finish the step that :func:`lines_incoming` began: send the waves, move on by ``m`` steps.
+
+    Parameters
+    ----------
+    m : int
+        As in :func:`lines_incoming`.
+    q : array, shape (2 n,) [m^3/s]
+        Flow into each end, mean over the step.  The work that came in is ``(c + Z q) q m h``.
+    books : array, shape (n, 3) [J]
+        Losses of each line since the start, see :data:`LINE_LOSSES`; added to.
+    """
+    level = 0 if m == 1 else 1
+    duration = m * lines.step
+    decay = lines.decay[level]
+    z = lines.impedance_of_term[level]
+    for line in range(lines.impedance.size):
+        s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
+        k0, k1 = lines.first_term[line], lines.first_term[line + 1]
+        terms, at = k1 - k0, lines.first_memory[line]
+        Z, R = lines.impedance[line], lines.resistance[line]
+        q_a, q_b = q[2 * line], q[2 * line + 1]
+        heat = 0.5 * duration * R * (q_a * q_a + q_b * q_b)
+        if terms > 0:
+            heat += 0.5 * _rub(state.memory, at, decay, lines.inductance, k0, k1, q_a)
+            last = at + terms * (s1 - s0)
+            heat += 0.5 * _rub(state.memory, last, decay, lines.inductance, k0, k1, q_b)
+        out = state.incoming[s0, 1] + 2.0 * Z * q_a
+        collapse = 0.0
+        for s in range(s0, s1):
+            depth, head = lines.depth[s], state.head[s]
+            _write(state.samples, lines.start[s, 0], depth, head, m, out)
+            if s + 1 == s1:
+                back = state.incoming[s, 0] + 2.0 * Z * q_b
+            else:
+                # a lump with a cavity in its middle: Q + dQ flows in from the left, Q - dQ out
+                left, right = state.incoming[s, 0], state.incoming[s + 1, 1]
+                at += terms
+                offset, slope = _lump(state.memory, at, z, k0, k1)
+                Q = (left - right - offset) / (2.0 * Z + R + slope)
+                if terms > 0:
+                    heat += _rub(state.memory, at, decay, lines.inductance, k0, k1, Q)
+                heat += duration * R * Q * Q
+                free = 0.5 * (left + right)
+                V0, dQ = state.cavity[s], 0.0
+                if V0 > 0.0 or free < lines.vapour[line]:
+                    V1 = max(V0 + 2.0 * (lines.vapour[line] - free) * duration / Z, 0.0)
+                    dQ = 0.5 * (V0 - V1) / duration
+                    collapse += max(free - Z * dQ - lines.vapour[line], 0.0) * (V0 - V1)
+                    state.cavity[s] = V1
+                back = left - 2.0 * Z * (Q + dQ)
+                out = right + 2.0 * Z * (Q - dQ)
+            _write(state.samples, lines.start[s, 1], depth, head, m, back)
+            head += m
+            state.head[s] = head - depth if head >= depth else head
+        books[line, 0] += heat
+        books[line, 1] += state.scatter[line]
+        books[line, 2] += collapse
+
+
+@njit(cache=True)
+def line_store(lines: Lines, state: LineState, line: int) -> float:
+    """Energy [J] held in a line now: waves, memory of the friction, cavities.
+
+    Over any steps, ``work in at both ends = change of this + losses`` to round-off.
+    """
+    energy = 0.0
+    for s in range(lines.first_segment[line], lines.first_segment[line + 1]):
+        for wave in range(2):
+            energy += _held(lines, state, s, wave, 2) * lines.step / (4.0 * lines.impedance[line])
+        energy -= lines.vapour[line] * state.cavity[s]
+    k0, k1 = lines.first_term[line], lines.first_term[line + 1]
+    segments = lines.first_segment[line + 1] - lines.first_segment[line]
+    for lump in range(segments + 1):
+        share = 0.5 if lump in (0, segments) else 1.0
+        for k in range(k0, k1):
+            i = state.memory[lines.first_memory[line] + lump * (k1 - k0) + k - k0]
+            energy += share * 0.5 * lines.inductance[k] * i * i
+    return energy
+
+
+@njit(cache=True)
+def line_volume(lines: Lines, state: LineState, line: int) -> float:
+    """Fluid [m^3] that compression stores in a line now, ``P`` over its stiffness.
+
+    Over any steps, ``inflow at both ends + change of line_cavity = change of this`` to round-off.
+    """
+    volume = 0.0
+    for s in range(lines.first_segment[line], lines.first_segment[line + 1]):
+        for wave in range(2):
+            volume += _held(lines, state, s, wave, 1) * lines.step / (2.0 * lines.impedance[line])
+    return volume
+
+
+@njit(cache=True)
+def line_cavity(lines: Lines, state: LineState, line: int) -> float:
+    """Vapour [m^3] in all cavities of a line now."""
+    return state.cavity[lines.first_segment[line] : lines.first_segment[line + 1]].sum()
+
+
+@njit(cache=True)
+def _held(lines: Lines, state: LineState, segment: int, wave: int, power: int) -> float:
+    """Sum of the samples, or of their squares, that are still under way."""
+    start, depth = lines.start[segment, wave], lines.depth[segment]
+    total = 0.0
+    for i in range(depth):
+        share = lines.fraction[segment] if i == state.head[segment] else 1.0
+        x = state.samples[start + i]
+        total += share * x if power == 1 else share * x * x
+    return total
