@@ -1,6 +1,6 @@
 """Liquids without gas and vapour at one temperature: density and stiffness over pressure."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -166,7 +166,6 @@ class TabulatedLiquid:
     pressure: Values
     density_points: Values
     slopes: Values
-    _curve: PchipInterpolator = field(repr=False)
 
     def __init__(self, pressure: ArrayLike, density: ArrayLike) -> None:
         p = np.array(pressure, dtype=float).ravel()
@@ -259,8 +258,7 @@ def barus_viscosity(
 ) -> Values:
     r"""Dynamic viscosity [Pa s] under pressure, ``mu exp(alpha (p - p_0))`` (Barus 1893).
 
-    Good to 1 % up to 350 bar for alkanes, too steep above some 1000 bar.  Below the reference
-    pressure the viscosity is that of the reference: a cavity does not thin the liquid.
+    Good to 2 % up to 350 bar for alkanes, too steep above some 1000 bar.
 
     Parameters
     ----------
@@ -272,4 +270,4 @@ def barus_viscosity(
     reference_pressure : float [Pa]
     """
     x = np.asarray(pressure, dtype=float) - reference_pressure
-    return np.asarray(viscosity * np.exp(coefficient * np.maximum(x, -reference_pressure)))
+    return np.asarray(viscosity * np.exp(coefficient * x))
