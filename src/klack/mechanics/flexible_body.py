@@ -1,0 +1,160 @@
+"""A body that rings: the modes of a finite-element model, seen from its ports."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, model_validator
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Name
+from klack.mechanics.rigid_mass import RigidMass
+from klack.network.component import Component
+from klack.network.port import MOTION, Port
+from klack.network.rows import Rows
+from klack.reduction.reduced_body import ReducedBody
+from klack.units import Speed
+
+__all__ = ["FlexibleBody"]
+
+
+class FlexibleBody(Component):
+    r"""Reduced elastic body with any number of ports.
+
+    .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
+              \qquad y_p = \sum_i \varphi_{ip} q_i
+
+    The solver propagates the modes exactly, whatever the step.  Forces and displacements of a port
+    share one shape, the mean over the surface under its pressure pattern, so the body can create no
+    energy.  What its modes miss of the compliance under a contact belongs into the law of the end
+    stop.
+
+    A case file names a body of the case; its reduced form is computed and filled in when the case
+    runs.  In Python: ``FlexibleBody.of(reduced)``.
+    """
+
+    type: ClassVar[str] = "flexible-body"
+
+    body: Name = Field(description="Name of a body of the case.")
+    points: tuple[Name, ...] = Field(
+        min_length=1, description="Its ports: names of surfaces of the body."
+    )
+    speed: Speed = Field(
+        default=0.0, description="Speed along +z (opening) of the whole body at the start."
+    )
+
+    _reduced: ReducedBody | None = PrivateAttr(None)
+    _columns: tuple[int, ...] = PrivateAttr(())
+
+    @model_validator(mode="after")
+    def _different_points(self) -> "FlexibleBody":
+        if len(set(self.points)) < len(self.points):
+            raise CaseProblem(
+                ("points",),
+                got=f"{', '.join(self.points)}",
+                expected="every surface once",
+                hint="one point can take any number of springs, stops and forces.",
+            )
+        return self
+
+    @classmethod
+    def of(
+        cls, reduced: ReducedBody, points: Sequence[str] | None = None, speed: float = 0.0
+    ) -> Self:
+        """Make a component from a reduced body.
+
+        Parameters
+        ----------
+        reduced : ReducedBody
+        points : sequence of str, optional
+            Those of its ports that the network uses; all by default.
+        speed : float [m/s]
+            Of the whole body at the start, along +z; only a free body can have one.
+        """
+        chosen = tuple(reduced.port_names if points is None else points)
+        return cls(body=reduced.name, points=chosen, speed=speed).with_reduced(reduced)
+
+    def with_reduced(self, reduced: ReducedBody, port_map: Mapping[str, str] | None = None) -> Self:
+        """Return this component with its modes filled in.
+
+        Parameters
+        ----------
+        reduced : ReducedBody
+        port_map : mapping of str to str, optional
+            Port of ``reduced`` for each of :attr:`points`; equal names by default.
+
+        Raises
+        ------
+        InputError
+            If the reduced body has no such port, or a fixed body shall start with a speed.
+        """
+        names = [(port_map or {}).get(point, point) for point in self.points]
+        for point, name in zip(self.points, names, strict=True):
+            if name not in reduced.port_names:
+                raise CaseProblem(
+                    ("points",),
+                    got=f"'{point}', but the reduced body '{reduced.name}' has no port '{name}'",
+                    expected=f"one of: {one_of(reduced.port_names)}",
+                    hint=nearest(name, reduced.port_names, "reduce the body with this surface."),
+                )
+        if self.speed and not reduced.rigid_count:
+            raise CaseProblem(
+                ("speed",),
+                got=f"{self.speed:g} m/s for '{reduced.name}', which is held",
+                expected="no speed, or a free body",
+                hint="remove the speed, or the supports of the body.",
+            )
+        result = self.model_copy()
+        result._reduced = reduced
+        result._columns = tuple(reduced.port_index(name) for name in names)
+        return result
+
+    @property
+    def reduced(self) -> ReducedBody:
+        """Its modes, with the ports of this component only, in their order.
+
+        Raises
+        ------
+        InputError
+            If they have not been filled in.
+        """
+        if self._reduced is None:
+            raise InputError(
+                f"flexible body '{self.body}'",
+                got="no modes",
+                expected="a reduced body",
+                hint="klack stroke computes them; in Python use FlexibleBody.of(reduced).",
+            )
+        return _with_ports(self._reduced, self._columns, self.points)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return self.reduced.mass
+
+    def port_kinds(self) -> Mapping[str, Port]:
+        """One port for each point."""
+        return dict.fromkeys(self.points, MOTION)
+
+    def lumped(self, stiffness: float, restitution: float | None) -> Component | None:
+        """Return a rigid mass, or the ground for a body that is held."""
+        if not self.reduced.rigid_count:
+            return None
+        return RigidMass(mass=self.mass, speed=self.speed, points=self.points)
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add the body."""
+        rows.body(self.reduced, self.points, self.speed)
+
+
+def _with_ports(body: ReducedBody, columns: tuple[int, ...], names: tuple[str, ...]) -> ReducedBody:
+    """Return the same body with some of its ports, under new names."""
+    chosen = list(columns)
+    values: dict[str, Any] = {key: getattr(body, key) for key in body.__dataclass_fields__}
+    values |= {
+        "port_names": names,
+        "port_shapes": np.ascontiguousarray(body.port_shapes[:, chosen]),
+        "static_compliance": body.static_compliance[np.ix_(chosen, chosen)],
+    }
+    return ReducedBody(**values)

@@ -1,0 +1,81 @@
+"""Every component type that a case file may name."""
+
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+
+from klack.errors import KlackError
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.network.component import Component
+
+__all__ = ["COMPONENTS", "component_class", "component_classes", "type_words"]
+
+# Registering a component type is one line here: type word and where its class is.  The word must be
+# the class's own ``type``.  Nothing is imported before a case asks for it.
+COMPONENTS = (
+    # mechanics
+    ("rigid-mass", "klack.mechanics.rigid_mass.RigidMass"),
+    ("flexible-body", "klack.mechanics.flexible_body.FlexibleBody"),
+    ("spring", "klack.mechanics.spring.Spring"),
+    ("constant-force", "klack.mechanics.force.ConstantForce"),
+    ("force-over-time", "klack.mechanics.force.ForceOverTime"),
+    ("guide-friction", "klack.mechanics.friction.GuideFriction"),
+    ("gravity", "klack.mechanics.gravity.Gravity"),
+    # hydraulics
+    # magnetics and drivers
+)
+"""Type word and dotted path of the class, for each component type."""
+
+
+def type_words() -> tuple[str, ...]:
+    """Words that can stand after ``type:``."""
+    return tuple(word for word, _ in COMPONENTS)
+
+
+@cache
+def component_class(word: str) -> type[Component]:
+    """Class of a type word, or of ``package.module:Class`` for a component of the user's own.
+
+    Raises
+    ------
+    CaseProblem
+        For an unknown word, or a class that cannot be imported or is no component.
+    """
+    known = dict(COMPONENTS)
+    if word in known:
+        return _load(word, *known[word].rsplit(".", 1))
+    if ":" in word:
+        return _load(word, *word.split(":", 1))
+    raise CaseProblem(
+        ("type",),
+        got=f"'{word}'",
+        expected=f"one of: {one_of(known)}",
+        hint=nearest(word, known, "a class of your own is written package.module:Class."),
+    )
+
+
+def component_classes() -> Iterator[type[Component]]:
+    """All registered classes; imports them."""
+    return (component_class(word) for word in type_words())
+
+
+def _load(word: str, module: str, name: str) -> type[Component]:
+    try:
+        found = getattr(import_module(module), name)
+    except KlackError:
+        raise
+    except Exception as error:  # the user's module may fail in any way while it is imported
+        raise CaseProblem(
+            ("type",),
+            got=f"'{word}', which cannot be imported ({error})",
+            expected="package.module:Class of an installed module, or one next to where you start",
+            hint="try 'python -c \"import ...\"' in the same folder.",
+        ) from None
+    if not (isinstance(found, type) and issubclass(found, Component)):
+        raise CaseProblem(
+            ("type",),
+            got=f"'{word}', which is no component",
+            expected="a class derived from klack.network.component.Component",
+            hint="see docs/how-to/add-a-component.md.",
+        )
+    return found

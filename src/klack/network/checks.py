@@ -1,0 +1,240 @@
+"""What makes a network a valve that can be computed; one clear error for each way it can fail."""
+
+import warnings
+from collections.abc import Iterable, Mapping
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem
+from klack.network.component import Component
+from klack.network.nodes import Joint, Node
+from klack.network.port import Role
+from klack.network.rows import GROUND, Rows
+from klack.units import format_si
+
+__all__ = ["LooseBodyWarning", "check_nodes", "check_rows"]
+
+_TOUCHING = 1e-12  # [m]; what rounding may leave of a gap of zero
+
+
+class LooseBodyWarning(UserWarning):
+    """A body that nothing holds: correct, but seldom meant."""
+
+
+def check_nodes(components: Mapping[str, Component], nodes: Iterable[Node]) -> None:
+    """Check what can be seen from the connections alone.
+
+    Raises
+    ------
+    CaseProblem
+    """
+    nodes = tuple(nodes)
+    _check_dangling(components, nodes)
+    checks = {"mechanical": _check_motion, "hydraulic": _check_pressure, "electric": _check_drive}
+    for node in nodes:
+        checks[node.domain](components, node)
+
+
+def _check_dangling(components: Mapping[str, Component], nodes: Iterable[Node]) -> None:
+    joined = {(joint.component, joint.name) for node in nodes for joint in node.joints}
+    for component, part in components.items():
+        for name, port in part.port_kinds().items():
+            if port.optional or port.role is Role.MOTION or (component, name) in joined:
+                continue
+            if port.role is Role.COIL:
+                raise _no_driver(("components", component), f"{component}.{name}")
+            if port.role is Role.VOLTAGE:
+                raise _no_coil(("components", component), f"{component}.{name}")
+            raise CaseProblem(
+                ("components", component),
+                got=f"the port {component}.{name} in no connection",
+                expected=f"every port joined ({port.domain}: it {port.role.value})",
+                hint=_where_to(port.domain, f"{component}.{name}"),
+            )
+
+
+def _where_to(domain: str, port: str) -> str:
+    words = {
+        "mechanical": f"join it to a port of a body, or to the ground: [{port}, ground].",
+        "hydraulic": f"join it to a chamber or a pressure, or let it drain: [{port}, ambient].",
+        "electric": f"join it to its partner: [driver.terminals, {port}].",
+    }
+    return words[domain]
+
+
+def _check_motion(components: Mapping[str, Component], node: Node) -> None:
+    bodies = [str(joint) for joint in node.having(Role.MOTION)]
+    if node.word and bodies:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and(bodies)} joined to the ground",
+            expected="a body or the ground, not both at one point",
+            hint="fix the body where it is described, or hold it by a stiff spring.",
+        )
+    if len(bodies) > 1:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
+            expected="one body and what pushes it",
+            hint="put an end stop or a spring between the bodies, or make them one body.",
+        )
+    if not node.word and not bodies:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{node}: nothing there has a mass",
+            expected="a port of one body, or the ground",
+            hint="add the body that they push to this list; springs in series need one between.",
+        )
+
+
+def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
+    prescribed = [str(joint) for joint in node.having(Role.PRESSURE)]
+    prescribed += [node.word] if node.word else []
+    volumes = [str(joint) for joint in node.having(Role.COMPLIANCE)]
+    if len(prescribed) > 1:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{len(prescribed)} pressures at one node: {_and(prescribed)}",
+            expected="one pressure",
+            hint="put an orifice or a line between them.",
+        )
+    if prescribed and volumes:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"the volume {volumes[0]} where {prescribed[0]} prescribes the pressure",
+            expected="either a volume, whose pressure is computed, or a prescribed pressure",
+            hint="remove the chamber, or put an orifice between the two.",
+        )
+    if prescribed and not node.word:
+        _refuse_forced_flow(components, node, prescribed[0])
+    if not prescribed and not volumes:
+        raise _no_compliance(components, node)
+
+
+def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressure: str) -> None:
+    for joint in node.joints:
+        if _is_flow_source(components, joint):
+            raise CaseProblem(
+                ("connections", node.index),
+                got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
+                expected="a flow into a volume, whose pressure can answer",
+                hint="join it to a chamber; at a prescribed pressure it changes nothing.",
+            )
+
+
+def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
+    """Whether this flow comes from nowhere: the only port of its component."""
+    return joint.port.role is Role.FLOW and len(components[joint.component].port_kinds()) == 1
+
+
+def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProblem:
+    got = f"{node}: nothing there stores fluid or gives the pressure"
+    if any(_is_flow_source(components, joint) for joint in node.joints):
+        got = f"{node}: a flow is forced into a node that stores nothing"
+    return CaseProblem(
+        ("connections", node.index),
+        got=got,
+        expected="a chamber, a prescribed pressure or ambient at every hydraulic node",
+        hint="add the dead volume there as a chamber (a few mm^3), or a pressure source.",
+    )
+
+
+def _check_drive(components: Mapping[str, Component], node: Node) -> None:
+    drivers = [str(joint) for joint in node.having(Role.VOLTAGE)]
+    coils = [str(joint) for joint in node.having(Role.COIL)]
+    key = ("connections", node.index)
+    if not drivers:
+        raise _no_driver(key, _and(coils))
+    if not coils:
+        raise _no_coil(key, _and(drivers))
+    if len(drivers) > 1 or len(coils) > 1:
+        raise CaseProblem(
+            key,
+            got=f"{_and([*drivers, *coils])} in one circuit",
+            expected="one driver and one coil",
+            hint="give every coil its own driver; they may have equal settings.",
+        )
+
+
+def _no_driver(key: tuple[str | int, ...], coil: str) -> CaseProblem:
+    return CaseProblem(
+        key,
+        got=f"the coil {coil} without a driver",
+        expected="a driver at its terminals",
+        hint=f"add one, e.g. of the type voltage-step, and join it: [driver.terminals, {coil}].",
+    )
+
+
+def _no_coil(key: tuple[str | int, ...], driver: str) -> CaseProblem:
+    return CaseProblem(
+        key,
+        got=f"the driver {driver} without a coil",
+        expected="a solenoid at its terminals",
+        hint=f"join it: [{driver}, solenoid.terminals], or remove it.",
+    )
+
+
+def check_rows(rows: Rows) -> None:
+    """Check what the parts have contributed, before the solver sees it.
+
+    Raises
+    ------
+    InputError
+        For no body at all, an interface closed at the start, or a node without a row.
+
+    Warns
+    -----
+    LooseBodyWarning
+        For a body that nothing holds.
+    """
+    if not rows.bodies:
+        raise InputError(
+            "network",
+            got="no body that moves",
+            expected="at least one, of the type rigid-mass or flexible-body",
+            hint="add the needle as a component.",
+        )
+    for interface in rows.interfaces:
+        if interface.gap < -_TOUCHING:
+            raise CaseProblem(
+                ("components", interface.component),
+                got=f"a gap of {format_si(interface.gap, 'm')} at the start: closed already",
+                expected="a gap of 0 or more",
+                hint="start touching (gap 0): a preload then presses the stop together.",
+            )
+    _check_node_rows(rows)
+    _warn_of_loose_bodies(rows)
+
+
+def _check_node_rows(rows: Rows) -> None:
+    used = [(wall.node, wall.component) for wall in rows.walls]
+    used += [(node, row.component) for row in rows.branches for node in (row.a, row.b)]
+    used += [(node, row.component) for row in rows.lines for node in (row.a, row.b)]
+    for node, component in used:
+        if node not in rows.nodes:
+            raise CaseProblem(
+                ("components", component),
+                got="a flow or wall at a node that has no pressure",
+                expected="a chamber, a prescribed pressure or ambient there",
+                hint="a component with a port of the role COMPLIANCE must call rows.chamber.",
+            )
+
+
+def _warn_of_loose_bodies(rows: Rows) -> None:
+    """Warn of free bodies that no contact, no spring and no enclosed fluid can bring to rest."""
+    held = {port for row in rows.interfaces for port in (row.upper, row.lower)}
+    for element in rows.elements:
+        if any(book.kind == "store" for book in element.books):
+            held |= set(element.ports)
+    held |= {wall.port for wall in rows.walls if rows.nodes[wall.node].volume > 0.0}
+    for body in rows.bodies:
+        if body.body.rigid_count and not held & (set(body.ports) - {GROUND}):
+            warnings.warn(
+                f"nothing holds '{body.component}': a steady force drives it away without end.\n"
+                "Try: add an end stop or a spring.",
+                LooseBodyWarning,
+                stacklevel=4,
+            )
+
+
+def _and(names: Iterable[str]) -> str:
+    return " and ".join(names)

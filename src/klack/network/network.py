@@ -1,0 +1,214 @@
+r"""A valve as components and connections: checked, then translated into rows for the solver.
+
+A *connection* lists all ports that meet in one node.  A mechanical node is one point of one body
+(or of the ground) and everything that pushes it there; a hydraulic node is one pressure; an
+electric node is one pair of wires.  Two words may stand in place of a port: ``ground`` does not
+move, ``ambient`` has the pressure of the surroundings.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
+
+from klack.input.problem import CaseProblem
+from klack.network.checks import check_nodes, check_rows
+from klack.network.component import Component
+from klack.network.nodes import RESERVED, Node, join
+from klack.network.port import Role
+from klack.network.rows import AMBIENT, GROUND, Ambient, Rows
+
+if TYPE_CHECKING:
+    from klack.hydraulics.fluid import Fluid
+
+__all__ = ["Network"]
+
+_FIRST = {Role.MOTION: 0, Role.COMPLIANCE: 1, Role.PRESSURE: 1}
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Components joined in their ports.
+
+    Parameters
+    ----------
+    components : mapping of str to Component
+        By name.
+    connections : sequence of sequences of str
+        Each lists the ports, ``"component.port"``, that meet in one node; or ``"ground"``,
+        ``"ambient"``.
+    ambient : Ambient
+    fluid : Fluid or None
+        At its temperature; needed as soon as anything is hydraulic.
+
+    Raises
+    ------
+    CaseProblem
+        An :class:`klack.errors.InputError` that names the component or the connection.
+
+    Examples
+    --------
+    >>> from klack.mechanics.rigid_mass import RigidMass
+    >>> from klack.mechanics.spring import Spring
+    >>> parts = {"needle": RigidMass(mass=3e-3), "spring": Spring(stiffness=5e3, preload=20.0)}
+    >>> rows = Network(parts, [["needle.body", "spring.end"]]).rows()
+    >>> len(rows.bodies), len(rows.elements)
+    (1, 1)
+    """
+
+    components: Mapping[str, Component]
+    connections: Sequence[Sequence[str]]
+    ambient: Ambient = field(default_factory=Ambient)
+    fluid: "Fluid | None" = None
+    nodes: tuple[Node, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "components", dict(self.components))
+        connections = tuple(tuple(connection) for connection in self.connections)
+        object.__setattr__(self, "connections", connections)
+        for name in self.components:
+            if name in RESERVED or "." in name:
+                raise CaseProblem(
+                    ("components", name),
+                    got=f"the name '{name}'",
+                    expected="a name without point, other than ground and ambient",
+                    hint="rename the component.",
+                    on_key=True,
+                )
+        nodes = join(self.components, self.connections)
+        check_nodes(self.components, nodes)
+        object.__setattr__(self, "nodes", nodes)
+        if self.fluid is None:
+            for name, component in self.components.items():
+                if _is_hydraulic(component):
+                    raise CaseProblem(
+                        (),
+                        got=f"no fluid, but the hydraulic component '{name}'",
+                        expected="fluid: what flows through the valve",
+                        hint="add e.g. 'fluid: {name: n-heptane}'.",
+                    )
+
+    def rows(self) -> Rows:
+        """Translate into what the solver runs.
+
+        Bodies come first, then whatever rules a pressure, then all others in their own order, so
+        that each finds what it needs.
+
+        Raises
+        ------
+        InputError
+            For a network that cannot start; see :mod:`klack.network.checks`.
+
+        Warns
+        -----
+        LooseBodyWarning
+            For a body that nothing holds.
+        """
+        rows = Rows(ambient=self.ambient, fluid=self.fluid)
+        if any(_is_hydraulic(component) for component in self.components.values()):
+            rows.component = "ambient"
+            rows.pressure(AMBIENT, time=[0.0], pressure=[self.ambient.pressure])
+        handles, partners = self._handles(), self._partners()
+        for name in sorted(self.components, key=self._rank):  # stable: else in the given order
+            rows.component = name
+            rows.handles, rows.partners = handles[name], partners[name]
+            self.components[name].add_rows(rows)
+        check_rows(rows)
+        return rows
+
+    def _rank(self, name: str) -> int:
+        ports = self.components[name].port_kinds().values()
+        return min((_FIRST.get(port.role, 2) for port in ports), default=2)
+
+    def _handles(self) -> dict[str, dict[str, int]]:
+        """Handle of every port of every component."""
+        handles: dict[str, dict[str, int]] = {}
+        moving = 0
+        for name, component in self.components.items():
+            handles[name] = {}
+            for port, kind in component.port_kinds().items():
+                rest = AMBIENT if kind.domain == "hydraulic" else GROUND
+                handles[name][port] = rest
+                if kind.role is Role.MOTION:
+                    handles[name][port], moving = moving, moving + 1
+        pressures = AMBIENT
+        for node in self.nodes:
+            if node.domain == "hydraulic" and not node.word:
+                pressures += 1
+            bodies = node.having(Role.MOTION)
+            motion = handles[bodies[0].component][bodies[0].name] if bodies else GROUND
+            shared = {"mechanical": motion, "electric": node.index}
+            shared["hydraulic"] = AMBIENT if node.word else pressures
+            for joint in node.joints:
+                handles[joint.component][joint.name] = shared[node.domain]
+        return handles
+
+    def _partners(self) -> dict[str, dict[str, tuple[Component, ...]]]:
+        """Return the other components at the node of every joined port."""
+        partners: dict[str, dict[str, tuple[Component, ...]]] = {}
+        for name in self.components:
+            partners[name] = {}
+        for node in self.nodes:
+            for joint in node.joints:
+                partners[joint.component][joint.name] = tuple(
+                    self.components[other.component] for other in node.joints if other is not joint
+                )
+        return partners
+
+    def with_components(
+        self, components: Mapping[str, Component], connections: Sequence[Sequence[str]] = ()
+    ) -> Self:
+        """Return this network with components added or, under a name that is there, replaced.
+
+        Parameters
+        ----------
+        components : mapping of str to Component
+        connections : sequence of sequences of str
+            Added; one that shares a port with a connection that is there extends it.
+        """
+        merged = [list(connection) for connection in self.connections]
+        for new in connections:
+            met = [old for old in merged if (set(old) & set(new)) - set(RESERVED)]
+            together = [port for old in met for port in old]
+            together += [port for port in new if port not in together]
+            merged = [old for old in merged if old not in met] + [together]
+        return type(self)({**self.components, **components}, merged, self.ambient, self.fluid)
+
+    def dry(self) -> Self:
+        """Return the same valve without fluid: no flow, no pressure force, no film, no leakage."""
+        return self._changed({name: part.dry() for name, part in self.components.items()}, None)
+
+    def lumped(self, stiffness: float, restitution: float | None = None) -> Self:
+        """Return the lumped baseline: rigid bodies, one spring and one dashpot per end stop.
+
+        Parameters
+        ----------
+        stiffness : float [N/m]
+            Of every end stop; 1e9 N/m is usual.
+        restitution : float or None [-]
+            Sets the dashpots after Gonthier et al. (2004); no loss without.
+        """
+        parts = {
+            name: part.lumped(stiffness, restitution) for name, part in self.components.items()
+        }
+        return self._changed(parts, "ground")
+
+    def _changed(self, parts: Mapping[str, Component | None], instead: str | None) -> Self:
+        """Exchange components; what became None is left out, or its ports become a word."""
+        kept = {name: part for name, part in parts.items() if part is not None}
+        connections = []
+        for connection in self.connections:
+            ports = [port for port in connection if port in RESERVED or _part_of(port) in kept]
+            if instead and len(ports) < len(connection) and instead not in ports:
+                ports.append(instead)
+            if len(ports) > 1:
+                connections.append(ports)
+        hydraulic = any(_is_hydraulic(part) for part in kept.values())
+        return type(self)(kept, connections, self.ambient, self.fluid if hydraulic else None)
+
+
+def _is_hydraulic(component: Component) -> bool:
+    return any(port.domain == "hydraulic" for port in component.port_kinds().values())
+
+
+def _part_of(port: str) -> str:
+    return port.partition(".")[0]
