@@ -1,0 +1,33 @@
+"""Values over time that a source is given: a step, or a table."""
+
+from collections.abc import Sequence
+
+from klack.input.problem import CaseProblem
+
+__all__ = ["check_table", "step_table"]
+
+
+def check_table(time: Sequence[float], values: Sequence[float], name: str) -> None:
+    """Raise :class:`CaseProblem` unless times rise and every one has a value."""
+    if len(time) != len(values) or not time:
+        raise CaseProblem(
+            (name,),
+            got=f"{len(values)} values at {len(time)} times",
+            expected="one value per time, at least one",
+            hint="both lists belong together, entry by entry.",
+        )
+    for k in range(1, len(time)):
+        if not time[k] > time[k - 1]:
+            raise CaseProblem(
+                ("time", k),
+                got=f"{time[k]:g} s after {time[k - 1]:g} s",
+                expected="times that rise",
+                hint="write a jump as a short ramp, e.g. of 1 us.",
+            )
+
+
+def step_table(
+    before: float, after: float, at: float, rise: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times [s] and values of a ramp from ``before`` to ``after`` that begins ``at``."""
+    return (at, at + rise), (before, after)
