@@ -42,8 +42,8 @@ NO_LAW = -1
 
 _LINEAR, _TABLE = LAW_LINEAR, LAW_TABLE
 _FORCE_LEFT = 1e-9  # [N] accepted error of a force
-_STEP_LEFT = 1e-17  # [m] Newton step that is round-off
-_UNKNOWN = 1e16  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-13 m
+_ROUND_OFF = 1e-17  # [m]
+_UNKNOWN = 1e18  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-14 m
 _NEWTON_LIMIT = 100
 _SERIES = 0.05  # below it the logarithm is a short series
 
@@ -196,7 +196,7 @@ def solve_interface(
         relaxed = (theta - 0.5) * (e1 - e0) * (e1 - e0) / series
     contact_loss, film_loss = 0.0, 0.0
     if chi_over_h != 0.0:
-        contact_loss = _damping_loss(kind, law_data, law_start, chi_over_h, z0, g1 + e1, hint)
+        contact_loss = _damping_loss(kind, law_data, law_start, contact, z0, g1 + e1, hint)
     if filmed:
         film_loss = film * (z0 - (g1 + e1)) + relaxed
     else:
@@ -275,39 +275,31 @@ def _both(
     for _ in range(_NEWTON_LIMIT):
         contact, stiffness, curvature = 0.0, 0.0, 0.0
         if (z0 < 0.0 or z < 0.0) and kind != NO_LAW:
-            contact, stiffness, curvature, hint = _contact(
-                kind, p, start, chi_over_h, z0, z, hint
-            )
+            contact, stiffness, curvature, hint = _contact(kind, p, start, chi_over_h, z0, z, hint)
         film = film_force(cubic, linear, cut_off, h, z0, z)
         pulled = film <= -suction
         if pulled:
             film = -suction
         excess = z - base - S * (contact + film)
+        film_slope = 0.0
         if not pulled and (z > 0.0 or (z == 0.0 and excess < 0.0)):
             x = z + cut_off
             damper = cubic / (x * x)
-            stiffness += (damper + linear) / (x * h)
+            film_slope = (damper + linear) / (x * h)
             curvature += (3.0 * damper + linear) / (x * x * h)
-        step = excess / (1.0 + S * stiffness)
+        step = excess / (1.0 + S * (stiffness + film_slope))
         after = z - step
-        crosses = z != 0.0 and (z > 0.0) != (after > 0.0)
-        released = pulled and step > 0.0
+        kinked = z == 0.0 or (z > 0.0) != (after > 0.0) or (pulled and step > 0.0)
         # taken without a look back, and before the bracket test: both its ends are round-off then
-        if abs(step) < _STEP_LEFT or (
-            curvature * step * step < _FORCE_LEFT and not crosses and not released
-        ):
-            film_step = 0.0
-            if not pulled and z > 0.0:
-                x = z + cut_off
-                film_step = (cubic / (x * x) + linear) / (x * h) * step
-            if film + film_step >= -suction:
-                contact_step = (stiffness * step - film_step) if stiffness > 0.0 else 0.0
-                return max(contact + contact_step, 0.0), film + film_step, hint
+        if abs(excess) < _ROUND_OFF or (not kinked and curvature * step * step < _FORCE_LEFT):
+            contact = max(contact + stiffness * step, 0.0)
+            if pulled or film + film_slope * step >= -suction:
+                return contact, film + film_slope * step, hint
         if excess > 0.0:
             low, high = max(low, z - excess), z
         else:
             low, high = z, min(high, z - excess)
-        if crosses and low < 0.0 < high:
+        if z != 0.0 and (z > 0.0) != (after > 0.0) and low < 0.0 < high:
             after = 0.0
         if not low <= after <= high:
             after = 0.5 * (low + high)
@@ -336,14 +328,10 @@ def _contact(
 
 @njit(cache=True, error_model="numpy")
 def _damping_loss(
-    kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z1: float, hint: int
+    kind: int, p: Vector, start: int, contact: float, z0: float, z1: float, hint: int
 ) -> float:
-    """Part of the work that the dissipation of Hunt and Crossley takes, never negative."""
+    """Work of the contact force that the elastic law does not store."""
     if kind == NO_LAW or (z0 >= 0.0 and z1 >= 0.0):
         return 0.0
     mean, _, _ = mean_force(kind, p, start, -z0, -z1, hint)
-    stored = mean * (z0 - z1)
-    rate = chi_over_h * (z0 - z1)
-    if rate <= -1.0:
-        return -stored  # clipped: the store empties without doing work
-    return stored * rate
+    return (contact - mean) * (z0 - z1)
