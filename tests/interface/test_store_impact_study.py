@@ -9,7 +9,7 @@ import pytest
 import zarr
 
 from klack.errors import InputError
-from klack.workflow import store
+from klack.workflow import record_store
 from klack.workflow.store import RESULT_NAME, load_study, save_study
 from klack.workflow.study import ImpactStudy
 
@@ -89,7 +89,7 @@ def test_an_interrupted_save_leaves_the_old_result(
     def interrupt(*_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(store, "_checksum", interrupt)
+    monkeypatch.setattr(record_store, "_checksum", interrupt)
     with pytest.raises(KeyboardInterrupt):
         save_study(lonely_study, tmp_path)
     monkeypatch.undo()

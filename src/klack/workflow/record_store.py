@@ -1,0 +1,290 @@
+"""Records on disk: one Zarr v3 store that any language with a Zarr reader can open.
+
+Every record is a group, every array an array with its unit as an attribute, numbers and words are
+attributes of the group.  Nothing is pickled.  A checksum beside each array finds lost chunks, which
+a Zarr reader would silently take for zeros.
+"""
+
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cache
+from math import isfinite
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+from urllib.parse import quote
+from zlib import crc32
+
+import numpy as np
+import zarr
+
+from klack.errors import InputError
+
+__all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
+
+RESULT_NAME = "result.zarr"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFormat:
+    """How one kind of record is stored.
+
+    Parameters
+    ----------
+    name : str
+        Written into the store.
+    version : int
+    kind : type
+        Frozen dataclass of numbers, words, arrays and further such records.
+    command : str
+        That makes it, for messages.
+    units : mapping of str to str
+        By name of the array; a name not listed is stored without a unit.
+    """
+
+    name: str
+    version: int
+    kind: type
+    command: str
+    units: Mapping[str, str]
+
+
+def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
+    """Write ``folder/result.zarr``; an earlier result stays whole until the new one is complete.
+
+    Returns
+    -------
+    Path
+        Of the store.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    target, old = folder / RESULT_NAME, folder / f"{RESULT_NAME}.old"
+    new = folder / f".{RESULT_NAME}.{os.getpid()}.new"
+    try:
+        root = zarr.open_group(new, mode="w", zarr_format=3)
+        root.attrs.put({"format": form.name, "format_version": form.version})
+        _write(root, "study", record, form.units)
+        if target.exists():
+            shutil.rmtree(old, ignore_errors=True)
+            target.rename(old)
+        new.rename(target)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    shutil.rmtree(old, ignore_errors=True)
+    return target
+
+
+def load_record(folder: Path, form: RecordFormat) -> Any:
+    """Read what :func:`save_record` wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder given to :func:`save_record`, or the store itself.
+    form : RecordFormat
+
+    Raises
+    ------
+    InputError
+        If there is no result, it comes from something else, or a part of it is missing.
+    """
+    path = _find(folder)
+    root, attributes = _open(path)
+    if attributes.get("format") != form.name:
+        raise InputError(
+            f"result {path}",
+            got=f"a Zarr store with format {attributes.get('format')!r}",
+            expected=f"{form.name!r}",
+            hint=f"give the folder that `{form.command}` wrote its result to.",
+        )
+    version = attributes.get("format_version")
+    if version != form.version:
+        raise InputError(
+            f"result {path}",
+            got=f"format version {version}",
+            expected=f"version {form.version}",
+            hint="read it with the klack that wrote it, or run the case again.",
+        )
+    try:
+        record = _read(root, "study", form.kind)
+    except InputError as error:
+        raise _damaged(path, error.got) from error
+    except Exception as error:  # whatever zarr and the codecs say about missing or cut files
+        raise _damaged(path, f"a part that cannot be read ({type(error).__name__}: {error})") from (
+            error
+        )
+    if not isinstance(record, form.kind):
+        raise _damaged(path, "no study in it")
+    return record
+
+
+def stored_format(folder: Path) -> str:
+    """Name of the format of the result in a folder."""
+    return str(_open(_find(folder))[1].get("format"))
+
+
+def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
+    try:
+        root = zarr.open_group(path, mode="r", zarr_format=3)
+        return root, dict(root.attrs)
+    except Exception as error:  # zarr raises its own, json's and the file system's kinds
+        raise _damaged(path, f"a store that does not open ({error})") from error
+
+
+def _find(folder: Path) -> Path:
+    # the second name holds the earlier result while save_study exchanges the two
+    for path in (folder / RESULT_NAME, folder / f"{RESULT_NAME}.old", folder):
+        if (path / "zarr.json").is_file():
+            return path
+    raise InputError(
+        f"result {folder}",
+        got="no klack result" if folder.exists() else "a folder that does not exist",
+        expected=f"a folder with '{RESULT_NAME}' in it",
+        hint="run `klack impact CASE` or `klack stroke CASE` first, and give the folder that it "
+        "names at the end.",
+    )
+
+
+def _damaged(path: Path, got: str) -> InputError:
+    return InputError(
+        f"result {path}",
+        got=got,
+        expected="a complete result",
+        hint="copy the whole folder again, or run the case again.",
+    )
+
+
+# --------------------------------------------------------------------------- writing
+
+
+def _write(parent: zarr.Group, name: str, value: Any, units: Mapping[str, str]) -> None:
+    """Store a value that is or holds arrays or records as a child of ``parent``."""
+    if isinstance(value, np.ndarray):
+        attributes: dict[str, Any] = {"crc32": _checksum(value)}
+        if name in units:
+            attributes["unit"] = units[name]
+        parent.create_array(name, data=np.ascontiguousarray(value), attributes=attributes)
+        return
+    if is_dataclass(value):
+        members = {field.name: getattr(value, field.name) for field in fields(value)}
+    elif isinstance(value, Mapping):
+        members = dict(value)
+    else:
+        members = {str(i): member for i, member in enumerate(value)}
+    group = parent.create_group(quote(name, safe=" "))
+    plain: dict[str, Any] = {}
+    for key, member in members.items():
+        if _has_arrays(member):
+            _write(group, key, member, units)
+        else:
+            plain[key] = _plain(member)
+    # the order of a mapping is part of it, and a zarr group does not keep it
+    group.attrs.put({"values": plain, "order": list(members)})
+
+
+def _has_arrays(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return any(map(_has_arrays, value.values()))
+    if isinstance(value, tuple | list):
+        return any(map(_has_arrays, value))
+    return isinstance(value, np.ndarray) or is_dataclass(value)
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no infinity: such numbers travel as words."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(member) for key, member in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(member) for member in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)
+    return value
+
+
+def _checksum(array: np.ndarray) -> int:
+    return crc32(np.ascontiguousarray(array).tobytes())
+
+
+# --------------------------------------------------------------------------- reading
+
+
+def _read(parent: zarr.Group, name: str, hint: Any) -> Any:
+    node = parent[quote(name, safe=" ")]
+    if isinstance(node, zarr.Array):
+        values = np.asarray(node[...])
+        if _checksum(values) != node.attrs.get("crc32"):
+            raise _incomplete(f"damaged numbers in '{node.path}'")
+        return values
+    attributes = dict(node.attrs)
+    plain, order = attributes.get("values"), attributes.get("order")
+    if not isinstance(plain, dict) or not isinstance(order, list):
+        raise _incomplete(f"no values in '{node.path}'")
+    if is_dataclass(hint):
+        return _read_record(node, hint, plain, order)
+    kinds = [_element(hint, i) for i in range(len(order))]
+    members = {
+        key: _convert(plain[key], kind) if key in plain else _read(node, key, kind)
+        for key, kind in zip(order, kinds, strict=True)
+    }
+    return members if _is_mapping(hint) else tuple(members.values())
+
+
+def _read_record(node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: list[str]) -> Any:
+    hints = _hints(kind)
+    members = {}
+    for field in fields(kind):
+        if field.name in plain:
+            members[field.name] = _convert(plain[field.name], hints[field.name])
+        elif field.name in order:
+            members[field.name] = _read(node, field.name, _without_none(hints[field.name]))
+        elif field.default is MISSING and field.default_factory is MISSING:
+            raise _incomplete(f"no '{field.name}' in '{node.path}'")
+    return kind(**members)
+
+
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _incomplete(got: str) -> InputError:
+    return InputError("result", got=got, expected="a complete result", hint="run it again.")
+
+
+def _convert(value: Any, hint: Any) -> Any:
+    hint = _without_none(hint)
+    if value is None:
+        return None
+    if hint is float:
+        return float(value)
+    if isinstance(value, list):
+        return tuple(_convert(member, _element(hint, i)) for i, member in enumerate(value))
+    if isinstance(value, dict):
+        return {key: _convert(member, _element(hint, 0)) for key, member in value.items()}
+    return value
+
+
+def _without_none(hint: Any) -> Any:
+    """``X`` for ``X | None``."""
+    kinds = [kind for kind in get_args(hint) if kind is not type(None)]
+    return kinds[0] if type(None) in get_args(hint) and len(kinds) == 1 else hint
+
+
+def _is_mapping(hint: Any) -> bool:
+    origin = get_origin(hint)
+    return isinstance(origin, type) and issubclass(origin, Mapping)
+
+
+def _element(hint: Any, index: int) -> Any:
+    """Kind declared for the member ``index`` of a tuple or of a value of a mapping."""
+    arguments = get_args(hint)
+    if not arguments:
+        return Any
+    if _is_mapping(hint):
+        return arguments[1]
+    if len(arguments) == 2 and arguments[1] is Ellipsis:
+        return arguments[0]
+    return arguments[min(index, len(arguments) - 1)]
