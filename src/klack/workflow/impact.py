@@ -1,8 +1,6 @@
 """``klack impact``: one dry impact at the levels asked for, laid over each other."""
 
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from time import perf_counter
@@ -16,14 +14,12 @@ from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
 from klack.contact.statics import check_resolution
 from klack.contact.submodel import LocalStiffness
-from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
-from klack.errors import AccuracyWarning, InputError
-from klack.materials import Material
+from klack.errors import InputError
 from klack.reduction.reduce import Correction
-from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
+from klack.workflow.body_summary import summarise_body
 from klack.workflow.levels import (
     PARTICIPATION_POOL,
     ReducedPair,
@@ -43,6 +39,7 @@ from klack.workflow.levels import (
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 from klack.workflow.section import section_picture
+from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.study import (
     BodySummary,
     ContactSummary,
@@ -55,7 +52,6 @@ from klack.workflow.transfer import TRANSFER_MODES, compare_transfer
 
 __all__ = ["run_impact"]
 
-_LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 # What a reduced level needs before it can run, beyond meshes and matrices.
 _SET_UP = ("factorise", "static contact", "modes", "reduced")
 _CORRECTIONS: Mapping[str, Correction] = {
@@ -93,8 +89,8 @@ def run_impact(
     begin = perf_counter()
     wanted = case.require_levels(levels)
     _require_time_to_touch(case)
-    clock = _Clock(progress)
-    with _collected_warnings() as notes:
+    clock = StageClock(progress)
+    with collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
         needed = [1]
         if case.run.transfer is not None:
@@ -136,7 +132,7 @@ def run_impact(
         speed=case.motion.speed,
         gap=case.contact.gap or 0.0,
         version=__version__,
-        versions={name: version(name) for name in _LIBRARIES},
+        versions={name: version(name) for name in LIBRARIES},
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         wall_time=perf_counter() - begin,
         stage_times=clock.times(),
@@ -161,52 +157,6 @@ def _require_time_to_touch(case: Case) -> None:
             expected="a time that holds the impact",
             hint="enlarge run.duration or make contact.gap smaller.",
         )
-
-
-class _Clock:
-    """Passes progress on and measures how long each stage takes."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._stage, self._since = "", perf_counter()
-        self._times: dict[str, float] = {}
-
-    def __call__(self, stage: str, fraction: float) -> None:
-        if stage != self._stage:
-            self._book()
-            self._stage = stage
-        self._progress(stage, fraction)
-
-    def _book(self) -> None:
-        now = perf_counter()
-        if self._stage:
-            self._times[self._stage] = self._times.get(self._stage, 0.0) + now - self._since
-        self._since = now
-
-    def spent(self, stages: Sequence[str]) -> float:
-        """Seconds in these stages so far."""
-        return sum(self.times().get(stage, 0.0) for stage in stages)
-
-    def times(self) -> dict[str, float]:
-        """Seconds per stage."""
-        self._book()
-        return dict(self._times)
-
-
-@contextmanager
-def _collected_warnings() -> Iterator[list[str]]:
-    """Collect accuracy warnings as notes of the study, each once; show all others as usual."""
-    notes: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield notes
-    for item in caught:
-        if issubclass(item.category, AccuracyWarning):
-            text = str(item.message)
-            if text not in notes:
-                notes.append(text)
-        else:
-            warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
 
 
 def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) -> ReducedPair:
@@ -263,52 +213,13 @@ def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPic
 
 def _summaries(problem: ContactProblem, own: ReducedPair) -> tuple[BodySummary, ...]:
     return tuple(
-        _body_summary(problem.case, body, reduced)
+        summarise_body(
+            problem.case, body, reduced, compliance_share=float(reduced.compliance_share[0])
+        )
         for body, reduced in (
             (problem.pair.upper, own.upper),
             (problem.pair.lower, own.lower),
         )
-    )
-
-
-def _body_summary(case: Case, body: ElasticBody, reduced: ReducedBody) -> BodySummary:
-    given = case.bodies[body.name]
-    geometry = given.geometry
-    if geometry.mesh is not None:
-        source = f"mesh file {geometry.mesh.file.name}"
-    elif geometry.step is not None:
-        source = f"STEP file {geometry.step.file.name}"
-    else:
-        layers = f" in {geometry.layers} layers" if geometry.layers else ""
-        source = f"profile, {geometry.model}{layers}"
-    supports = []
-    for support in given.fixed or ():
-        sectors = support.sectors
-        where = f"surface '{support.surface}'"
-        if sectors is not None:
-            where += f" in {sectors.count} sectors of {np.degrees(sectors.width):.4g} deg"
-        supports.append(where)
-    materials = case.materials_of(body.name, body.mesh.solids)
-    first, last = reduced.rigid_count, reduced.rigid_count + elastic_count(reduced)
-    return BodySummary(
-        name=body.name,
-        model="axisymmetric" if body.dimension == 2 else "3-D",
-        source=source,
-        support="held at " + " and ".join(supports) if supports else "free",
-        material="; ".join(dict.fromkeys(_in_words(m) for m in materials.values())),
-        mass=body.mass,
-        nodes=body.mesh.node_count,
-        elements=body.mesh.element_count,
-        dofs=body.dof_count,
-        frequencies=reduced.frequencies[first:last],
-        compliance_share=float(reduced.compliance_share[0]),
-    )
-
-
-def _in_words(material: Material) -> str:
-    return (
-        f"{material.name} (E {material.young / 1e9:.4g} GPa, nu {material.poisson:.3g}, "
-        f"rho {material.density:.5g} kg/m3)"
     )
 
 

@@ -1,0 +1,56 @@
+"""One body in numbers and words, for tables."""
+
+import numpy as np
+
+from klack.case.bodies import CaseFile
+from klack.elasticity.body import ElasticBody
+from klack.materials import Material
+from klack.reduction.reduced_body import ReducedBody
+from klack.workflow.levels import elastic_count
+from klack.workflow.study import BodySummary
+
+__all__ = ["summarise_body"]
+
+
+def summarise_body(
+    case: CaseFile, body: ElasticBody, reduced: ReducedBody, *, compliance_share: float
+) -> BodySummary:
+    """Put a body into numbers and words; the share is that of the kept modes at its contact."""
+    given = case.bodies[body.name]
+    geometry = given.geometry
+    if geometry.mesh is not None:
+        source = f"mesh file {geometry.mesh.file.name}"
+    elif geometry.step is not None:
+        source = f"STEP file {geometry.step.file.name}"
+    else:
+        layers = f" in {geometry.layers} layers" if geometry.layers else ""
+        source = f"profile, {geometry.model}{layers}"
+    supports = []
+    for support in given.fixed or ():
+        sectors = support.sectors
+        where = f"surface '{support.surface}'"
+        if sectors is not None:
+            where += f" in {sectors.count} sectors of {np.degrees(sectors.width):.4g} deg"
+        supports.append(where)
+    materials = case.materials_of(body.name, body.mesh.solids)
+    first, last = reduced.rigid_count, reduced.rigid_count + elastic_count(reduced)
+    return BodySummary(
+        name=body.name,
+        model="axisymmetric" if body.dimension == 2 else "3-D",
+        source=source,
+        support="held at " + " and ".join(supports) if supports else "free",
+        material="; ".join(dict.fromkeys(_in_words(m) for m in materials.values())),
+        mass=body.mass,
+        nodes=body.mesh.node_count,
+        elements=body.mesh.element_count,
+        dofs=body.dof_count,
+        frequencies=reduced.frequencies[first:last],
+        compliance_share=compliance_share,
+    )
+
+
+def _in_words(material: Material) -> str:
+    return (
+        f"{material.name} (E {material.young / 1e9:.4g} GPa, nu {material.poisson:.3g}, "
+        f"rho {material.density:.5g} kg/m3)"
+    )
