@@ -11,7 +11,8 @@ from klack.network.component import Component
 __all__ = ["COMPONENTS", "component_class", "component_classes", "type_words"]
 
 # Registering a component type is one line here: type word and where its class is.  The word must be
-# the class's own ``type``.  Nothing is imported before a case asks for it.
+# the class's own ``type``; words are joined by hyphens, like all words that a case may choose from.
+# Nothing is imported before a case asks for it.
 COMPONENTS = (
     # mechanics
     ("rigid-mass", "klack.mechanics.rigid_mass.RigidMass"),

@@ -122,8 +122,11 @@ def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressur
 
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
-    """Whether this flow comes from nowhere: the only port of its component."""
-    return joint.port.role is Role.FLOW and len(components[joint.component].port_kinds()) == 1
+    """Whether the component needs nothing else than this port for a flow."""
+    needed = [
+        port for port in components[joint.component].port_kinds().values() if not port.optional
+    ]
+    return needed == [joint.port] and joint.port.role is Role.FLOW
 
 
 def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProblem:

@@ -1,0 +1,149 @@
+"""The section ``network`` of a case file: fluid, components by type, connections."""
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from klack.input.problem import CaseProblem, one_of
+from klack.input.section import Name, Section, Text
+from klack.network.catalogue import component_class, component_classes, type_words
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.rows import Ambient
+from klack.units import Pressure, Temperature
+
+__all__ = ["AmbientSection", "AnyComponent", "NetworkSection", "read_component"]
+
+
+def read_component(value: Any, context: Any = None) -> Component:
+    """Make a component from a mapping with the key ``type``.
+
+    Parameters
+    ----------
+    value : mapping or Component
+    context : mapping, optional
+        Of pydantic; with one, as in a case file, every number needs its unit.
+
+    Raises
+    ------
+    CaseProblem
+        Without a type, or for an unknown one.
+    pydantic.ValidationError
+        For keys and values that the component refuses.
+    """
+    if isinstance(value, Component):
+        return value
+    if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
+        raise CaseProblem(
+            (),
+            got="a mapping without the key 'type'" if isinstance(value, Mapping) else f"'{value}'",
+            expected=f"type: one of {one_of(type_words())}",
+            hint="write e.g. {type: spring, stiffness: 5 N/mm, preload: 20 N}.",
+        )
+    found = component_class(value["type"])
+    return found.model_validate(
+        {key: item for key, item in value.items() if key != "type"}, context=context
+    )
+
+
+class _ComponentSchema:
+    """JSON schema of the mapping that :func:`read_component` takes."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        choices = []
+        for found in component_classes():
+            reference = handler(found.__pydantic_core_schema__)
+            definition = handler.resolve_ref_schema(reference)
+            word = {"const": found.type, "type": "string", "description": "Component type."}
+            definition["properties"] = {"type": word, **definition.get("properties", {})}
+            definition["required"] = ["type", *definition.get("required", [])]
+            choices.append(reference)
+        return {"oneOf": choices}
+
+
+def _read_component(value: Any, info: ValidationInfo) -> Component:
+    return read_component(value, info.context)
+
+
+AnyComponent = Annotated[Component, BeforeValidator(_read_component), _ComponentSchema()]
+"""Field that takes any registered component, ``{type: ..., ...}``."""
+
+_FLUID = ("klack.hydraulics.fluid_choice", "FluidChoice")
+
+
+def _fluid_section() -> Any:
+    """Class of the section ``fluid``; hydraulics is above this package and so imported late."""
+    return getattr(import_module(_FLUID[0]), _FLUID[1])
+
+
+def _read_fluid(value: Any, info: ValidationInfo) -> Any:
+    found = _fluid_section()
+    return value if isinstance(value, found) else found.model_validate(value, context=info.context)
+
+
+class _FluidSchema:
+    """JSON schema of the section ``fluid``."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return handler(_fluid_section().__pydantic_core_schema__)
+
+
+class AmbientSection(Section):
+    """Surroundings of the valve."""
+
+    pressure: Pressure = Field(
+        default=101_325.0, gt=0, description="Absolute; pressure forces count from here."
+    )
+    temperature: Temperature = Field(
+        default=293.15, gt=0, description="Of the surroundings and of the fluid."
+    )
+
+    def ambient(self) -> Ambient:
+        """Return it as the rows know it."""
+        return Ambient(self.pressure, self.temperature)
+
+
+class NetworkSection(Section):
+    """Everything around the bodies: components and how they are joined."""
+
+    ambient: AmbientSection = Field(default=AmbientSection(), description="Surroundings.")
+    fluid: Annotated[Any, BeforeValidator(_read_fluid), _FluidSchema()] = Field(
+        default=None, description="What flows through the valve; none: a dry valve."
+    )
+    components: Mapping[Name, AnyComponent] = Field(
+        min_length=1, description="name: {type: ..., and the keys of that type}."
+    )
+    connections: tuple[tuple[Text, ...], ...] = Field(
+        description="Each a list of the ports, component.port, that meet in one node; the words "
+        "ground and ambient may stand among them."
+    )
+
+    @model_validator(mode="after")
+    def _can_be_joined(self) -> Self:
+        self.network()
+        return self
+
+    def network(self) -> Network:
+        """Join the components.
+
+        Raises
+        ------
+        CaseProblem
+            See :class:`klack.network.network.Network`.
+        """
+        fluid = self.fluid.at(self.ambient.temperature) if self.fluid is not None else None
+        return Network(self.components, self.connections, self.ambient.ambient(), fluid)
