@@ -1,0 +1,215 @@
+r"""What drives a coil: a small state machine that every driver component compiles to.
+
+A driver is in one *state* at a time.  The state says which voltage the terminals see (constant, or
+a course over time) and whether a diode keeps the current from turning negative; its *switches* say
+when it goes over into another one: current above or below a value, time in the state, or time
+since the start of the cycle.  Switches are looked at in their order; the first that is due wins.
+
+With a diode the coil is left open once its current has come down to zero, and is connected again
+when the driver offers more than the coil induces, :math:`u > \dot\psi`.  Freewheeling is a state
+of a small negative voltage (the forward voltage of a diode), fast decay one of a large negative
+voltage (the zener diode or the boost capacitor that the current is driven back into): what flows
+back is a negative supply.
+
+Limits: ideal switches without transients of their own; sources without inner resistance (add a
+harness to the resistance of the coil).
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+from klack.network.component import Component
+from klack.network.port import VOLTAGE, Port
+from klack.network.rows import Rows
+
+__all__ = ["DriveProgram", "DriveState", "Driver", "Switch", "VoltageCourse", "When", "driver_of"]
+
+
+class When(IntEnum):
+    """What a switch waits for; the numbers stand in the compiled program."""
+
+    CURRENT_ABOVE = 0
+    CURRENT_BELOW = 1
+    STATE_LASTS = 2
+    TIME = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """Way out of a state.
+
+    Parameters
+    ----------
+    when : When
+    value : float [A] or [s]
+        Times in the state count from entering it, ``When.TIME`` from the start of the cycle.
+    to : str
+        Name of the next state.
+    new_cycle : bool
+        Whether a new cycle starts with it (``When.TIME`` only): exactly ``value`` after the last.
+    """
+
+    when: When
+    value: float
+    to: str
+    new_cycle: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VoltageCourse:
+    """Voltage over time since the start of the cycle, straight between its points.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Not falling; a time that stands twice is a jump.
+    voltage : array, shape (n,) [V]
+        Constant before the first and after the last point.
+    """
+
+    time: NDArray[np.float64]
+    voltage: NDArray[np.float64]
+
+    def __init__(self, time: ArrayLike, voltage: ArrayLike) -> None:
+        t, u = np.array(time, dtype=float).ravel(), np.array(voltage, dtype=float).ravel()
+        if t.size != u.size or t.size == 0 or np.any(np.diff(t) < 0):
+            raise InputError(
+                "VoltageCourse",
+                got=f"{t.size} times and {u.size} voltages"
+                + (", times that fall" if t.size == u.size > 0 else ""),
+                expected="as many times as voltages, at least one, times that do not fall",
+                hint="sort the points by time; write a jump as the same time twice.",
+            )
+        object.__setattr__(self, "time", t)
+        object.__setattr__(self, "voltage", u)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveState:
+    """State of a driver.
+
+    Parameters
+    ----------
+    name : str
+    voltage : float [V] or VoltageCourse
+    switches : tuple of Switch
+        The first that is due wins.
+    diode : bool
+        Whether the current cannot turn negative.
+    """
+
+    name: str
+    voltage: float | VoltageCourse
+    switches: tuple[Switch, ...] = ()
+    diode: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class DriveProgram:
+    """States of a driver; it starts in the first one at time zero.
+
+    Examples
+    --------
+    >>> on = DriveState("on", 12.0, (Switch(When.CURRENT_ABOVE, 2.2, "off"),))
+    >>> off = DriveState("off", -0.7, (Switch(When.CURRENT_BELOW, 1.8, "on"),))
+    >>> DriveProgram((on, off)).numbers().size
+    19
+    """
+
+    states: tuple[DriveState, ...]
+
+    def __post_init__(self) -> None:
+        names = [state.name for state in self.states]
+        if not names or len(set(names)) < len(names):
+            raise InputError(
+                "DriveProgram.states",
+                got=f"the states {', '.join(names) or 'none'}",
+                expected="at least one state, all with different names",
+                hint="rename a state.",
+            )
+        for state in self.states:
+            for switch in state.switches:
+                _check(state, switch, names)
+
+    def numbers(self) -> NDArray[np.float64]:
+        """Flat program for the compiled step.
+
+        ``[n] | offset of each state | states``; a state is ``source, diode, n switches`` and four
+        numbers per switch ``when, value, next state, new cycle``; then ``voltage`` (source 0) or
+        ``n, times, voltages`` (source 1).  Offsets count from the start of the program.
+        """
+        names = [state.name for state in self.states]
+        blocks = [_block(state, names) for state in self.states]
+        sizes = [block.size for block in blocks]
+        starts = 1 + len(blocks) + np.concatenate(([0], np.cumsum(sizes[:-1])))
+        return np.concatenate(([float(len(blocks))], starts, *blocks))
+
+
+def _check(state: DriveState, switch: Switch, names: Sequence[str]) -> None:
+    where = f"DriveState '{state.name}'"
+    if switch.to not in names or (switch.to == state.name and not switch.new_cycle):
+        raise InputError(
+            where,
+            got=f"a switch to '{switch.to}'",
+            expected=f"another state: {', '.join(name for name in names if name != state.name)}",
+            hint="check the names of the states.",
+        )
+    if switch.new_cycle and (switch.when is not When.TIME or not switch.value > 0):
+        raise InputError(
+            where,
+            got=f"a new cycle by {switch.when.name} {switch.value:g}",
+            expected="When.TIME with a period above 0 s",
+            hint="let a new cycle start after its period.",
+        )
+
+
+def _block(state: DriveState, names: Sequence[str]) -> NDArray[np.float64]:
+    switches = [
+        number
+        for s in state.switches
+        for number in (float(s.when), s.value, float(names.index(s.to)), float(s.new_cycle))
+    ]
+    if isinstance(state.voltage, VoltageCourse):
+        course = state.voltage
+        source = [float(course.time.size), *course.time, *course.voltage]
+    else:
+        source = [state.voltage]
+    kind = float(isinstance(state.voltage, VoltageCourse))
+    return np.array([kind, float(state.diode), float(len(state.switches)), *switches, *source])
+
+
+class Driver(Component):
+    """Something with two terminals that drives a coil; joined to the terminals of a solenoid.
+
+    A driver adds no rows: the coil that it is joined to runs its program in its own step, because
+    a switching instant is a matter of the current in the coil.
+    """
+
+    ports: ClassVar[Mapping[str, Port]] = {"terminals": VOLTAGE}
+
+    @abstractmethod
+    def program(self) -> DriveProgram:
+        """States and switches of this driver."""
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add nothing: the coil runs the program."""
+
+
+def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:
+    """Program of the driver that the coil ``port`` of the present component is joined to."""
+    drivers = [partner for partner in rows.partner(port) if isinstance(partner, Driver)]
+    if len(drivers) != 1:
+        raise InputError(
+            f"{rows.component}.{port}",
+            got=f"{len(drivers)} drivers",
+            expected="one driver at the terminals of a coil",
+            hint="join the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
+        )
+    return drivers[0].program()

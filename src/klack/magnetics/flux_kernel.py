@@ -1,0 +1,388 @@
+r"""One stretch of time of a magnetic circuit at constant voltage, compiled.
+
+From the fluxes :math:`\varphi_0` and gaps ``x0 -> x1`` the step finds the fluxes at its end from
+
+.. math::
+
+    C^T S C \frac{\Delta\varphi}{h} + C^T \bar\Theta = n\,\bar\imath , \qquad
+    \frac{n^T \Delta\varphi}{h} + R\,\bar\imath = \bar u .
+
+:math:`\bar\Theta` is a discrete gradient of the stored energy (Gonzalez 1996; Itoh and Abe 1988):
+of iron the mean of ``H`` between both fluxes, of a gap the mean of both reluctances times the
+mean flux.  With the force ``-(R1 - R0)/(x1 - x0) (b0^2 + b1^2)/4`` every step balances exactly:
+``u i h = R i^2 h + eddy loss + change of energy + F (x1 - x0)``.  Means and quotients of cubics
+are formed without subtraction, so nothing is lost when a step is short.
+
+All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``par`` (layout:
+:func:`klack.magnetics.flux_table.circuit_numbers`).  Work space lies on the stack.
+"""
+
+from math import sqrt
+from typing import Any
+
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
+from klack.magnetics.flux_table import HEADER as _HEADER
+
+__all__ = [
+    "circuit_current",
+    "circuit_energy",
+    "circuit_flux",
+    "circuit_loss_and_force",
+    "circuit_step",
+    "linked",
+    "stack",
+]
+
+_CLOSE = 1e-8
+"""Newton step over flux scale that leaves an error of its square: round-off."""
+
+
+@intrinsic(prefer_literal=True)
+def stack(typingctx: Any, size: Any) -> Any:
+    """Return ``size`` (a literal) numbers of work space on the stack of the calling function."""
+    signature = types.CPointer(types.float64)(size)
+    count = size.literal_value
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        number = context.get_value_type(types.float64)
+        return cgutils.alloca_once(builder, number, size=count)
+
+    return signature, codegen
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def interval(par: Any, table: int, hint: int, value: float) -> int:
+    """Number of the interval that holds ``value``, searched from where it was last."""
+    last = int(par[table]) - 1
+    i = hint
+    while i > 0 and value < par[table + 1 + 6 * i]:
+        i -= 1
+    while i < last and value >= par[table + 7 + 6 * i]:
+        i += 1
+    return i
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _cubic(par: Any, row: int, s: float) -> float:
+    return par[row + 1] + s * (par[row + 2] + s * (par[row + 3] + s * par[row + 4]))
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _cubic_integral(par: Any, row: int, s: float) -> float:
+    return s * (
+        par[row + 1]
+        + s * (0.5 * par[row + 2] + s * (par[row + 3] * (1.0 / 3.0) + s * 0.25 * par[row + 4]))
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def iron_energy(par: Any, table: int, hint: int, flux: float) -> float:
+    """Stored energy [J]; even in the flux."""
+    a = abs(flux)
+    row = table + 1 + 6 * interval(par, table, hint, a)
+    return par[row + 5] + _cubic_integral(par, row, a - par[row])
+
+
+@njit(cache=True, error_model="numpy")
+def iron_mmf(par: Any, table: int, hint: int, flux: float) -> float:
+    """Magnetomotive force [A]; odd in the flux."""
+    a = abs(flux)
+    row = table + 1 + 6 * interval(par, table, hint, a)
+    mmf = _cubic(par, row, a - par[row])
+    return mmf if flux >= 0.0 else -mmf
+
+
+@njit(cache=True, error_model="numpy")
+def _iron_mean_far(par: Any, table: int, hint: int, b0: float, b1: float) -> tuple[float, float]:
+    """Mean over more than one interval or across zero; see :func:`_iron_mean`."""
+    a0, a1 = abs(b0), abs(b1)
+    i0 = interval(par, table, hint, a0)
+    i1 = interval(par, table, i0, a1)
+    r0, r1 = table + 1 + 6 * i0, table + 1 + 6 * i1
+    if b0 * b1 < 0.0 or i0 == i1:
+        before = par[r0 + 5] + _cubic_integral(par, r0, a0 - par[r0])
+        after = par[r1 + 5] + _cubic_integral(par, r1, a1 - par[r1])
+        work = after - before
+    else:
+        # neighbours share a point: its energy drops out exactly
+        up = i1 > i0
+        low, high = (r0, r1) if up else (r1, r0)
+        a, b = (a0, a1) if up else (a1, a0)
+        end = par[low + 6]
+        s0, s1 = a - par[low], end - par[low]
+        first = (s1 - s0) * _mean_of(par, low, s0, s1)
+        work = first + (par[high + 5] - par[low + 11]) + _cubic_integral(par, high, b - par[high])
+        work = work if up else -work
+    change = b1 - b0
+    mean = work / change
+    end_mmf = _cubic(par, r1, a1 - par[r1])
+    return mean, ((end_mmf if b1 >= 0.0 else -end_mmf) - mean) / change
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _mean_of(par: Any, row: int, s0: float, s1: float) -> float:
+    """Mean of a cubic between ``s0`` and ``s1``."""
+    total, squares = s0 + s1, s0 * s0 + s1 * s1
+    return (
+        par[row + 1]
+        + 0.5 * par[row + 2] * total
+        + par[row + 3] * (1.0 / 3.0) * (squares + s0 * s1)
+        + 0.25 * par[row + 4] * total * squares
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _iron_mean(par: Any, table: int, hint: int, b0: float, b1: float) -> tuple[float, float]:
+    """Mean mmf between two fluxes and its derivative by ``b1``."""
+    a0, a1 = abs(b0), abs(b1)
+    i = interval(par, table, hint, a0)
+    row = table + 1 + 6 * i
+    last = i + 1 >= int(par[table])
+    inside = a1 >= par[row] and (last or a1 < par[row + 6])
+    if not inside or b0 * b1 < 0.0:
+        return _iron_mean_far(par, table, hint, b0, b1)
+    s0, s1 = a0 - par[row], a1 - par[row]
+    mean = _mean_of(par, row, s0, s1)
+    slope = (
+        0.5 * par[row + 2]
+        + par[row + 3] * (1.0 / 3.0) * (s0 + 2.0 * s1)
+        + 0.25 * par[row + 4] * (s0 * s0 + s1 * (2.0 * s0 + 3.0 * s1))
+    )
+    negative = b0 < 0.0 or (b0 == 0.0 and b1 < 0.0)
+    return (-mean if negative else mean), slope
+
+
+@njit(cache=True, error_model="numpy")
+def gap_reluctance(par: Any, table: int, hint: int, x: float) -> float:
+    """Reluctance [A/Wb] at a gap."""
+    row = table + 1 + 6 * interval(par, table, hint, x)
+    return _cubic(par, row, x - par[row])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _quotient_of(par: Any, row: int, s0: float, s1: float) -> float:
+    """Difference quotient of a cubic between ``s0`` and ``s1``."""
+    total = s0 + s1
+    return par[row + 2] + par[row + 3] * total + par[row + 4] * (total * total - s0 * s1)
+
+
+@njit(cache=True, error_model="numpy")
+def gap_slope(par: Any, table: int, hint: int, x0: float, x1: float) -> float:
+    """Difference quotient of the reluctance between two gaps [A/(Wb m)]."""
+    i0 = interval(par, table, hint, x0)
+    i1 = interval(par, table, i0, x1)
+    r0, r1 = table + 1 + 6 * i0, table + 1 + 6 * i1
+    if i0 == i1:
+        return _quotient_of(par, r0, x0 - par[r0], x1 - par[r0])
+    low, high = (r0, r1) if i1 > i0 else (r1, r0)
+    a, b = (x0, x1) if i1 > i0 else (x1, x0)
+    s0, s1, s2 = a - par[low], par[low + 6] - par[low], b - par[high]
+    rise = (s1 - s0) * _quotient_of(par, low, s0, s1)
+    rise += (par[high + 1] - par[low + 7]) + s2 * _quotient_of(par, high, 0.0, s2)
+    return rise / (b - a)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _tube(par: Any, at: int, k: int) -> int:
+    loops = int(par[at])
+    return at + _HEADER + loops + k * (_SIZE + loops)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def circuit_flux(par: Any, at: int, k: int, phi: Any) -> float:
+    """Flux of the tube ``k`` [Wb] from the loop fluxes."""
+    loops, row = int(par[at]), _tube(par, at, k) + _SIZE
+    flux = par[row] * phi[0]
+    for j in range(1, loops):
+        flux += par[row + j] * phi[j]
+    return flux
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def linked(par: Any, at: int, phi: Any) -> float:
+    """Linkage of the coil [Wb] from the loop fluxes (or their changes)."""
+    total = par[at + _HEADER] * phi[0]
+    for j in range(1, int(par[at])):
+        total += par[at + _HEADER + j] * phi[j]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def circuit_current(par: Any, at: int, hints: Any, phi: Any, x: float) -> float:
+    """Current [A] that belongs to fluxes and gap."""
+    current = 0.0
+    for k in range(int(par[at + 1])):
+        p = _tube(par, at, k)
+        weight = par[p + 5]
+        if weight != 0.0:
+            b = circuit_flux(par, at, k, phi)
+            mmf = par[p + 1] * b - par[p + 2]
+            if par[p + 3] != 0.0:
+                mmf += b * gap_reluctance(par, at + int(par[p + 3]), int(hints[2 * k]), x)
+            if par[p + 4] != 0.0:
+                mmf += iron_mmf(par, at + int(par[p + 4]), int(hints[2 * k + 1]), b)
+            current += weight * mmf
+    return current
+
+
+@njit(cache=True, error_model="numpy")
+def circuit_energy(par: Any, at: int, hints: Any, phi: Any, x: float) -> float:
+    """Stored energy [J]; writes where in the tables it was found into ``hints``."""
+    energy = 0.0
+    for k in range(int(par[at + 1])):
+        p = _tube(par, at, k)
+        b = circuit_flux(par, at, k, phi)
+        reluctance = par[p + 1]
+        if par[p + 3] != 0.0:
+            table = at + int(par[p + 3])
+            i = interval(par, table, int(hints[2 * k]), x)
+            hints[2 * k] = i
+            row = table + 1 + 6 * i
+            reluctance += _cubic(par, row, x - par[row])
+        energy += (0.5 * reluctance * b - par[p + 2]) * b
+        if par[p + 4] != 0.0:
+            table = at + int(par[p + 4])
+            i = interval(par, table, int(hints[2 * k + 1]), abs(b))
+            hints[2 * k + 1] = i
+            row = table + 1 + 6 * i
+            energy += par[row + 5] + _cubic_integral(par, row, abs(b) - par[row])
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def circuit_loss_and_force(
+    par: Any, at: int, hints: Any, phi: Any, change: Any, x0: float, x1: float, h: float
+) -> tuple[float, float]:
+    """Eddy loss [J] and mean force along the gap [N] of a step with a change of loop fluxes."""
+    loss, force = 0.0, 0.0
+    for k in range(int(par[at + 1])):
+        p = _tube(par, at, k)
+        db = circuit_flux(par, at, k, change)
+        loss += par[p] * db * db
+        if par[p + 3] != 0.0:
+            b0 = circuit_flux(par, at, k, phi)
+            b1 = b0 + db
+            slope = gap_slope(par, at + int(par[p + 3]), int(hints[2 * k]), x0, x1)
+            force -= 0.25 * slope * (b0 * b0 + b1 * b1)
+    return loss / h, force
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(A: Any, g: Any, n: int) -> bool:
+    """Replace ``g`` by ``A^-1 g`` (symmetric, positive definite, lower half given)."""
+    if n == 1:
+        g[0] /= A[0]
+        return A[0] > 0.0
+    if n == 2:
+        a, b, c = A[0], A[2], A[3]
+        ratio = b / a
+        pivot = c - ratio * b
+        g[1] = (g[1] - ratio * g[0]) / pivot
+        g[0] = (g[0] - b * g[1]) / a
+        return a > 0.0 and pivot > 0.0
+    for j in range(n):
+        d = A[j * n + j]
+        for m in range(j):
+            d -= A[j * n + m] * A[j * n + m]
+        if not d > 0.0:
+            return False
+        d = sqrt(d)
+        A[j * n + j] = d
+        for i in range(j + 1, n):
+            v = A[i * n + j]
+            for m in range(j):
+                v -= A[i * n + m] * A[j * n + m]
+            A[i * n + j] = v / d
+    for i in range(n):
+        v = g[i]
+        for m in range(i):
+            v -= A[i * n + m] * g[m]
+        g[i] = v / A[i * n + i]
+    for r in range(n):
+        i = n - 1 - r
+        v = g[i]
+        for m in range(i + 1, n):
+            v -= A[m * n + i] * g[m]
+        g[i] = v / A[i * n + i]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def circuit_step(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    x0: float,
+    x1: float,
+    h: float,
+    voltage: float,
+    resistance: float,
+    conducts: bool,
+) -> bool:
+    """Find the change of the loop fluxes (in: a guess); False if the iteration does not settle.
+
+    Without ``conducts`` the coil is open: no current, whatever the voltage.
+    """
+    A, g = stack(36), stack(6)
+    loops, tubes = int(par[at]), int(par[at + 1])
+    turns = at + _HEADER
+    most = int(par[at + 2])
+    per_time = 1.0 / h
+    per_ohm = 1.0 / resistance
+    for _ in range(most):
+        if conducts:
+            current = (voltage - linked(par, at, change) * per_time) * per_ohm
+            stiff = per_time * per_ohm
+        else:
+            current = stiff = 0.0
+        for i in range(loops):
+            ni = par[turns + i]
+            g[i] = ni * current
+            for j in range(i + 1):
+                A[i * loops + j] = ni * par[turns + j] * stiff
+        for k in range(tubes):
+            p = _tube(par, at, k)
+            b0 = circuit_flux(par, at, k, phi)
+            db = circuit_flux(par, at, k, change)
+            reluctance = par[p + 1]
+            if par[p + 3] != 0.0:
+                table, hint = at + int(par[p + 3]), int(hints[2 * k])
+                reluctance += 0.5 * (
+                    gap_reluctance(par, table, hint, x0) + gap_reluctance(par, table, hint, x1)
+                )
+            eddy = par[p] * per_time
+            mmf = eddy * db + reluctance * (b0 + 0.5 * db) - par[p + 2]
+            slope = eddy + 0.5 * reluctance
+            if par[p + 4] != 0.0:
+                iron, iron_slope = _iron_mean(
+                    par, at + int(par[p + 4]), int(hints[2 * k + 1]), b0, b0 + db
+                )
+                mmf += iron
+                slope += iron_slope
+            row = p + _SIZE
+            for i in range(loops):
+                c = par[row + i]
+                if c != 0.0:
+                    g[i] -= c * mmf
+                    for j in range(i + 1):
+                        A[i * loops + j] += c * par[row + j] * slope
+        if not _solve(A, g, loops):
+            return False
+        for i in range(loops):
+            change[i] += g[i]
+        if most == 1:
+            return True
+        settled = True
+        for k in range(tubes):
+            p = _tube(par, at, k)
+            if par[p + 4] != 0.0:
+                settled = settled and abs(circuit_flux(par, at, k, g)) <= _CLOSE * par[p + 6]
+        if settled:
+            return True
+    return False

@@ -1,0 +1,168 @@
+r"""A magnetic circuit as flat numbers for the compiled step.
+
+Branches that carry the same flux are one: their reluctances, eddy terms and magnetisation curves
+add up.  The sum of piecewise cubics is again one on the union of their intervals, so nothing is
+lost by it; a solenoid of ten tubes often comes down to two or three.
+
+The current must follow from the fluxes alone.  Where a loop has no eddy term, its balance says
+
+.. math:: i = \frac{v^T C^T \Theta(\varphi, x)}{v^T n}, \qquad C^T S C\,v = 0 ,
+
+with ``n`` the turns linked with each loop.  Without such a loop the current would jump with the
+voltage, and a two-point driver would switch in every step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
+
+__all__ = ["BRANCH_SIZE", "HEADER", "circuit_numbers", "current_weights"]
+
+Vector = NDArray[np.float64]
+
+HEADER = 12
+"""Numbers in front of a plant; see :func:`circuit_numbers`."""
+
+BRANCH_SIZE = 8
+"""Numbers of a branch in front of its row of loops."""
+
+_SAFE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tube:
+    """Branches of equal flux: ``mmf = (R + R_gap(x)) flux + iron(flux) - remanence + S dflux/dt``.
+
+    ``gap`` and ``iron`` are rows of six numbers, empty where there is none.
+    """
+
+    row: Vector
+    eddy: float
+    reluctance: float
+    remanence: float
+    gap: Vector
+    iron: Vector
+    weight: float
+
+
+def current_weights(circuit: MagneticCircuit) -> Vector:
+    """Weights ``w`` of the branch mmfs in the current, ``i = w @ mmf``; shape (n_branches,) [-].
+
+    Raises
+    ------
+    InputError
+        If every loop around the coil encloses eddy currents.
+    """
+    C, n = circuit.loops.astype(float), circuit.loop_turns
+    S = C.T @ (circuit.eddy[:, None] * C)
+    free = [k for k in range(n.size) if n[k] != 0.0 and not np.any(S[k])]
+    if free:  # a plain leakage loop; the one through the fewest branches
+        v = np.zeros(n.size)
+        v[min(free, key=lambda k: np.count_nonzero(C[:, k]))] = 1.0
+    else:
+        values, vectors = np.linalg.eigh(S)
+        null = vectors[:, values <= _SAFE * values[-1]]
+        v = null @ (null.T @ n)
+        v[np.abs(v) < _SAFE * np.max(np.abs(v), initial=0.0)] = 0.0
+    if not abs(v @ n) > _SAFE * np.linalg.norm(n) * np.linalg.norm(v):
+        raise InputError(
+            "magnetic circuit",
+            got="eddy currents in every loop that the coil drives",
+            expected="a leakage path around the coil without an eddy term",
+            hint="add a leakage branch (5 to 15 % of the main permeance) in a loop of its own.",
+        )
+    return np.asarray(C @ v / (v @ n), dtype=float)
+
+
+def circuit_numbers(circuit: MagneticCircuit) -> Vector:
+    """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
+
+    ``[loops, tubes, largest iterations (1 if linear), main tube, sign of its flux, 7 spare]``,
+    the turns of each loop, then per tube ``eddy, reluctance, remanence, gap table, iron table,
+    weight in the current, flux scale, spare`` and its row of loops, then the tables.  Offsets of
+    tables count from the start; 0 says that there is none.
+    """
+    tubes, main, sign = _tubes(circuit)
+    loops = circuit.loops.shape[1]
+    head = np.zeros(HEADER)
+    linear = all(tube.iron.size == 0 for tube in tubes)
+    head[:5] = loops, len(tubes), 1 if linear else 40, main, sign
+    offset = HEADER + loops + len(tubes) * (BRANCH_SIZE + loops)
+    blocks, tables = [], []
+    for tube in tubes:
+        starts = []
+        for rows in (tube.gap, tube.iron):
+            starts.append(offset if rows.size else 0)
+            if rows.size:
+                tables.append(np.append(float(rows.shape[0]), rows.ravel()))
+                offset += tables[-1].size
+        scale = tube.iron[-1, 0] if tube.iron.size else 0.0
+        numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, scale, 0.0]
+        blocks.append(np.concatenate((numbers, tube.row)))
+    return np.concatenate((head, circuit.loop_turns, *blocks, *tables))
+
+
+def _tubes(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:
+    """Tubes, the one of the main branch, and the sign of the main flux in it."""
+    weights = current_weights(circuit)
+    groups: dict[tuple[int, ...], list[tuple[float, int]]] = {}
+    for k, row in enumerate(circuit.loops):
+        if np.any(row):
+            sign = 1.0 if row[np.flatnonzero(row)[0]] > 0 else -1.0
+            key = tuple(int(c) for c in sign * row)
+            groups.setdefault(key, []).append((sign, k))
+    tubes, main = [], (0, 0.0)
+    for j, (row, members) in enumerate(groups.items()):
+        branches = [(sign, circuit.branches[k]) for sign, k in members]
+        # the weight is that of the loops, so equal up to the sign within a tube
+        sign, k = members[0]
+        tubes.append(_tube(np.array(row, dtype=float), branches, sign * float(weights[k])))
+        for sign, k in members:
+            if circuit.branches[k].name == circuit.main:
+                main = (j, sign)
+    return tubes, main[0], main[1]
+
+
+def _tube(row: Vector, branches: list[tuple[float, MagneticBranch]], weight: float) -> _Tube:
+    reluctance, gaps, irons = 0.0, [], []
+    for _, branch in branches:
+        law = branch.law
+        if isinstance(law, LinearReluctance):
+            reluctance += law.reluctance
+        elif isinstance(law, GapReluctance):
+            gaps.append(law.rows)
+        elif isinstance(law, IronReluctance):
+            irons.append(law.rows)
+    return _Tube(
+        row=row,
+        eddy=sum(branch.eddy for _, branch in branches),
+        reluctance=reluctance,
+        remanence=sum(sign * branch.remanence for sign, branch in branches),
+        gap=_sum_of_cubics(gaps),
+        iron=_sum_of_cubics(irons),
+        weight=weight,
+    )
+
+
+def _sum_of_cubics(tables: list[Vector]) -> Vector:
+    """Sum of piecewise cubics (start, value, three factors, integral) on all their intervals."""
+    if not tables:
+        return np.zeros((0, 6))
+    starts = np.unique(np.concatenate([table[:, 0] for table in tables]))
+    out = np.zeros((starts.size, 6))
+    out[:, 0] = starts
+    for table in tables:
+        i = np.clip(np.searchsorted(table[:, 0], starts, side="right") - 1, 0, None)
+        s = starts - table[i, 0]
+        y, a, b, c, w = table[i, 1:].T
+        out[:, 1] += y + s * (a + s * (b + s * c))
+        out[:, 2] += a + s * (2 * b + s * 3 * c)
+        out[:, 3] += b + 3 * c * s
+        out[:, 4] += c
+        out[:, 5] += w + s * (y + s * (a / 2 + s * (b / 3 + s * c / 4)))
+    return out
