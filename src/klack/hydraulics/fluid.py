@@ -1,6 +1,6 @@
 """The fluid of a network at one temperature: liquid, entrained gas and vapour as one density."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,7 +55,7 @@ class Fluid:
     liquid: LiquidLaw
     base_viscosity: float
     vapour: Vapour
-    gas: EntrainedGas = EntrainedGas()
+    gas: EntrainedGas = field(default_factory=EntrainedGas)
     pressure_viscosity: float = 0.0
 
     def __post_init__(self) -> None:

@@ -1,0 +1,208 @@
+"""The fluid of a case file: a name of the library, a few numbers, or a table."""
+
+from math import inf
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from klack.errors import InputError
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
+from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
+from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Section, Text
+from klack.units import (
+    Density,
+    DynamicViscosity,
+    KinematicViscosity,
+    Pressure,
+    Ratio,
+    Speed,
+)
+
+__all__ = ["DensityTable", "FluidChoice"]
+
+_NUMBERS = (
+    "density",
+    "table",
+    "bulk_modulus",
+    "sound_speed",
+    "bulk_modulus_slope",
+    "viscosity",
+    "kinematic_viscosity",
+    "viscosity_pressure",
+    "vapour_pressure",
+    "vapour_density",
+)
+
+
+class DensityTable(Section):
+    """Density over pressure, at the temperature of the run."""
+
+    pressure: tuple[Pressure, ...] = Field(description="Absolute pressures, increasing.")
+    density: tuple[Density, ...] = Field(description="Densities, increasing.")
+
+    @model_validator(mode="after")
+    def _usable(self) -> Self:
+        try:
+            self.liquid()
+        except InputError as error:
+            raise CaseProblem(
+                ("density",), got=error.got, expected=error.expected, hint=error.hint
+            ) from None
+        return self
+
+    def liquid(self) -> TabulatedLiquid:
+        """Return the liquid through these points."""
+        return TabulatedLiquid(self.pressure, self.density)
+
+
+class FluidChoice(Section):
+    """The fluid of a network: a name of the library alone, or a fluid of your own.
+
+    Your own needs ``viscosity`` or ``kinematic_viscosity``, and either ``density`` with
+    ``bulk_modulus`` or ``sound_speed``, or a ``table``; these numbers hold at the temperature of
+    the run and one atmosphere.  ``fluid: n-heptane`` is short for ``fluid: {name: n-heptane}``.
+    """
+
+    name: Text = Field(description="Name of the library, or of your own fluid.")
+    density: Density | None = Field(default=None, gt=0, description="At one atmosphere.")
+    table: DensityTable | None = Field(default=None, description="Instead of density: a curve.")
+    bulk_modulus: Pressure | None = Field(
+        default=None, gt=0, description="Isentropic (from the speed of sound), at one atmosphere."
+    )
+    sound_speed: Speed | None = Field(default=None, gt=0, description="Instead of bulk_modulus.")
+    bulk_modulus_slope: Ratio | None = Field(
+        default=None, gt=0, description="Rise of the bulk modulus over pressure; default 10."
+    )
+    viscosity: DynamicViscosity | None = Field(default=None, gt=0, description="Dynamic.")
+    kinematic_viscosity: KinematicViscosity | None = Field(
+        default=None, gt=0, description="Instead of viscosity."
+    )
+    viscosity_pressure: Pressure | None = Field(
+        default=None,
+        gt=0,
+        description="Pressure over which the viscosity grows by e = 2.72; fuels 1000 bar.",
+    )
+    vapour_pressure: Pressure | None = Field(
+        default=None, gt=0, description="Where it boils, absolute; default 10 Pa."
+    )
+    vapour_density: Density | None = Field(
+        default=None, gt=0, description="Of the saturated vapour; default: ideal, 0.1 kg/mol."
+    )
+    gas_fraction: Ratio = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="Entrained gas, share of the volume at one atmosphere; 0.01 % to 0.5 %.",
+    )
+    gas_exponent: Ratio = Field(
+        default=1.4, ge=1, le=5 / 3, description="1 for slow changes, 1.4 for fast ones."
+    )
+    release_pressure: Pressure | None = Field(
+        default=None, gt=1, description="Below it all gas is free; default: it always is."
+    )
+    saturation_pressure: Pressure | None = Field(
+        default=None, gt=1, description="Above it all gas is dissolved."
+    )
+    boiling_half_width: Pressure = Field(
+        default=2000.0, gt=0, description="Half of the band of pressures in which it boils."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        low, high = self.release_pressure, self.saturation_pressure
+        if (low is None) != (high is None) or (low and high and low >= high):
+            raise CaseProblem(
+                ("saturation_pressure",),
+                got="one of the two alone" if low is None or high is None else "not above it",
+                expected="release_pressure below saturation_pressure, or none of them",
+                hint="leave both out: in strokes of milliseconds the gas stays free.",
+            )
+        if not any(getattr(self, name) is not None for name in _NUMBERS):
+            return self._in_library()
+        if find_fluid(self.name) is not None:
+            raise CaseProblem(
+                ("name",),
+                got=f"'{self.name}' of the library together with numbers of your own",
+                expected="a name alone, or your own numbers under a name of your own",
+                hint=f"remove the numbers, or call it e.g. my-{self.name.replace(' ', '-')}.",
+            )
+        self._exactly_one(("density", "table"), "the density")
+        self._exactly_one(("viscosity", "kinematic_viscosity"), "the viscosity")
+        if self.table is not None:
+            stiffness = ("bulk_modulus", "sound_speed", "bulk_modulus_slope")
+            return self._refuse_with(stiffness, "a table", "its slope is the stiffness")
+        self._exactly_one(("bulk_modulus", "sound_speed"), "the stiffness")
+        self._own()
+        return self
+
+    def _in_library(self) -> Self:
+        if find_fluid(self.name) is None:
+            hint = "for a fluid of your own add density, viscosity and bulk_modulus."
+            raise CaseProblem(
+                ("name",),
+                got=f"'{self.name}'",
+                expected=f"one of: {one_of(FLUIDS)}; or numbers of your own",
+                hint=nearest(self.name, FLUIDS, hint),
+            )
+        return self
+
+    def definition(self) -> FluidDefinition:
+        """Return the fluid over temperature, without gas."""
+        found = find_fluid(self.name)
+        return library_fluid(self.name) if found is not None else self._own()
+
+    def at(self, temperature: float) -> Fluid:
+        """Fluid with its gas at a temperature [K]."""
+        return self.definition().at(
+            temperature,
+            gas_fraction=self.gas_fraction,
+            gas_exponent=self.gas_exponent,
+            release_pressure=self.release_pressure,
+            saturation_pressure=self.saturation_pressure,
+            boiling_half_width=self.boiling_half_width,
+        )
+
+    def _own(self) -> FluidDefinition:
+        liquid = self.table.liquid() if self.table is not None else self._murnaghan()
+        viscosity = self.viscosity
+        if viscosity is None:
+            assert self.kinematic_viscosity is not None
+            viscosity = self.kinematic_viscosity * float(liquid.density(ATMOSPHERE))
+        return FluidDefinition(
+            name=self.name,
+            properties=FixedProperties(
+                liquid=liquid,
+                viscosity=viscosity,
+                pressure_viscosity=1.0 / (self.viscosity_pressure or inf),
+                vapour_pressure=self.vapour_pressure or 10.0,
+                vapour_density=self.vapour_density,
+            ),
+        )
+
+    def _murnaghan(self) -> Murnaghan:
+        assert self.density is not None
+        K = self.bulk_modulus
+        if K is None:
+            assert self.sound_speed is not None
+            K = self.density * self.sound_speed**2
+        try:
+            return Murnaghan(
+                density_at_reference=self.density,
+                bulk_modulus_at_reference=K,
+                slope=self.bulk_modulus_slope or 10.0,
+            )
+        except InputError as error:
+            raise CaseProblem(
+                ("sound_speed" if self.bulk_modulus is None else "bulk_modulus",),
+                got=f"a bulk modulus of {K:g} Pa",
+                expected="one that stays above 0 down to zero pressure",
+                hint="liquids have 0.4 to 3 GPa; check the unit.",
+            ) from error

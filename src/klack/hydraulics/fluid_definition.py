@@ -1,0 +1,355 @@
+"""What is known of a fluid over temperature, with the source of every constant."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from klack.errors import InputError
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.liquid import (
+    ATMOSPHERE,
+    LiquidLaw,
+    Murnaghan,
+    TabulatedLiquid,
+    Tait,
+    walther_viscosity,
+)
+from klack.hydraulics.mixture import EntrainedGas, Vapour
+from klack.units import format_si
+
+__all__ = [
+    "Constant",
+    "FixedProperties",
+    "FluidDefinition",
+    "FluidState",
+    "MeasuredProperties",
+    "MineralOil",
+    "TaitOil",
+]
+
+_GAS_CONSTANT = 8.314462618  # [J/(mol K)], CODATA 2018
+_MOLAR_MASS = 0.1  # [kg/mol] of a fluid of which nothing is known
+_REFERENCE_TEMPERATURE = 293.15
+_FIFTEEN = 288.15
+
+
+def _vapour_density(pressure: float, temperature: float, molar_mass: float) -> float:
+    """Density [kg/m^3] of an ideal gas."""
+    return pressure * molar_mass / (_GAS_CONSTANT * temperature)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constant:
+    """A constant of a fluid and where it comes from.
+
+    Parameters
+    ----------
+    label : str
+        What it is, e.g. ``"bulk modulus, isentropic, 20 degC"``.
+    value : float or tuple of float
+        Several for a table over temperature.
+    unit : str
+    source : str
+    verified : bool
+        True when the source itself was read or recomputed; False for numbers quoted from memory
+        or by a third party, which deserve a look before a result depends on them.
+    """
+
+    label: str
+    value: float | tuple[float, ...]
+    unit: str
+    source: str
+    verified: bool
+
+
+class FluidState(NamedTuple):
+    """What :class:`FluidProperties` give at one temperature."""
+
+    liquid: LiquidLaw
+    viscosity: float  # [Pa s] at one atmosphere
+    pressure_viscosity: float  # [1/Pa]
+    vapour_pressure: float  # [Pa]
+    vapour_density: float  # [kg/m^3]
+
+
+class FluidProperties(Protocol):
+    """Properties over temperature."""
+
+    def at(self, temperature: float) -> FluidState:
+        """Properties at a temperature [K]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredProperties:
+    """Columns over temperature, all at ``pressure``; smooth curves run through them.
+
+    Parameters
+    ----------
+    pressure : float [Pa]
+    molar_mass : float [kg/mol]
+    temperature : tuple [K]
+    density : tuple [kg/m^3]
+    bulk_modulus : tuple [Pa]
+        Isentropic.
+    bulk_modulus_slope : tuple [-]
+    viscosity : tuple [Pa s]
+    pressure_viscosity : tuple [1/Pa]
+    vapour_pressure : tuple [Pa]
+    """
+
+    pressure: float
+    molar_mass: float
+    temperature: tuple[float, ...]
+    density: tuple[float, ...]
+    bulk_modulus: tuple[float, ...]
+    bulk_modulus_slope: tuple[float, ...]
+    viscosity: tuple[float, ...]
+    pressure_viscosity: tuple[float, ...]
+    vapour_pressure: tuple[float, ...]
+
+    @cached_property
+    def _over_temperature(self) -> CubicSpline:
+        columns = (self.density, self.bulk_modulus, self.bulk_modulus_slope)
+        return CubicSpline(self.temperature, np.column_stack((*columns, self.pressure_viscosity)))
+
+    @cached_property
+    def _over_inverse(self) -> CubicSpline:
+        """Logarithms of viscosity and vapour pressure over 1/T (Andrade; Clausius-Clapeyron)."""
+        x = 1.0 / np.array(self.temperature)[::-1]
+        logs = np.log(np.column_stack((self.viscosity, self.vapour_pressure)))
+        return CubicSpline(x, logs[::-1])
+
+    def at(self, temperature: float) -> FluidState:
+        """Properties at a temperature [K]."""
+        rho, K, m, alpha = (float(x) for x in self._over_temperature(temperature))
+        mu, boiling = (float(x) for x in np.exp(self._over_inverse(1.0 / temperature)))
+        return FluidState(
+            liquid=Murnaghan(
+                density_at_reference=rho,
+                bulk_modulus_at_reference=K,
+                slope=m,
+                reference_pressure=self.pressure,
+            ),
+            viscosity=mu * float(np.exp(alpha * (ATMOSPHERE - self.pressure))),
+            pressure_viscosity=alpha,
+            vapour_pressure=boiling,
+            vapour_density=_vapour_density(boiling, temperature, self.molar_mass),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MineralOil:
+    r"""Oil or fuel of many species, by a few constants.
+
+    .. math:: \rho = \rho_{15}\,[1 - a\,(T - 15\,°C)], \qquad
+              K = K_{20}\,e^{-b\,(T - 20\,°C)} + m\,(p - 1\,\mathrm{atm})
+
+    and the kinematic viscosity of Walther.
+
+    Parameters
+    ----------
+    density : float [kg/m^3]
+        At 15 degC and one atmosphere.
+    expansion : float [1/K]
+    bulk_modulus : float [Pa]
+        Isentropic, at 20 degC and one atmosphere.
+    bulk_modulus_slope : float [-]
+    softening : float [1/K]
+        ``b``.
+    walther_a, walther_b : float [-]
+    pressure_viscosity : float [1/Pa]
+    vapour_pressure : float [Pa]
+        Held over temperature.
+    molar_mass : float [kg/mol]
+    """
+
+    density: float
+    expansion: float
+    bulk_modulus: float
+    bulk_modulus_slope: float
+    softening: float
+    walther_a: float
+    walther_b: float
+    pressure_viscosity: float
+    vapour_pressure: float
+    molar_mass: float
+
+    def at(self, temperature: float) -> FluidState:
+        """Properties at a temperature [K]."""
+        T = temperature
+        rho = self.density * (1.0 - self.expansion * (T - _FIFTEEN))
+        K = self.bulk_modulus * float(np.exp(-self.softening * (T - _REFERENCE_TEMPERATURE)))
+        return FluidState(
+            liquid=Murnaghan(
+                density_at_reference=rho,
+                bulk_modulus_at_reference=K,
+                slope=self.bulk_modulus_slope,
+            ),
+            viscosity=rho * float(walther_viscosity(T, self.walther_a, self.walther_b)),
+            pressure_viscosity=self.pressure_viscosity,
+            vapour_pressure=self.vapour_pressure,
+            vapour_density=_vapour_density(self.vapour_pressure, T, self.molar_mass),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaitOil:
+    r"""Oil after Tait, with isothermal constants.
+
+    .. math:: \rho_0 = \frac{\rho_{00}}{1 + a\,(T - 0\,°C)}, \qquad K_0 = K_{00}\,e^{-b T}
+
+    Parameters
+    ----------
+    density : float [kg/m^3]
+        At 0 degC, zero pressure.
+    expansion, softening : float [1/K]
+    bulk_modulus : float [Pa]
+        ``K_00``, at zero pressure and 0 K.
+    bulk_modulus_slope : float [-]
+    walther_a, walther_b : float [-]
+    pressure_viscosity : float [1/Pa]
+    vapour_pressure : float [Pa]
+    molar_mass : float [kg/mol]
+    """
+
+    density: float
+    expansion: float
+    bulk_modulus: float
+    bulk_modulus_slope: float
+    softening: float
+    walther_a: float
+    walther_b: float
+    pressure_viscosity: float
+    vapour_pressure: float
+    molar_mass: float
+
+    def at(self, temperature: float) -> FluidState:
+        """Properties at a temperature [K]."""
+        T = temperature
+        liquid = Tait(
+            density_at_zero=self.density / (1.0 + self.expansion * (T - 273.15)),
+            bulk_modulus_at_zero=self.bulk_modulus * float(np.exp(-self.softening * T)),
+            slope=self.bulk_modulus_slope,
+        )
+        nu = float(walther_viscosity(T, self.walther_a, self.walther_b))
+        return FluidState(
+            liquid=liquid,
+            viscosity=nu * float(liquid.density(ATMOSPHERE)),
+            pressure_viscosity=self.pressure_viscosity,
+            vapour_pressure=self.vapour_pressure,
+            vapour_density=_vapour_density(self.vapour_pressure, T, self.molar_mass),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedProperties:
+    """A user's numbers; they hold at the temperature of the run, whatever it is.
+
+    Parameters
+    ----------
+    liquid : Murnaghan or TabulatedLiquid
+    viscosity : float [Pa s]
+        Dynamic, at one atmosphere.
+    pressure_viscosity : float [1/Pa]
+    vapour_pressure : float [Pa]
+    vapour_density : float [kg/m^3], optional
+        Of the saturated vapour; by default of an ideal gas of 0.1 kg/mol.
+    """
+
+    liquid: Murnaghan | TabulatedLiquid
+    viscosity: float
+    pressure_viscosity: float = 0.0
+    vapour_pressure: float = 10.0
+    vapour_density: float | None = None
+
+    def at(self, temperature: float) -> FluidState:
+        """Return the numbers, which do not depend on temperature."""
+        vapour_density = self.vapour_density
+        if vapour_density is None:
+            vapour_density = _vapour_density(self.vapour_pressure, temperature, _MOLAR_MASS)
+        return FluidState(
+            liquid=self.liquid,
+            viscosity=self.viscosity,
+            pressure_viscosity=self.pressure_viscosity,
+            vapour_pressure=self.vapour_pressure,
+            vapour_density=vapour_density,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FluidDefinition:
+    """A fluid over temperature, before gas is mixed into it.
+
+    Parameters
+    ----------
+    name : str
+    properties : FluidProperties
+    constants : tuple of Constant
+        What the properties rest on.
+    lowest_temperature, highest_temperature : float [K]
+        Range in which the constants hold.
+    """
+
+    name: str
+    properties: FluidProperties
+    constants: tuple[Constant, ...] = ()
+    lowest_temperature: float = 0.0
+    highest_temperature: float = float("inf")
+
+    @property
+    def verified(self) -> bool:
+        """Whether the source of every constant was read or recomputed."""
+        return all(constant.verified for constant in self.constants)
+
+    def at(
+        self,
+        temperature: float,
+        *,
+        gas_fraction: float = 0.0,
+        gas_exponent: float = 1.4,
+        release_pressure: float | None = None,
+        saturation_pressure: float | None = None,
+        boiling_half_width: float = 2000.0,
+    ) -> Fluid:
+        """Fluid at one temperature, with entrained gas.
+
+        Parameters
+        ----------
+        temperature : float [K]
+        gas_fraction, gas_exponent, release_pressure, saturation_pressure
+            See :class:`~klack.hydraulics.mixture.EntrainedGas`; the fraction is at one atmosphere.
+        boiling_half_width : float [Pa]
+            See :class:`~klack.hydraulics.mixture.Vapour`.
+        """
+        if not self.lowest_temperature <= temperature <= self.highest_temperature:
+            low, high = self.lowest_temperature - 273.15, self.highest_temperature - 273.15
+            raise InputError(
+                f"fluid '{self.name}': temperature",
+                got=f"{format_si(temperature - 273.15, 'degC')}",
+                expected=f"{low:g} to {high:g} degC, where its constants hold",
+                hint="give your own fluid by density, viscosity and bulk_modulus at this "
+                "temperature.",
+            )
+        state = self.properties.at(temperature)
+        return Fluid(
+            name=self.name,
+            temperature=temperature,
+            liquid=state.liquid,
+            base_viscosity=state.viscosity,
+            pressure_viscosity=state.pressure_viscosity,
+            vapour=Vapour(
+                pressure=state.vapour_pressure,
+                density=state.vapour_density,
+                half_width=boiling_half_width,
+            ),
+            gas=EntrainedGas(
+                fraction=gas_fraction,
+                exponent=gas_exponent,
+                release_pressure=release_pressure,
+                saturation_pressure=saturation_pressure,
+            ),
+        )
