@@ -1,0 +1,130 @@
+"""End stop of a needle: contact, squeeze film, and the compliance behind them."""
+
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
+from klack.errors import InputError
+from klack.hydraulics.film import FilmShape
+from klack.input.problem import CaseProblem
+from klack.mechanics.stop_law import ConsistentStopLaw, LinearStopLaw, StopLaw
+from klack.network.component import Component
+from klack.network.port import ELEMENT, Port
+from klack.network.rows import Rows
+from klack.units import Compliance, Length, Ratio
+
+__all__ = ["EndStop"]
+
+
+class EndStop(Component):
+    r"""Where two bodies meet: a contact law and a squeeze film side by side, then a compliance.
+
+    .. math:: z = g + e, \qquad g = g_0 + y_\text{upper} - y_\text{lower}, \qquad e = D F, \qquad
+              F = F_\text{contact}(-z) + F_\text{film}(z, \dot z)
+
+    ``upper`` is the part that lies in +z: the stop at the opening end (its ``lower`` is the
+    needle), the needle at the seat (its ``lower`` is the seat).  A force above zero presses the
+    parts asunder; only the film can pull.
+
+    The film lies on the rough faces, beside the asperities, and both press on the bulk of the
+    bodies, so the compliance ``D`` is in series.  With a film parallel to the whole spring, as in
+    simpler models, the fluid would be squeezed out of a gap that the elastic faces do not have.
+
+    ``restitution`` adds the dashpot of Hunt and Crossley with the factor of Gonthier et al. (2004);
+    for rigid bodies only: in modal bodies the waves take that energy already.
+
+    Limits: parallel, centred faces; no friction across the axis.
+    """
+
+    type: ClassVar[str] = "end-stop"
+    ports: ClassVar[Mapping[str, Port]] = {"upper": ELEMENT, "lower": ELEMENT}
+
+    gap: Length = Field(ge=0, description="Between the parts at the start; the lift at the stop.")
+    law: StopLaw | None = Field(default=None, description="Contact law; none: only a film.")
+    restitution: Ratio | None = Field(
+        default=None, gt=0, le=1, description="Of rigid bodies; leave it out for modal ones."
+    )
+    series_compliance: Compliance = Field(
+        default=0.0, ge=0, description="Of the bulk behind the faces that the modes miss."
+    )
+    film: FilmShape | None = Field(default=None, description="Squeeze film between the faces.")
+
+    _computed: ContactLaw | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _something_acts(self) -> Self:
+        if self.law is None and self.film is None:
+            raise CaseProblem(
+                (),
+                got="neither law nor film",
+                expected="at least one of them",
+                hint="add law: {kind: consistent} or {kind: linear, stiffness: 1e9 N/m}.",
+            )
+        if self.law is None and self.restitution is not None:
+            raise CaseProblem(
+                ("restitution",),
+                got="restitution without a law",
+                expected="a contact law that it can act on",
+                hint="remove it: a film alone brings its own loss.",
+                on_key=True,
+            )
+        return self
+
+    def with_law(self, law: ContactLaw, series_compliance: float = 0.0) -> Self:
+        """Return this end stop with a law that was computed, e.g. the consistent one.
+
+        Parameters
+        ----------
+        law : ContactLaw
+        series_compliance : float [m/N]
+        """
+        stop = self.model_copy(update={"series_compliance": series_compliance})
+        stop._computed = law
+        return stop
+
+    def contact_law(self) -> ContactLaw | None:
+        """Law that acts; raise :class:`InputError` if a consistent law was not filled in."""
+        if self._computed is not None:
+            law = self._computed
+        elif self.law is None:
+            return None
+        elif isinstance(self.law, ConsistentStopLaw):
+            raise InputError(
+                "EndStop.law",
+                got="a consistent law that is not computed yet",
+                expected="a law from the static contact of the two bodies",
+                hint="a case names the surfaces under 'stops'; in Python call with_law(...).",
+            )
+        else:
+            law = self.law.contact_law()
+        if self.restitution is None or isinstance(law, HuntCrossley):
+            return law
+        return HuntCrossley(law, gonthier_coefficient(self.restitution))
+
+    def lumped(self, stiffness: float, restitution: float | None) -> Self:
+        """Return this end stop with one spring [N/m] and one dashpot; a film stays."""
+        law = LinearStopLaw(kind="linear", stiffness=LinearLaw(stiffness).stiffness)
+        stop = self.model_copy(
+            update={"law": law, "restitution": restitution, "series_compliance": 0.0}
+        )
+        stop._computed = None
+        return stop
+
+    def dry(self) -> Self | None:
+        """Return this end stop without its film; None if it had nothing else."""
+        if self.law is None:
+            return None
+        return self.model_copy(update={"film": None})
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add one interface."""
+        rows.interface(
+            upper=rows.port("upper"),
+            lower=rows.port("lower"),
+            gap=self.gap,
+            law=self.contact_law(),
+            series_compliance=self.series_compliance,
+            film=self.film.row(rows) if self.film else None,
+        )
