@@ -66,7 +66,7 @@ class Murnaghan:
     --------
     >>> oil = Murnaghan(density_at_reference=860.0, bulk_modulus_at_reference=1.6e9, slope=10.0)
     >>> round(float(oil.density(200e5)), 2)
-    870.08
+    870.14
     """
 
     density_at_reference: float

@@ -8,7 +8,16 @@ from klack.verification.check import Check
 
 __all__ = ["GROUPS", "iterate_checks", "run_checks"]
 
-GROUPS = ("elasticity", "contact", "reduction", "integrator", "impact", "transient", "spectra")
+GROUPS = (
+    "elasticity",
+    "contact",
+    "reduction",
+    "integrator",
+    "impact",
+    "transient",
+    "spectra",
+    "fluids",
+)
 """Module names in this package; each has ``checks() -> list[Check]``."""
 
 
