@@ -20,6 +20,7 @@ COMPONENTS = (
     ("spring", "klack.mechanics.spring.Spring"),
     ("constant-force", "klack.mechanics.force.ConstantForce"),
     ("force-over-time", "klack.mechanics.force.ForceOverTime"),
+    ("force-over-stroke", "klack.mechanics.force_over_stroke.ForceOverStroke"),
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
     # hydraulics

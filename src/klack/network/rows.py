@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from klack.errors import InputError
 from klack.network.step_function import StepFunction
 
 if TYPE_CHECKING:
@@ -79,6 +80,8 @@ class Channel:
 class BodyRow:
     """A body in modal form; ``ports`` are handles of its ``port_shapes`` columns, in order.
 
+    ``names`` are what the component calls them.
+
     ``speed`` [m/s] along +z is that of the whole free body at the start, undeformed: the rigid
     modal velocities are ``speed * rigid_axial``.
     """
@@ -86,17 +89,22 @@ class BodyRow:
     component: str
     body: "ReducedBody"
     ports: tuple[int, ...]
+    names: tuple[str, ...]
     speed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ElementRow:
-    """Something that pushes ports; see :mod:`klack.network.step_function`."""
+    """Something that pushes ports; see :mod:`klack.network.step_function`.
+
+    ``names`` are what the component calls its ports.
+    """
 
     component: str
     label: str
     step: StepFunction
     ports: tuple[int, ...]
+    names: tuple[str, ...]
     parameters: NDArray[np.float64]
     state: NDArray[np.float64]
     books: tuple[Book, ...]
@@ -252,7 +260,9 @@ class Rows:
     def body(self, body: "ReducedBody", ports: Sequence[str], speed: float = 0.0) -> None:
         """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
         handles = tuple(self.handles[name] for name in ports)
-        row = BodyRow(component=self.component, body=body, ports=handles, speed=speed)
+        row = BodyRow(
+            component=self.component, body=body, ports=handles, names=tuple(ports), speed=speed
+        )
         self.bodies.append(row)
 
     def element(
@@ -274,6 +284,7 @@ class Rows:
                 label=label,
                 step=step,
                 ports=tuple(ports),
+                names=self._names(ports),
                 parameters=np.array(parameters, dtype=float),
                 state=np.array(state, dtype=float),
                 books=tuple(books),
@@ -281,6 +292,16 @@ class Rows:
                 failures=failures or {},
             )
         )
+
+    def _names(self, ports: Sequence[int]) -> tuple[str, ...]:
+        """Return what the present component calls these handles, each name once."""
+        left = dict(self.handles)
+        names = []
+        for handle in ports:
+            name = next((name for name, other in left.items() if other == handle), "")
+            left.pop(name, None)
+            names.append(name)
+        return tuple(names)
 
     def branch(
         self,
@@ -316,6 +337,14 @@ class Rows:
     def chamber(self, node: int, *, volume: float, pressure: float) -> None:
         """Make a node a volume [m^3] with a start pressure [Pa]; adds to a volume already there."""
         before = self.nodes.get(node)
+        if before is not None and before.pressure[0] != pressure:
+            raise InputError(
+                f"components.{self.component}",
+                got=f"{pressure:g} Pa at the start where '{before.component}' has"
+                f" {before.pressure[0]:g} Pa",
+                expected="one start pressure at one node",
+                hint="give both the same, or put an orifice between them.",
+            )
         self.nodes[node] = NodeRow(
             component=self.component,
             volume=volume + (before.volume if before else 0.0),
