@@ -1,7 +1,8 @@
 r"""Annular gap of a guide: leakage and drag."""
 
+from collections.abc import Mapping
 from math import pi, sqrt
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -27,7 +28,7 @@ def eccentricity_factor(eccentricity: float) -> float:
 
 
 @step_function
-def annulus_step(par, state, inp, out):  # type: ignore[no-untyped-def]
+def annulus_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """``par``: flow per pressure [m^3/(s Pa)], half area [m^2], drag [N s/m]."""
     h, p_a, p_b = inp[1], inp[2], inp[3]
     rho_a, rho_b = inp[4], inp[5]
@@ -68,7 +69,7 @@ class Annulus(Component):
     """
 
     type: ClassVar[str] = "annulus"
-    ports: ClassVar = {
+    ports: ClassVar[Mapping[str, Port]] = {
         "a": FLOW,
         "b": FLOW,
         "needle": ELEMENT,

@@ -1,12 +1,13 @@
 """Chamber: a volume of fluid with one pressure."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
 
 from klack.hydraulics.network_fluid import network_fluid
 from klack.network.component import Component
-from klack.network.port import COMPLIANCE
+from klack.network.port import COMPLIANCE, Port
 from klack.network.rows import Rows
 from klack.units import Pressure, Volume
 
@@ -30,7 +31,7 @@ class Chamber(Component):
     """
 
     type: ClassVar[str] = "chamber"
-    ports: ClassVar = {"fluid": COMPLIANCE}
+    ports: ClassVar[Mapping[str, Port]] = {"fluid": COMPLIANCE}
 
     volume: Volume = Field(gt=0, description="With all faces where they start.")
     pressure: Pressure | None = Field(

@@ -1,6 +1,7 @@
 """Flow source: a flow that the rest of the valve cannot change."""
 
-from typing import ClassVar, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numba import carray
@@ -20,7 +21,7 @@ __all__ = ["FlowSource", "FlowStep", "FlowTable"]
 
 
 @step_function
-def flow_source_step(par, state, inp, out):  # type: ignore[no-untyped-def]
+def flow_source_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow of the middle of the step, whatever the pressures, and the work that takes.
 
     ``par``: size of all, number ``n`` of times, ``n`` times, ``n`` mass flows, fluid table.
@@ -77,8 +78,11 @@ class FlowSource(Component):
     falls to its lower end, and the run says so.
     """
 
-    type: ClassVar[str] = "flow_source"
-    ports: ClassVar = {"a": Port("hydraulic", Role.FLOW, optional=True), "b": FLOW}
+    type: ClassVar[str] = "flow-source"
+    ports: ClassVar[Mapping[str, Port]] = {
+        "a": Port("hydraulic", Role.FLOW, optional=True),
+        "b": FLOW,
+    }
 
     flow: VolumeFlow | None = Field(
         default=None, description="At ambient density; before the step, if there is one."

@@ -1,7 +1,8 @@
 r"""Inertance: a column of fluid that has to be accelerated."""
 
+from collections.abc import Mapping
 from math import pi
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from numba import carray
 from pydantic import Field, model_validator
@@ -9,7 +10,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.network.component import Component
-from klack.network.port import FLOW
+from klack.network.port import FLOW, Port
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length
@@ -18,7 +19,7 @@ __all__ = ["Inertance"]
 
 
 @step_function
-def inertance_step(par, state, inp, out):  # type: ignore[no-untyped-def]
+def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Mean flow of the step; ``par``: size of all, ``l/(rho A)``, friction, fluid table.
 
     ``state``: mass flow, and the places in the fluid table of both ends.
@@ -57,7 +58,7 @@ class Inertance(Component):
     """
 
     type: ClassVar[str] = "inertance"
-    ports: ClassVar = {"a": FLOW, "b": FLOW}
+    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
 
     length: Length = Field(gt=0, description="Of the channel.")
     diameter: Length | None = Field(default=None, gt=0, description="Of the channel.")

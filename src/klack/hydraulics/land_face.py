@@ -1,5 +1,6 @@
 """Land face: the ring of a narrow gap, over which the pressure falls."""
 
+from collections.abc import Mapping
 from math import log, pi
 from typing import ClassVar, Literal, Self
 
@@ -8,7 +9,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
-from klack.network.port import ELEMENT, FLOW
+from klack.network.port import ELEMENT, FLOW, Port
 from klack.network.rows import Rows
 from klack.units import Length
 
@@ -55,8 +56,8 @@ class LandFace(Component):
     Source: Reynolds' equation in polar coordinates.
     """
 
-    type: ClassVar[str] = "land_face"
-    ports: ClassVar = {"inside": FLOW, "outside": FLOW, "body": ELEMENT}
+    type: ClassVar[str] = "land-face"
+    ports: ClassVar[Mapping[str, Port]] = {"inside": FLOW, "outside": FLOW, "body": ELEMENT}
 
     direction: Literal["opening", "closing"] = Field(
         description="Where the pressure pushes: opening is +z."

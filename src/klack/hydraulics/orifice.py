@@ -1,7 +1,8 @@
 r"""Orifice: turbulent and laminar flow through a short restriction, and its cavitation limit."""
 
+from collections.abc import Mapping
 from math import exp, pi, sqrt
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from numba import njit
 from pydantic import Field, model_validator
@@ -10,7 +11,7 @@ from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
-from klack.network.port import FLOW
+from klack.network.port import FLOW, Port
 from klack.network.rows import Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Ratio
@@ -133,7 +134,7 @@ def orifice_flow(
 
 
 @step_function
-def orifice_step(par, state, inp, out):  # type: ignore[no-untyped-def]
+def orifice_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """``par = conductance, number, throat, vapour pressure``; no state."""
     out[0], out[1], out[2] = orifice_flow(
         inp[2], inp[3], inp[4], inp[5], par[0], par[1], par[2], par[3]
@@ -160,7 +161,7 @@ class Orifice(Component):
     """
 
     type: ClassVar[str] = "orifice"
-    ports: ClassVar = {"a": FLOW, "b": FLOW}
+    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
 
     diameter: Length | None = Field(default=None, gt=0, description="Of the circular hole.")
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")

@@ -1,5 +1,6 @@
 """Pressure face: where a pressure pushes a body, and the body moves fluid."""
 
+from collections.abc import Mapping
 from math import pi
 from typing import ClassVar, Literal, Self
 
@@ -8,7 +9,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
-from klack.network.port import ELEMENT, FLOW
+from klack.network.port import ELEMENT, FLOW, Port
 from klack.network.rows import Rows
 from klack.units import Area, Length
 
@@ -30,8 +31,8 @@ class PressureFace(Component):
     see :class:`~klack.hydraulics.land_face.LandFace`.
     """
 
-    type: ClassVar[str] = "pressure_face"
-    ports: ClassVar = {"fluid": FLOW, "body": ELEMENT}
+    type: ClassVar[str] = "pressure-face"
+    ports: ClassVar[Mapping[str, Port]] = {"fluid": FLOW, "body": ELEMENT}
 
     direction: Literal["opening", "closing"] = Field(
         description="Where the pressure pushes: opening is +z."

@@ -1,5 +1,6 @@
 """Pressure source: a pressure that the rest of the valve cannot change."""
 
+from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -8,7 +9,7 @@ from klack.hydraulics.network_fluid import network_fluid
 from klack.hydraulics.time_table import check_table, step_table
 from klack.input.section import Section
 from klack.network.component import Component
-from klack.network.port import PRESSURE
+from klack.network.port import PRESSURE, Port
 from klack.network.rows import Rows
 from klack.units import Pressure, Time
 
@@ -42,8 +43,8 @@ class PressureSource(Component):
     pressure is *absolute*: 5 bar above the surroundings are 6.013 bar.
     """
 
-    type: ClassVar[str] = "pressure_source"
-    ports: ClassVar = {"fluid": PRESSURE}
+    type: ClassVar[str] = "pressure-source"
+    ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
 
     pressure: Pressure | None = Field(
         default=None, gt=0, description="Absolute; before the step, if there is one."

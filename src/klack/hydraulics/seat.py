@@ -1,7 +1,8 @@
 r"""Seat: the restriction that a needle opens and closes."""
 
+from collections.abc import Mapping
 from math import acos, cos, pi, sin, sqrt
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from numba import njit
 from pydantic import Field, model_validator
@@ -80,7 +81,7 @@ def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[flo
 
 
 @step_function
-def seat_step(par, state, inp, out):  # type: ignore[no-untyped-def]
+def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow at the lift of the end of the step, and the forces of the flow.
 
     ``par``: 0 kind, 1 radius, 2-3 shape, 4 lift at the start, 5 largest area, 6 ``C_q``, 7
@@ -158,7 +159,7 @@ class Seat(Component):
     """
 
     type: ClassVar[str] = "seat"
-    ports: ClassVar = {
+    ports: ClassVar[Mapping[str, Port]] = {
         "a": FLOW,
         "b": FLOW,
         "needle": ELEMENT,

@@ -1,0 +1,99 @@
+"""Truth: second law. What a restriction takes from the fluid and does not pass on is heat."""
+
+import numpy as np
+import pytest
+
+from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.seat import Seat
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
+
+AMBIENT = Ambient()
+FLUIDS = {
+    "liquid": library_fluid("n-heptane").at(293.15),
+    "with gas": library_fluid("n-heptane").at(293.15, gas_fraction=2e-3),
+}
+PARTS = {
+    "orifice": Orifice(diameter=0.4e-3),
+    "seat": Seat(
+        shape="cone", diameter=1.5e-3, half_angle=0.8, land_width=0.1e-3, lift=5e-6, leak_area=1e-12
+    ),
+    "annulus": Annulus(diameter=4e-3, length=8e-3, clearance=6e-6, eccentricity=0.4),
+    "inertance": Inertance(length=5e-3, diameter=1e-3),
+    "pump": FlowSource(flow=3e-6),
+}
+HANDLES = {"a": 1, "b": 2, "needle": 0, "body": 1}
+
+
+def balance(part, fluid, rng, count=300):
+    """Power [W] that is lost, and its scale, for random pressures, motions and histories."""
+    rows = Rows(ambient=AMBIENT, fluid=fluid, component="part", handles=HANDLES)
+    part.add_rows(rows)
+    row = rows.branches[0]
+    table = fluid_table(fluid, AMBIENT.pressure)
+    state, stores = row.state, 0.0
+    lost, scale = [], []
+    for _ in range(count):
+        h = 10.0 ** rng.uniform(-8.5, -6.5)
+        p = np.exp(rng.uniform(np.log(2e4), np.log(2e6), 2))
+        y = rng.uniform(-10e-6, 50e-6, 2)
+        moved = np.stack([y, y + h * rng.uniform(-1.0, 1.0, 2)], axis=1)
+        (rho_a, _, g_a, _), (rho_b, _, g_b, _) = (fluid_at(table, x, 0) for x in p)
+        forces = len(row.ports)
+        status, out = evaluate(
+            row.step,
+            row.parameters,
+            state,
+            [0.0, h, *p, rho_a, rho_b, *moved[:forces].ravel()],
+            3 + forces + row.state.size + len(row.books),
+        )
+        assert status == 0
+        state = out[3 + forces : 3 + forces + row.state.size]
+        work = float(out[3 : 3 + forces] @ np.diff(moved[:forces]).ravel())
+        power = (g_a - g_b) * out[0] * h
+        book = out[-1] if row.books else 0.0
+        if row.books and row.books[0].kind == "store":
+            book, stores = stores - book, book
+        lost.append((power - work + book) / h)
+        scale.append((abs(power) + abs(work) + abs(book)) / h)
+    return np.array(lost), np.array(scale)
+
+
+@pytest.mark.parametrize("fluid", FLUIDS)
+@pytest.mark.parametrize("name", PARTS)
+def test_loss_is_never_negative(name, fluid):
+    lost, scale = balance(PARTS[name], FLUIDS[fluid], np.random.default_rng(7))
+
+    assert np.all(scale > 0.0)
+    assert np.all(lost >= -1e-12 * scale)
+
+
+def test_a_pump_and_a_column_without_friction_lose_nothing():
+    rng = np.random.default_rng(8)
+    smooth = Inertance(length=5e-3, diameter=1e-3, friction="none")
+    for part in (PARTS["pump"], smooth):
+        lost, scale = balance(part, FLUIDS["with gas"], rng)
+
+        # differences of stores: 1e-16 of the largest kinetic energy
+        assert np.max(np.abs(lost)) <= 1e-12 * np.max(scale)
+
+
+def test_annulus_loses_leakage_and_shear_and_nothing_else():
+    guide, fluid = PARTS["annulus"], FLUIDS["liquid"]
+    rows = Rows(ambient=AMBIENT, fluid=fluid, component="guide", handles=HANDLES)
+    guide.add_rows(rows)
+    row = rows.branches[0]
+    viscosity = float(fluid.viscosity(AMBIENT.pressure))
+    h, drop, needle, body = 2e-8, 3e5, 0.7, -0.2
+    inputs = [0.0, h, 4e5, 1e5, 700.0, 700.0, 0.0, needle * h, 0.0, body * h]
+
+    _, out = evaluate(row.step, row.parameters, [], inputs, 5)
+
+    heat = drop * out[0] / 700.0 - out[3] * needle - out[4] * body
+    exact = guide.conductance(viscosity) * drop**2 + guide.drag(viscosity) * 0.9**2
+    assert heat == pytest.approx(exact, rel=1e-12)
