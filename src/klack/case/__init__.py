@@ -1,7 +1,8 @@
 """The case file: what a user writes, checked and in SI."""
 
+from klack.case.bodies import SurfaceName
 from klack.case.reader import case_schema, load_case, read_case
-from klack.case.schema import LEVELS, Case, SurfaceName
+from klack.case.schema import LEVELS, Case
 from klack.case.shipped import find_case, shipped_cases
 from klack.input.problem import CaseProblem
 

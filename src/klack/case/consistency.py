@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 
 if TYPE_CHECKING:
-    from klack.case.schema import Case, SurfaceName
+    from klack.case.bodies import CaseFile, SurfaceName
+    from klack.case.schema import Case
 
-__all__ = ["check_consistency"]
+__all__ = ["check_body", "check_consistency", "check_surface", "require_known"]
 
 
 def check_consistency(case: "Case") -> None:
     """Raise :class:`CaseProblem` for the first contradiction between sections."""
     _check_bodies(case)
     for i, surface in enumerate(case.contact.between):
-        _check_contact_surface(case, i, surface)
+        check_surface(case, ("contact", "between", i), surface)
     _check_roles(case)
     for name in case.bodies:
-        _check_materials(case, name)
-        _check_surfaces(case, name)
+        check_body(case, name)
     for name in case.reduction.modes:
-        _require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
+        require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_local_law(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
@@ -32,9 +32,10 @@ def check_consistency(case: "Case") -> None:
         )
 
 
-def _require_known(
+def require_known(
     key: Key, name: str, known: Iterable[str], what: str, *, on_key: bool = False
 ) -> None:
+    """Raise :class:`CaseProblem` unless ``name`` is among the known ones; propose the nearest."""
     known = list(known)
     if name not in known:
         raise CaseProblem(
@@ -56,12 +57,12 @@ def _check_bodies(case: "Case") -> None:
         )
 
 
-def _check_contact_surface(case: "Case", i: int, surface: "SurfaceName") -> None:
-    key = ("contact", "between", i)
-    _require_known(key, surface.body, case.bodies, "body")
+def check_surface(case: "CaseFile", key: Key, surface: "SurfaceName") -> None:
+    """Check that a body has the surface that ``key`` names, as far as a drawing tells."""
+    require_known(key, surface.body, case.bodies, "body")
     profile = case.bodies[surface.body].geometry.profile
     if profile is not None:
-        _require_known(key, surface.surface, profile.surfaces, f"surface of {surface.body}")
+        require_known(key, surface.surface, profile.surfaces, f"surface of {surface.body}")
 
 
 def _check_roles(case: "Case") -> None:
@@ -92,18 +93,24 @@ def _check_roles(case: "Case") -> None:
         )
 
 
-def _check_materials(case: "Case", name: str) -> None:
+def check_body(case: "CaseFile", name: str) -> None:
+    """Check the materials of a body and the surfaces that its supports and mesh name."""
+    _check_materials(case, name)
+    _check_surfaces(case, name)
+
+
+def _check_materials(case: "CaseFile", name: str) -> None:
     body = case.bodies[name]
     key: Key = ("bodies", name, "material")
     if isinstance(body.material, str):
-        _require_known(key, body.material, case.materials, "material")
+        require_known(key, body.material, case.materials, "material")
         return
     for solid, material in body.material.items():
-        _require_known((*key, solid), material, case.materials, "material")
+        require_known((*key, solid), material, case.materials, "material")
     if body.geometry.profile is not None:
         parts = body.geometry.profile.parts
         for solid in body.material:
-            _require_known((*key, solid), solid, parts, "part", on_key=True)
+            require_known((*key, solid), solid, parts, "part", on_key=True)
         for part in parts:
             if part not in body.material:
                 raise CaseProblem(
@@ -114,17 +121,17 @@ def _check_materials(case: "Case", name: str) -> None:
                 )
 
 
-def _check_surfaces(case: "Case", name: str) -> None:
+def _check_surfaces(case: "CaseFile", name: str) -> None:
     body = case.bodies[name]
     if body.geometry.profile is None:
         return  # the names are inside the file; the mesh says which are missing
     known = body.geometry.profile.surfaces
     for i, support in enumerate(body.fixed or ()):
         key: Key = ("bodies", name, "fixed", i, "surface")
-        _require_known(key, support.surface, known, f"surface of {name}")
+        require_known(key, support.surface, known, f"surface of {name}")
     for surface in body.mesh.surfaces if body.mesh else ():
         key = ("bodies", name, "mesh", "surfaces", surface)
-        _require_known(key, surface, known, f"surface of {name}", on_key=True)
+        require_known(key, surface, known, f"surface of {name}", on_key=True)
 
 
 def _check_local_law(case: "Case") -> None:

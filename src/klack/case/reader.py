@@ -1,10 +1,13 @@
-"""Read a case file: YAML 1.2 in, a checked :class:`Case` or one clear error out."""
+"""Read a case file: YAML 1.2 in, a checked case or one clear error out.
+
+The case of a whole valve, with a section ``network``, is read by :mod:`klack.case.valve_reader`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -13,11 +16,23 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from klack.case.bodies import CaseFile
 from klack.case.schema import Case
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text, nearest
 
-__all__ = ["case_schema", "load_case", "read_case"]
+__all__ = [
+    "Lines",
+    "case_schema",
+    "load_case",
+    "parse",
+    "read_case",
+    "schema_of",
+    "text_of",
+    "validated",
+]
+
+_Kind = TypeVar("_Kind", bound=CaseFile)
 
 _LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
 _MOST_VALUES = 200_000
@@ -25,7 +40,7 @@ _DEEPEST = 40
 
 
 @dataclass(slots=True)
-class _Lines:
+class Lines:
     """Line of each key and each value of a file, by key path (lines count from 1)."""
 
     keys: dict[Key, int] = field(default_factory=dict)
@@ -42,7 +57,7 @@ class _Lines:
 
 
 def load_case(path: str | Path) -> Case:
-    """Read and check a case file.
+    """Read and check the case file of an impact.
 
     Parameters
     ----------
@@ -60,26 +75,44 @@ def load_case(path: str | Path) -> Case:
         With file, line, key, what came, what was expected and what to try.
     """
     path = Path(path)
-    return read_case(_text_of(path), path)
+    return read_case(text_of(path), path)
 
 
 def read_case(text: str, path: Path) -> Case:
-    """Check the text of a case file that lies (or will lie) at ``path``."""
-    data, lines = _parse(text, path)
+    """Check the text of an impact case that lies (or will lie) at ``path``."""
+    data, lines = parse(text, path)
+    if "network" in data and "contact" not in data:
+        raise InputError(
+            f"{path}:{lines.find(('network',), on_key=True)}: network",
+            got="a case of a whole valve",
+            expected="a case of an impact, with a section 'contact'",
+            hint="run it with klack stroke.",
+        )
+    return validated(Case, text, path, data, lines)
+
+
+def validated(kind: type[_Kind], text: str, path: Path, data: Any, lines: "Lines") -> _Kind:
+    """Check parsed data against a kind of case."""
     context = {"path": path, "folder": path.parent, "source": text}
     try:
-        return Case.model_validate(data, context=context)
+        return kind.model_validate(data, context=context)
     except ValidationError as error:
         raise _first_error(error, data, lines, path) from None
 
 
 def case_schema() -> dict[str, Any]:
-    """JSON schema of a case file (draft 2020-12), for editors that check while one types."""
-    schema = Case.model_json_schema(by_alias=True)
+    """JSON schema of an impact case (draft 2020-12), for editors that check while one types."""
+    return schema_of(Case)
+
+
+def schema_of(kind: type[CaseFile]) -> dict[str, Any]:
+    """JSON schema of a kind of case."""
+    schema = kind.model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _text_of(path: Path) -> str:
+def text_of(path: Path) -> str:
+    """Text of a case file, of reasonable size and in UTF-8."""
     hint = "klack impact demo-valve runs a shipped case; its file is a good start."
     if not path.is_file():
         got = "a folder" if path.is_dir() else "a file that does not exist"
@@ -105,7 +138,7 @@ def _text_of(path: Path) -> str:
         raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint) from None
 
 
-def _parse(text: str, path: Path) -> tuple[Any, _Lines]:
+def parse(text: str, path: Path) -> tuple[Any, Lines]:
     """Plain data of a YAML text, and where each key and value stands."""
     yaml = YAML(typ="rt")
     try:
@@ -129,7 +162,7 @@ def _parse(text: str, path: Path) -> tuple[Any, _Lines]:
             expected="a mapping that starts with 'klack: 1'",
             hint="a case has the sections materials, bodies, contact, motion and run.",
         )
-    lines = _Lines()
+    lines = Lines()
     return _Plain(path, lines).of(data, ()), lines
 
 
@@ -142,7 +175,7 @@ def _reason(error: Exception) -> str:
 class _Plain:
     """Turn the nodes of ruamel.yaml into plain data and note their lines."""
 
-    def __init__(self, path: Path, lines: _Lines) -> None:
+    def __init__(self, path: Path, lines: Lines) -> None:
         self.path, self.lines, self.count = path, lines, 0
 
     def of(self, node: Any, key: Key) -> Any:
@@ -212,7 +245,7 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     )
 
 
-def _first_error(error: ValidationError, data: Any, lines: _Lines, path: Path) -> InputError:
+def _first_error(error: ValidationError, data: Any, lines: Lines, path: Path) -> InputError:
     """Turn the first of pydantic's complaints into ours; say how many more there are."""
     details = error.errors(include_url=False)
     first, more = details[0], len(details) - 1

@@ -1,0 +1,161 @@
+"""Checks of a case of a whole valve that need more than one section."""
+
+from typing import TYPE_CHECKING
+
+from klack.case.consistency import check_body, check_surface, require_known
+from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
+from klack.input.problem import CaseProblem, Key, one_of
+from klack.network.component import Component
+
+if TYPE_CHECKING:
+    from klack.case.valve import ValveCase
+
+__all__ = ["check_valve", "is_consistent"]
+
+
+def check_valve(case: "ValveCase") -> None:
+    """Raise :class:`CaseProblem` for the first contradiction between sections."""
+    for name in case.bodies:
+        check_body(case, name)
+        _check_ports(case, name)
+    for name in case.reduction.modes:
+        require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
+    _check_flexible_bodies(case)
+    meetings = find_meetings(case.network.network())
+    for name in case.stops:
+        _check_stop(case, name, meetings)
+    _check_laws(case)
+    if case.lumped is None:
+        for variant in case.run.variants:
+            if variant.endswith("lumped"):
+                raise CaseProblem(
+                    ("run", "variants"),
+                    got=f"the variant '{variant}' without a section 'lumped'",
+                    expected="its stiffness",
+                    hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the variant.",
+                )
+    find_roles(case)
+
+
+def _check_ports(case: "ValveCase", name: str) -> None:
+    body = case.bodies[name]
+    for port, place in body.ports.items():
+        key: Key = ("bodies", name, "ports", port)
+        profile = body.geometry.profile
+        if profile is None:
+            continue
+        require_known((*key, "surface"), place.surface, profile.surfaces, f"surface of {name}")
+        if port in profile.surfaces and port != place.surface:
+            raise CaseProblem(
+                key,
+                got=f"the name of the surface '{port}' for a port on '{place.surface}'",
+                expected="a name of its own",
+                hint="rename the port here and in the network.",
+                on_key=True,
+            )
+
+
+def _check_flexible_bodies(case: "ValveCase") -> None:
+    """Every flexible body of the network is a body of the case, once, at points that it has."""
+    used: dict[str, str] = {}
+    for name, part in case.network.components.items():
+        if part.type != FLEXIBLE_BODY:
+            continue
+        key: Key = ("network", "components", name)
+        body, points = str(getattr(part, "body", "")), tuple(getattr(part, "points", ()))
+        require_known((*key, "body"), body, case.bodies, "body")
+        if body in used:
+            raise CaseProblem(
+                (*key, "body"),
+                got=f"'{body}' a second time (first in '{used[body]}')",
+                expected="one component for each body",
+                hint="give one component all the points.",
+            )
+        used[body] = name
+        known = _points(case, body)
+        for i, point in enumerate(points):
+            if known is not None:
+                require_known((*key, "points", i), point, known, f"surface or port of {body}")
+    for body in case.bodies:
+        if body not in used:
+            raise CaseProblem(
+                ("bodies", body),
+                got=f"a body '{body}' that the network does not use",
+                expected=f"a component {{type: {FLEXIBLE_BODY}, body: {body}, points: [...]}}",
+                hint="add it to network.components, or remove the body.",
+                on_key=True,
+            )
+
+
+def _points(case: "ValveCase", body: str) -> tuple[str, ...] | None:
+    """Names of the points of a body; None when only its mesh can tell."""
+    profile = case.bodies[body].geometry.profile
+    return None if profile is None else (*case.bodies[body].ports, *profile.surfaces)
+
+
+def _check_stop(case: "ValveCase", name: str, meetings: dict[str, Meeting]) -> None:
+    key: Key = ("stops", name)
+    stop = case.stops[name]
+    for i, surface in enumerate(stop.between):
+        check_surface(case, (*key, "between", i), surface)
+        for other, rival in case.stops.items():
+            if other != name and surface in rival.between:
+                raise CaseProblem(
+                    (*key, "between", i),
+                    got=f"{surface}, which the stop '{other}' uses as well",
+                    expected="a surface for each stop",
+                    hint="split the edge in the drawing.",
+                )
+    if stop.upper.body == stop.lower.body:
+        raise CaseProblem(
+            (*key, "between"),
+            got=f"{stop.upper} and {stop.lower}, two surfaces of one body",
+            expected="surfaces of two bodies",
+            hint="draw the stop as a body of its own.",
+        )
+    dimensions = [case.bodies[surface.body].geometry.dimension for surface in stop.between]
+    if dimensions[0] != dimensions[1]:
+        raise CaseProblem(
+            (*key, "between"),
+            got="an axisymmetric and a three-dimensional body",
+            expected="both axisymmetric or both three-dimensional",
+            hint="take 'model: swept' with 'layers: 18' for the axisymmetric one.",
+        )
+    require_known(key, name, meetings, f"{END_STOP} of the network", on_key=True)
+    for side, surface in zip(("upper", "lower"), stop.between, strict=True):
+        met: tuple[str, str] | None = getattr(meetings[name], side)
+        part = case.network.components[met[0]] if met else None
+        if part is None or met is None or (getattr(part, "body", ""), met[1]) != surface:
+            found = f"{met[0]}.{met[1]}" if met else "the ground"
+            raise CaseProblem(
+                (*key, "between"),
+                got=f"{surface}, but the network joins {name}.{side} to {found}",
+                expected=f"{name}.{side} at the point '{surface.surface}' of '{surface.body}'",
+                hint="the upper surface comes first; correct the connection or the stop.",
+            )
+
+
+def _check_laws(case: "ValveCase") -> None:
+    """A consistent law needs surfaces, and a correction that leaves something to it."""
+    for name, part in case.network.components.items():
+        if part.type != END_STOP or not is_consistent(part):
+            continue
+        if name not in case.stops:
+            raise CaseProblem(
+                ("network", "components", name, "law"),
+                got="a consistent law, but no surfaces to compute it from",
+                expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
+                hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
+            )
+        if case.reduction.correction != "consistent":
+            raise CaseProblem(
+                ("reduction", "correction"),
+                got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
+                expected="the correction 'consistent'",
+                hint="or give the end stop a linear law.",
+            )
+
+
+def is_consistent(part: Component) -> bool:
+    """Whether an end stop waits for a law computed from the static contact."""
+    return getattr(getattr(part, "law", None), "kind", "") == "consistent"

@@ -1,0 +1,58 @@
+"""Read the case of a whole valve, or a case of either kind.
+
+Apart from :mod:`klack.case.reader`, because the components of a network take a while to import.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from klack.case.reader import parse, schema_of, text_of, validated
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+
+__all__ = [
+    "load_any_case",
+    "load_valve_case",
+    "read_any_case",
+    "read_valve_case",
+    "valve_case_schema",
+]
+
+
+def load_valve_case(path: str | Path) -> ValveCase:
+    """Read and check the case file of a whole valve; see :func:`klack.case.reader.load_case`."""
+    path = Path(path)
+    return read_valve_case(text_of(path), path)
+
+
+def load_any_case(path: str | Path) -> Case | ValveCase:
+    """Read and check a case file of either kind: with a section ``network`` it is a valve."""
+    path = Path(path)
+    return read_any_case(text_of(path), path)
+
+
+def read_valve_case(text: str, path: Path) -> ValveCase:
+    """Check the text of a case of a whole valve that lies (or will lie) at ``path``."""
+    data, lines = parse(text, path)
+    if "contact" in data and "network" not in data:
+        raise InputError(
+            f"{path}:{lines.find(('contact',), on_key=True)}: contact",
+            got="a case of an impact",
+            expected="a case of a whole valve, with a section 'network'",
+            hint="run it with klack impact.",
+        )
+    return validated(ValveCase, text, path, data, lines)
+
+
+def read_any_case(text: str, path: Path) -> Case | ValveCase:
+    """Check the text of a case of either kind."""
+    data, lines = parse(text, path)
+    if "network" in data:
+        return validated(ValveCase, text, path, data, lines)
+    return validated(Case, text, path, data, lines)
+
+
+def valve_case_schema() -> dict[str, Any]:
+    """JSON schema of a case of a whole valve, with all components."""
+    return schema_of(ValveCase)

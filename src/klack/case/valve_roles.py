@@ -1,0 +1,115 @@
+"""Who is who in a valve: the needle, its seat, its opening stop, and where its lift is measured."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.network.network import Network
+from klack.network.port import Role
+
+if TYPE_CHECKING:
+    from klack.case.valve import ValveCase
+
+__all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
+
+END_STOP, FLEXIBLE_BODY = "end-stop", "flexible-body"
+"""Type words of the components that a case of a whole valve speaks about itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Points that an end stop keeps apart, as (component, point); None is the ground."""
+
+    upper: tuple[str, str] | None
+    lower: tuple[str, str] | None
+
+
+@dataclass(frozen=True, slots=True)
+class ValveRoles:
+    """Names that tell the story of a stroke.
+
+    Parameters
+    ----------
+    needle, point : str
+        Component that moves, and its point whose displacement is the lift.
+    seat, opening_stop : str
+        End stops below and above the needle, of several the one with the smallest gap; empty if
+        there is none.
+    """
+
+    needle: str
+    point: str
+    seat: str
+    opening_stop: str
+
+
+def find_meetings(network: Network) -> dict[str, Meeting]:
+    """What every end stop of a network keeps apart."""
+    at: dict[tuple[str, str], tuple[str, str] | None] = {}
+    for node in network.nodes:
+        bodies = node.having(Role.MOTION)
+        moving = (bodies[0].component, bodies[0].name) if bodies else None
+        for joint in node.joints:
+            at[joint.component, joint.name] = moving
+    return {
+        name: Meeting(at.get((name, "upper")), at.get((name, "lower")))
+        for name, part in network.components.items()
+        if part.type == END_STOP
+    }
+
+
+def find_roles(case: "ValveCase") -> ValveRoles:
+    """Find needle, seat and opening stop of a case.
+
+    Raises
+    ------
+    CaseProblem
+        When the needle is not plain and the case does not name the lift.
+    """
+    network = case.network.network()
+    meetings = find_meetings(network)
+    points = {
+        name: tuple(port for port, kind in part.port_kinds().items() if kind.role is Role.MOTION)
+        for name, part in network.components.items()
+    }
+    needle = _needle(case, {name: ports for name, ports in points.items() if ports})
+    gaps = {name: float(getattr(network.components[name], "gap", 0.0)) for name in meetings}
+    above = [name for name, met in meetings.items() if met.lower and met.lower[0] == needle]
+    below = [name for name, met in meetings.items() if met.upper and met.upper[0] == needle]
+    seat = min(below, key=gaps.__getitem__, default="")
+    opening = min(above, key=gaps.__getitem__, default="")
+    sides = [meetings[seat].upper] if seat else [meetings[opening].lower] if opening else []
+    point = sides[0][1] if sides and sides[0] else points[needle][0]
+    if case.run.lift is not None:
+        point = case.run.lift.surface
+    return ValveRoles(needle=needle, point=point, seat=seat, opening_stop=opening)
+
+
+def _needle(case: "ValveCase", points: dict[str, tuple[str, ...]]) -> str:
+    """Component that moves: named by the lift, or the only one that nothing fixes."""
+    lift = case.run.lift
+    if lift is not None:
+        known = [f"{name}.{port}" for name, ports in points.items() for port in ports]
+        if str(lift) not in known:
+            raise CaseProblem(
+                ("run", "lift"),
+                got=f"'{lift}'",
+                expected=f"a point of a body: {one_of(known)}",
+                hint=nearest(str(lift), known, "write component.point."),
+            )
+        return lift.body
+    free = [name for name in points if not _held(case, name)]
+    if len(free) != 1:
+        raise CaseProblem(
+            ("run",),
+            got=f"{len(free)} bodies that can move ({one_of(free)})",
+            expected="lift: the point of the needle whose displacement is the lift",
+            hint=f"add 'lift: {free[0]}.{points[free[0]][0]}'." if free else "add a needle.",
+        )
+    return free[0]
+
+
+def _held(case: "ValveCase", name: str) -> bool:
+    part = case.network.components[name]
+    body = str(getattr(part, "body", "")) if part.type == FLEXIBLE_BODY else ""
+    return body in case.bodies and bool(case.bodies[body].fixed)
