@@ -175,7 +175,9 @@ class Network:
 
     def dry(self) -> Self:
         """Return the same valve without fluid: no flow, no pressure force, no film, no leakage."""
-        return self._changed({name: part.dry() for name, part in self.components.items()}, None)
+        parts = {name: part.dry() for name, part in self.components.items()}
+        wet = any(_is_hydraulic(part) for part in parts.values() if part is not None)
+        return self._changed(parts, "", self.fluid if wet else None)
 
     def lumped(self, stiffness: float, restitution: float | None = None) -> Self:
         """Return the lumped baseline: rigid bodies, one spring and one dashpot per end stop.
@@ -190,10 +192,12 @@ class Network:
         parts = {
             name: part.lumped(stiffness, restitution) for name, part in self.components.items()
         }
-        return self._changed(parts, "ground")
+        return self._changed(parts, "ground", self.fluid)
 
-    def _changed(self, parts: Mapping[str, Component | None], instead: str | None) -> Self:
-        """Exchange components; what became None is left out, or its ports become a word."""
+    def _changed(
+        self, parts: Mapping[str, Component | None], instead: str, fluid: "Fluid | None"
+    ) -> Self:
+        """Exchange components; what became None is left out, its ports become the word given."""
         kept = {name: part for name, part in parts.items() if part is not None}
         connections = []
         for connection in self.connections:
@@ -202,8 +206,7 @@ class Network:
                 ports.append(instead)
             if len(ports) > 1:
                 connections.append(ports)
-        hydraulic = any(_is_hydraulic(part) for part in kept.values())
-        return type(self)(kept, connections, self.ambient, self.fluid if hydraulic else None)
+        return type(self)(kept, connections, self.ambient, fluid)
 
 
 def _is_hydraulic(component: Component) -> bool:

@@ -132,11 +132,12 @@ def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[st
         )
     known = ports[component]
     if name not in known:
+        full = [f"{component}.{port}" for port in known]
         raise CaseProblem(
             key,
             got=f"'{text}', but '{component}' has no port '{name}'",
-            expected=f"one of: {one_of(f'{component}.{port}' for port in known)}",
-            hint=nearest(name, known, "klack schema lists the ports of every component."),
+            expected=f"one of: {one_of(full)}",
+            hint=nearest(text, full, "every component has the ports of its type only."),
         )
     return Joint(component, name, known[name])
 
