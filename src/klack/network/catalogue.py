@@ -23,7 +23,19 @@ COMPONENTS = (
     ("force-over-stroke", "klack.mechanics.force_over_stroke.ForceOverStroke"),
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
+    ("end-stop", "klack.mechanics.end_stop.EndStop"),
+    ("end-stop", "klack.mechanics.end_stop.EndStop"),
     # hydraulics
+    ("chamber", "klack.hydraulics.chamber.Chamber"),
+    ("pressure-source", "klack.hydraulics.pressure_source.PressureSource"),
+    ("flow-source", "klack.hydraulics.flow_source.FlowSource"),
+    ("pressure-face", "klack.hydraulics.pressure_face.PressureFace"),
+    ("land-face", "klack.hydraulics.land_face.LandFace"),
+    ("orifice", "klack.hydraulics.orifice.Orifice"),
+    ("seat", "klack.hydraulics.seat.Seat"),
+    ("annulus", "klack.hydraulics.annulus.Annulus"),
+    ("inertance", "klack.hydraulics.inertance.Inertance"),
+    ("line", "klack.hydraulics.line.Line"),
     # magnetics and drivers
 )
 """Type word and dotted path of the class, for each component type."""

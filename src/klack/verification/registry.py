@@ -17,6 +17,7 @@ GROUPS = (
     "transient",
     "spectra",
     "fluids",
+    "films",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
 
