@@ -31,7 +31,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, require_nonnegative
 
 __all__ = ["GapReluctance", "IronReluctance", "LinearReluctance", "ReluctanceLaw"]
 
@@ -45,12 +45,13 @@ class LinearReluctance:
     Parameters
     ----------
     reluctance : float [A/Wb]
+        0 for a branch that only carries eddy currents.
     """
 
     reluctance: float
 
     def __post_init__(self) -> None:
-        require_positive("LinearReluctance.reluctance", self.reluctance, "A/Wb")
+        require_nonnegative("LinearReluctance.reluctance", self.reluctance, "A/Wb")
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return the magnetomotive force [A] at a flux [Wb]; the gap [m] does not matter."""
@@ -252,25 +253,28 @@ def _two_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
 
 
 def _locate(rows: Vector, x: Vector) -> tuple[NDArray[np.int64], Vector]:
-    i = np.clip(np.searchsorted(rows[:, 0], x, side="right") - 1, 0, None)
+    i: NDArray[np.int64] = np.clip(np.searchsorted(rows[:, 0], x, side="right") - 1, 0, None)
     return i, x - rows[i, 0]
 
 
 def _value(rows: Vector, x: Vector) -> Vector:
     i, s = _locate(rows, x)
-    return rows[i, 1] + s * (rows[i, 2] + s * (rows[i, 3] + s * rows[i, 4]))
+    value: Vector = rows[i, 1] + s * (rows[i, 2] + s * (rows[i, 3] + s * rows[i, 4]))
+    return value
 
 
 def _slope(rows: Vector, x: Vector) -> Vector:
     i, s = _locate(rows, x)
-    return rows[i, 2] + s * (2 * rows[i, 3] + s * 3 * rows[i, 4])
+    slope: Vector = rows[i, 2] + s * (2 * rows[i, 3] + s * 3 * rows[i, 4])
+    return slope
 
 
 def _integral(rows: Vector, x: Vector) -> Vector:
     i, s = _locate(rows, x)
-    return rows[i, 5] + s * (
+    integral: Vector = rows[i, 5] + s * (
         rows[i, 1] + s * (rows[i, 2] / 2 + s * (rows[i, 3] / 3 + s * rows[i, 4] / 4))
     )
+    return integral
 
 
 def _flat(rows: Vector) -> Vector:

@@ -1,0 +1,103 @@
+"""A magnetic circuit at rest: current and gap in, fluxes, force and energies out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import ConvergenceError
+from klack.magnetics.circuit import MagneticCircuit
+
+__all__ = ["StaticState", "static_state"]
+
+_MOST_ITERATIONS = 200
+_SETTLED = 1e-13
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StaticState:
+    """Fields of a circuit that carries a constant current.
+
+    Parameters
+    ----------
+    current : float [A]
+    gap : float [m]
+    loop_fluxes, branch_fluxes : array [Wb]
+    linkage : float [Wb]
+        Of the coil, ``psi``.
+    force : float [N]
+        Along the working gap; negative pulls it shut.
+    energy, coenergy : float [J]
+        Their sum is ``psi i``.
+    """
+
+    current: float
+    gap: float
+    loop_fluxes: NDArray[np.float64]
+    branch_fluxes: NDArray[np.float64]
+    linkage: float
+    force: float
+    energy: float
+    coenergy: float
+
+    @property
+    def inductance(self) -> float:
+        """Static inductance ``psi / i`` [H]; nan without current."""
+        return self.linkage / self.current if self.current else float("nan")
+
+
+def static_state(
+    circuit: MagneticCircuit,
+    *,
+    current: float,
+    gap: float,
+    start: NDArray[np.float64] | None = None,
+) -> StaticState:
+    """Solve the circuit for a constant current [A] at a working gap [m].
+
+    The loop fluxes minimise the convex function ``W(phi) - psi(phi) i``; damped Newton steps find
+    the minimum from any ``start`` (loop fluxes [Wb], zero by default).
+
+    Raises
+    ------
+    ConvergenceError
+        If the minimum is not found, which needs a law that does not rise.
+    """
+    C, turns = circuit.loops, circuit.loop_turns
+    phi = np.zeros(C.shape[1]) if start is None else np.array(start, dtype=float)
+
+    def gradient(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(C.T @ circuit.mmf(C @ phi, gap) - current * turns, dtype=float)
+
+    for _ in range(_MOST_ITERATIONS):
+        here = gradient(phi)
+        step = -np.linalg.solve((C.T * circuit.slope(C @ phi, gap)) @ C, here)
+        if np.max(np.abs(step)) <= _SETTLED * np.max(np.abs(phi)):
+            return _state(circuit, phi + step, current, gap)
+        # of a convex function only the slope along the step is needed, which round-off spares
+        downhill, share = abs(float(here @ step)), 1.0
+        while abs(float(gradient(phi + share * step) @ step)) > 0.9 * downhill and share > 1e-6:
+            share *= 0.5
+        phi = phi + share * step
+    raise ConvergenceError(
+        f"static magnetic circuit at {current:g} A and a gap of {gap:g} m: the last flux step was "
+        f"{np.max(np.abs(step)):.2g} Wb after {_MOST_ITERATIONS} iterations.\n"
+        "Try: check that every reluctance is above 0 and every B-H curve rises."
+    )
+
+
+def _state(
+    circuit: MagneticCircuit, phi: NDArray[np.float64], current: float, gap: float
+) -> StaticState:
+    branch = circuit.loops @ phi
+    linkage, energy = float(circuit.loop_turns @ phi), circuit.energy(branch, gap)
+    return StaticState(
+        current=current,
+        gap=gap,
+        loop_fluxes=phi,
+        branch_fluxes=branch,
+        linkage=linkage,
+        force=circuit.force(branch, gap),
+        energy=energy,
+        coenergy=linkage * current - energy,
+    )
