@@ -90,16 +90,19 @@ def _fluid_section() -> Any:
 
 def _read_fluid(value: Any, info: ValidationInfo) -> Any:
     found = _fluid_section()
-    return value if isinstance(value, found) else found.model_validate(value, context=info.context)
+    if value is None or isinstance(value, found):
+        return value
+    return found.model_validate(value, context=info.context)
 
 
 class _FluidSchema:
-    """JSON schema of the section ``fluid``."""
+    """JSON schema of the section ``fluid``: a name alone, or a mapping."""
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        return handler(_fluid_section().__pydantic_core_schema__)
+        section = handler(_fluid_section().__pydantic_core_schema__)
+        return {"anyOf": [{"type": "string", "examples": ["n-heptane"]}, section]}
 
 
 class AmbientSection(Section):
