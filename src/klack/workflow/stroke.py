@@ -1,0 +1,320 @@
+"""``klack stroke``: one actuation of a whole valve, in the variants asked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from time import perf_counter
+
+import numpy as np
+
+from klack import __version__
+from klack.case.valve import ValveCase, Variant
+from klack.case.valve_roles import ValveRoles, find_roles
+from klack.contact.statics import check_resolution
+from klack.errors import InputError
+from klack.mechanics.end_stop import EndStop
+from klack.network.network import Network
+from klack.network.port import Role
+from klack.network.rows import Rows
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.workflow.body_summary import summarise_body
+from klack.workflow.progress import Progress, silent
+from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.stroke_study import (
+    FluidSummary,
+    LineSummary,
+    StopSummary,
+    StrokeChannels,
+    StrokeStudy,
+    StrokeVariant,
+)
+from klack.workflow.study import BodySummary
+from klack.workflow.valve import Valve, build_valve
+
+__all__ = ["opening_and_closing", "run_stroke", "run_variant", "variant_network"]
+
+
+def run_stroke(
+    case: ValveCase,
+    *,
+    variants: Sequence[str] = (),
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> StrokeStudy:
+    """Compute one actuation in several variants and lay them side by side.
+
+    Parameters
+    ----------
+    case : ValveCase
+    variants : sequence of str
+        Among :data:`klack.case.valve.VARIANTS`; those of the case by default.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Returns
+    -------
+    StrokeStudy
+    """
+    begin = perf_counter()
+    wanted = case.require_variants(tuple(variants) or case.run.variants)
+    roles = find_roles(case)
+    clock = StageClock(progress)
+    with collected_warnings() as notes:
+        valve = build_valve(case, clock, threads=threads)
+        runs = {name: _run(valve, roles, name, clock) for name in wanted}
+        stops = _stop_summaries(valve)
+    results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
+    rows = [run.rows for run in runs.values()]
+    return StrokeStudy(
+        case=case.name,
+        title=case.title,
+        description=case.description.strip(),
+        case_text=case.source,
+        version=__version__,
+        versions={name: version(name) for name in LIBRARIES},
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        wall_time=perf_counter() - begin,
+        stage_times=clock.times(),
+        needle=roles.needle,
+        lift=_lift(valve.network, roles),
+        switch_off=_switch_off(valve.network),
+        duration=case.run.duration,
+        step=case.run.step,
+        variants=results,
+        channels=_channels(valve.network, roles, [run.result for run in results.values()]),
+        bodies=_body_summaries(valve),
+        stops=stops,
+        fluid=_fluid_summary(rows),
+        lines=_line_summaries(valve.network, rows),
+        warnings=tuple(notes),
+    )
+
+
+def variant_network(valve: Valve, variant: Variant) -> Network:
+    """Network of one variant of a valve: without fluid, with rigid bodies, or both."""
+    network = valve.network
+    if variant.startswith("dry"):
+        network = network.dry()
+    lumped = valve.case.lumped
+    if variant.endswith("lumped"):
+        if lumped is None:  # refused by require_variants already
+            raise InputError(
+                "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it."
+            )
+        network = network.lumped(lumped.stiffness, lumped.restitution)
+    return network
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    variant: StrokeVariant
+    rows: Rows
+
+
+def run_variant(
+    case: ValveCase, rows: Rows, progress: Callable[[float], None] = lambda fraction: None
+) -> NetworkResult:
+    """Run rows for the time and with the steps that the case asks for."""
+    return simulate_network(
+        rows,
+        duration=case.run.duration,
+        step=case.run.step,
+        coarse=case.run.coarse,
+        record=case.run.record,
+        progress=progress,
+    )
+
+
+def _run(valve: Valve, roles: ValveRoles, name: Variant, progress: Progress) -> _Run:
+    begin = perf_counter()
+    stage = f"run {name}"
+    progress(stage, 0.0)
+    rows = variant_network(valve, name).rows()
+    result = run_variant(valve.case, rows, lambda fraction: progress(stage, fraction))
+    opening, closing = opening_and_closing(result, roles)
+    wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
+    variant = StrokeVariant(
+        name=name,
+        label=_label(valve, rows, wet=wet, flexible=flexible),
+        wet=wet,
+        flexible=flexible,
+        modes=sum(row.body.mode_count for row in rows.bodies),
+        opening_time=opening,
+        closing_time=closing,
+        result=result,
+        setup_time=perf_counter() - begin - result.wall_time,
+    )
+    return _Run(variant=variant, rows=rows)
+
+
+def opening_and_closing(result: NetworkResult, roles: ValveRoles) -> tuple[float, float]:
+    """First touch of the opening stop, and of the seat after that [s]; nan if never."""
+    times = {stop: [e.time for e in result.events if e.stop == stop] for stop in _stops(roles)}
+    opening = min(times.get(roles.opening_stop, []), default=float("nan"))
+    since = opening
+    if np.isnan(opening):  # a short stroke: it left the seat, and came back
+        lift = result.channels[f"{roles.needle}.{roles.point} displacement"].values
+        since = float(result.time[int(np.argmax(lift))])
+    after = [time for time in times.get(roles.seat, []) if time > since]
+    return opening, min(after, default=float("nan"))
+
+
+def _stops(roles: ValveRoles) -> tuple[str, ...]:
+    return tuple(name for name in (roles.seat, roles.opening_stop) if name)
+
+
+def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
+    fluid = "dry"
+    if wet and rows.fluid is not None:
+        excess = _highest_pressure(rows) - rows.ambient.pressure
+        fluid = f"{rows.fluid.name} at {excess / 1e5:.3g} bar"
+    elastic = [
+        row.body.mode_count - row.body.rigid_count for row in rows.bodies if row.body.mode_count
+    ]
+    lumped = valve.case.lumped
+    if not flexible and lumped is not None:
+        return f"{fluid}, rigid bodies on {lumped.stiffness / 1e6:.4g} N/um"
+    if not any(elastic):
+        return f"{fluid}, rigid bodies"
+    return f"{fluid}, {' + '.join(str(count) for count in elastic)} modes"
+
+
+def _highest_pressure(rows: Rows) -> float:
+    """Highest pressure of the valve at the start [Pa]."""
+    return max(
+        (float(node.pressure[0]) for node in rows.nodes.values()), default=rows.ambient.pressure
+    )
+
+
+def _lift(network: Network, roles: ValveRoles) -> float:
+    """Travel between the two stops [m], unloaded."""
+    gaps = [_gap(network, name) for name in _stops(roles)]
+    return sum(gaps) if roles.opening_stop else float("nan")
+
+
+def _gap(network: Network, name: str) -> float:
+    part = network.components[name]
+    return part.gap if isinstance(part, EndStop) else float("nan")
+
+
+def _switch_off(network: Network) -> float:
+    """When the drivers' command ends [s]; nan if no driver says."""
+    ends = [
+        getattr(part, "switch_off", None)
+        for part in network.components.values()
+        if any(port.role is Role.VOLTAGE for port in part.port_kinds().values())
+    ]
+    return max((float(end) for end in ends if end is not None), default=float("nan"))
+
+
+def _channels(
+    network: Network, roles: ValveRoles, results: Sequence[NetworkResult]
+) -> StrokeChannels:
+    units = {
+        name: data.unit for result in reversed(results) for name, data in result.channels.items()
+    }
+    coils = [
+        name
+        for name, part in network.components.items()
+        if any(port.role is Role.COIL for port in part.port_kinds().values())
+    ]
+
+    def known(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(name for name in names if name in units)
+
+    point = f"{roles.needle}.{roles.point}"
+    return StrokeChannels(
+        lift=f"{point} displacement",
+        lift_velocity=f"{point} velocity",
+        velocity=f"{roles.needle} velocity",
+        voltage=known([f"{coil} voltage" for coil in coils]),
+        current=known([f"{coil} current" for coil in coils]),
+        magnetic_force=known([f"{coil}.armature force" for coil in coils]),
+        pressures=tuple(
+            name for name, unit in units.items() if unit == "Pa" and not name.startswith("ambient ")
+        ),
+        flows=tuple(name for name in units if name.endswith(" flow")),
+        opening_stop=roles.opening_stop,
+        seat=roles.seat,
+    )
+
+
+def _body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
+    result = []
+    for name, body in valve.bodies.items():
+        reduced = valve.reduced[name]
+        contact = [
+            reduced.port_index(port.name)
+            for item in valve.contacts.values()
+            for side, port in zip((item.pair.upper, item.pair.lower), item.ports, strict=True)
+            if side.name == name
+        ]
+        shares = reduced.compliance_share[contact] if contact else np.array([np.nan])
+        summary = summarise_body(valve.case, body, reduced, compliance_share=float(shares.min()))
+        result.append(summary)
+    return tuple(result)
+
+
+def _stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
+    return tuple(
+        _stop_summary(valve, name, part)
+        for name, part in valve.network.components.items()
+        if isinstance(part, EndStop)
+    )
+
+
+def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
+    contact, local = valve.contacts.get(name), valve.laws.get(name)
+    none, nan = np.empty(0), float("nan")
+    return StopSummary(
+        name=name,
+        surfaces=" on ".join(str(s) for s in valve.case.stops[name].between) if contact else "",
+        kind=part.law.kind if part.law is not None else "film",
+        gap=part.gap,
+        film=part.film is not None,
+        indentation=np.append(0.0, local.force_indentation) if local else none,
+        force=np.append(0.0, local.force) if local else none,
+        share=np.append(nan, local.share) if local else none,
+        approach=contact.static.approach if contact else none,
+        static_force=contact.static.force if contact else none,
+        area=contact.static.area if contact else none,
+        pattern_force=contact.pattern_force if contact else nan,
+        half_width=contact.static.half_width_at(contact.pattern_force) if contact else nan,
+        size_ratio=check_resolution(contact.static, contact.pattern_force) if contact else nan,
+    )
+
+
+def _fluid_summary(rows: Sequence[Rows]) -> FluidSummary | None:
+    wet = next((item for item in rows if item.fluid is not None), None)
+    if wet is None or wet.fluid is None:
+        return None
+    fluid, p = wet.fluid, _highest_pressure(wet)
+    return FluidSummary(
+        name=fluid.name,
+        temperature=fluid.temperature,
+        pressure=p,
+        density=float(fluid.density(p)),
+        bulk_modulus=float(fluid.bulk_modulus(p)),
+        sound_speed=float(fluid.sound_speed(p)),
+        viscosity=float(fluid.viscosity(p)),
+        vapour_pressure=fluid.vapour_pressure,
+    )
+
+
+def _line_summaries(network: Network, rows: Sequence[Rows]) -> tuple[LineSummary, ...]:
+    found: Mapping[str, float] = {
+        line.component: line.delay for item in reversed(rows) for line in item.lines
+    }
+    return tuple(
+        LineSummary(
+            name=name,
+            length=(length := float(getattr(network.components[name], "length", np.nan))),
+            sound_speed=length / delay,
+            echo_time=2.0 * delay,
+        )
+        for name, delay in found.items()
+    )
