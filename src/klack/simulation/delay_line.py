@@ -276,7 +276,7 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
     return np.concatenate([np.zeros(0), *parts])
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _read(
     samples: Vector, start: int, depth: int, head: int, m: int, f: float
 ) -> tuple[float, float]:
@@ -307,7 +307,7 @@ def _read(
     return mean, lost
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _write(samples: Vector, start: int, depth: int, head: int, m: int, w: float) -> None:
     i = head
     for _ in range(m):
@@ -317,7 +317,7 @@ def _write(samples: Vector, start: int, depth: int, head: int, m: int, w: float)
             i = 0
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _lump(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> tuple[float, float]:
     """Unsteady friction of a lump as ``offset + slope q``."""
     offset, slope = 0.0, 0.0
@@ -327,7 +327,7 @@ def _lump(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> tuple[floa
     return offset, slope
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _rub(
     memory: Vector, first: int, decay: Vector, inductance: Vector, k0: int, k1: int, q: float
 ) -> float:
@@ -341,7 +341,7 @@ def _rub(
     return heat
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
     """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
 
@@ -356,7 +356,7 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
     c, Z : array, shape (2 n,)
         Written.
     """
-    level = 0 if m == 1 else 1
+    z = lines.impedance_of_term[0 if m == 1 else 1]
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
         lost = 0.0
@@ -376,18 +376,20 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
         impedance = lines.impedance[line]
         state.scatter[line] = lines.step / (4.0 * impedance) * lost
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
-        c[2 * line], c[2 * line + 1] = state.incoming[s0, 1], state.incoming[s1 - 1, 0]
-        Z[2 * line] = Z[2 * line + 1] = impedance + 0.5 * lines.resistance[line]
+        a, b = 2 * line, 2 * line + 1
+        c[a], c[b] = state.incoming[s0, 1], state.incoming[s1 - 1, 0]
+        Z[a] = Z[b] = impedance + 0.5 * lines.resistance[line]
         if k1 > k0:
-            z = lines.impedance_of_term[level]
             first = lines.first_memory[line]
-            for end, at in ((2 * line, first), (2 * line + 1, first + (s1 - s0) * (k1 - k0))):
-                offset, slope = _lump(state.memory, at, z, k0, k1)
-                c[end] += 0.5 * offset
-                Z[end] += 0.5 * slope
+            offset, slope = _lump(state.memory, first, z, k0, k1)
+            c[a] += 0.5 * offset
+            Z[a] += 0.5 * slope
+            offset, slope = _lump(state.memory, first + (s1 - s0) * (k1 - k0), z, k0, k1)
+            c[b] += 0.5 * offset
+            Z[b] += 0.5 * slope
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matrix) -> None:
     """Finish the step that :func:`lines_incoming` began: send the waves, move on by ``m`` steps.
 
@@ -448,7 +450,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         books[line, 2] += collapse
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def line_store(lines: Lines, state: LineState, line: int) -> float:
     """Energy [J] held in a line now: waves, memory of the friction, cavities.
 
@@ -469,7 +471,7 @@ def line_store(lines: Lines, state: LineState, line: int) -> float:
     return energy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def line_volume(lines: Lines, state: LineState, line: int) -> float:
     """Fluid [m^3] that compression stores in a line now, ``P`` over its stiffness.
 
@@ -482,13 +484,13 @@ def line_volume(lines: Lines, state: LineState, line: int) -> float:
     return volume
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def line_cavity(lines: Lines, state: LineState, line: int) -> float:
     """Vapour [m^3] in all cavities of a line now."""
     return state.cavity[lines.first_segment[line] : lines.first_segment[line + 1]].sum()
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _held(lines: Lines, state: LineState, segment: int, wave: int, power: int) -> float:
     """Sum of the samples, or of their squares, that are still under way."""
     start, depth = lines.start[segment, wave], lines.depth[segment]

@@ -1,0 +1,428 @@
+"""From the rows of a network to the flat arrays of the time loop."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
+from klack.network.step_function import STEP, StepFunction
+from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
+from klack.simulation.interface_step import NO_LAW
+from klack.simulation.modal_step import (
+    FIXED_ROWS,
+    ROW,
+    ROW_A11,
+    ROW_B1,
+    ROW_P1,
+    ROW_Q,
+    ROW_V,
+)
+from klack.simulation.network_kernel import (
+    LOSS,
+    STORE,
+    SUPPLY,
+    Bodies,
+    Interfaces,
+    Nodes,
+    StepRows,
+)
+from klack.simulation.propagator import modal_propagator
+
+__all__ = [
+    "CompiledNetwork",
+    "PortName",
+    "body_energy",
+    "compile_bodies",
+    "compile_network",
+    "modal_state",
+]
+
+Vector = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_TABLE = 16  # functions in the table of the loop; it grows in steps, each compiled once
+_KINDS = {"store": STORE, "supply": SUPPLY, "loss": LOSS}
+
+
+@dataclass(frozen=True, slots=True)
+class PortName:
+    """A mechanical port of the loop, in words."""
+
+    component: str
+    port: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CompiledNetwork:
+    """All arrays of the time loop, and the words that belong to them.
+
+    Parameters
+    ----------
+    table : tuple of functions
+    bodies, elements, branches, nodes, lines, line_state, interfaces
+        See :mod:`klack.simulation.network_kernel`.
+    books : array [J]
+    book_kind : array of int
+    book_names : tuple of str
+    line_books : array, shape (lines, 3) [J]
+    ports : tuple of PortName
+    node_order : tuple of int
+        Handle of every node of the loop.
+    body_blocks : array, shape (bodies + 1,)
+        First block of each body.
+    """
+
+    rows: Rows
+    table: tuple[StepFunction, ...]
+    bodies: Bodies
+    elements: StepRows
+    branches: StepRows
+    nodes: Nodes
+    lines: Lines
+    line_state: LineState
+    line_books: NDArray[np.float64]
+    interfaces: Interfaces
+    books: Vector
+    book_kind: Index
+    book_names: tuple[str, ...]
+    ports: tuple[PortName, ...]
+    port_of: Mapping[int, int]
+    node_order: tuple[int, ...]
+    body_blocks: Index
+
+
+def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
+    """Lay out a network for steps of ``step`` and of ``coarse * step`` seconds."""
+    if not rows.bodies:
+        raise InputError(
+            "network",
+            got="no body",
+            expected="at least one body that moves",
+            hint="add a rigid-mass or a flexible-body component.",
+        )
+    port_of, names = _number_ports(rows.bodies)
+    bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
+    functions: list[StepFunction] = []
+    books = _Books()
+    elements = _step_rows(rows.elements, functions, books, port_of, {})
+    node_order = _order_nodes(rows)
+    node_of = {handle: i for i, handle in enumerate(node_order)}
+    branches = _step_rows(rows.branches, functions, books, port_of, node_of)
+    lines, line_state = compile_lines(
+        rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
+    )
+    nodes = _nodes(rows, node_order, port_of, bodies, lines)
+    ends = nodes.end_node
+    if len(ends):
+        start_lines(lines, line_state, nodes.density * nodes.g[ends])
+    return CompiledNetwork(
+        rows=rows,
+        table=_table(functions),
+        bodies=bodies,
+        elements=elements,
+        branches=branches,
+        nodes=nodes,
+        lines=lines,
+        line_state=line_state,
+        line_books=np.zeros((max(len(rows.lines), 1), 3)),
+        interfaces=_interfaces(rows, port_of),
+        books=np.zeros(len(books.kinds)),
+        book_kind=np.array(books.kinds, dtype=np.int64),
+        book_names=tuple(books.names),
+        ports=names,
+        port_of=port_of,
+        node_order=node_order,
+        body_blocks=blocks,
+    )
+
+
+class _Books:
+    """Collects the entries of the ledger."""
+
+    def __init__(self) -> None:
+        self.kinds: list[int] = []
+        self.names: list[str] = []
+
+    def add(self, name: str, kind: int) -> int:
+        self.names.append(name)
+        self.kinds.append(kind)
+        return len(self.kinds) - 1
+
+
+def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortName, ...]]:
+    """Number the ports body by body; the ground comes last."""
+    handles = [handle for row in rows for handle in row.ports]
+    port_of = {handle: i for i, handle in enumerate(handles)}
+    port_of[GROUND] = len(handles)
+    names = tuple(PortName(row.component, name) for row in rows for name in row.names)
+    return port_of, names
+
+
+def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple[Bodies, Index]:
+    """Lay out the modes in blocks for two step sizes; also the first block of each body."""
+    fine, coarse = list[Vector](), list[Vector]()
+    start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
+    blocks = [0]
+    first_port = 0
+    ports = sum(len(row.ports) for row in rows)
+    first, last = np.zeros(ports + 1, np.int64), np.zeros(ports + 1, np.int64)
+    first[ports] = last[ports] = ports
+    G = np.zeros((2, ports, ports))
+    for row in rows:
+        body, own = row.body, len(row.ports)
+        height = FIXED_ROWS + own + 1
+        modes = body.mode_count
+        cm = np.zeros(modes)
+        if body.rigid_count:
+            cm[: body.rigid_count] = body.rigid_axial / body.mass
+        v0 = np.zeros(modes)
+        v0[: body.rigid_count] = row.speed * body.rigid_axial
+        here = slice(first_port, first_port + own)
+        first[here], last[here] = first_port, first_port + own
+        for begin in range(0, max(modes, 1), ROW):
+            part = slice(begin, min(begin + ROW, modes))
+            used = part.stop - part.start
+            for level, (h, target) in enumerate(zip(steps, (fine, coarse), strict=True)):
+                W = np.zeros((height, ROW))
+                P = modal_propagator(body.omega[part], body.damping[part], h)
+                W[ROW_V, :used] = v0[part]
+                W[ROW_A11 : ROW_A11 + 4, :used] = P.A11, P.A12, P.A21, P.A22
+                W[ROW_P1 : ROW_P1 + 2, :used] = (
+                    P.A11 * P.B1 + P.A12 * P.B2,
+                    P.A21 * P.B1 + P.A22 * P.B2,
+                )
+                W[ROW_B1 : ROW_B1 + 2, :used] = P.B1, P.B2
+                shapes = np.asarray(body.port_shapes)[part].T
+                W[FIXED_ROWS:-1, :used] = shapes
+                W[-1, :used] = cm[part]
+                G[level, here, here] += (shapes * P.B1) @ shapes.T
+                target.append(W.ravel())
+            start.append(start[-1] + height * ROW)
+            count.append(4 * ceil(used / 4))
+            port0.append(first_port)
+            port1.append(first_port + own)
+        blocks.append(len(count))
+        first_port += own
+    bodies = Bodies(
+        fine=np.concatenate(fine),
+        coarse=np.concatenate(coarse),
+        start=np.array(start, dtype=np.int64),
+        modes=np.array(count, dtype=np.int64),
+        port0=np.array(port0, dtype=np.int64),
+        port1=np.array(port1, dtype=np.int64),
+        first=first,
+        last=last,
+        G=G,
+        force=np.zeros(ports + 1),
+        before=np.zeros(ports + 1),
+        y=np.zeros(ports + 1),
+        work=np.zeros(ports + 1),
+    )
+    return bodies, np.array(blocks, dtype=np.int64)
+
+
+def _step_rows(
+    rows: Sequence[ElementRow | BranchRow],
+    functions: list[StepFunction],
+    books: _Books,
+    port_of: Mapping[int, int],
+    node_of: Mapping[int, int],
+) -> StepRows:
+    count = len(rows)
+    numbers = {
+        key: np.zeros(count, np.int64)
+        for key in ("function", "states", "books", "a", "b", "supply", "loss")
+    }
+    offsets = {
+        key: np.zeros(count + 1, np.int64)
+        for key in ("parameter0", "state0", "input0", "output0", "port0", "book0")
+    }
+    numbers["supply"][:] = numbers["loss"][:] = -1
+    parameters, state, ports = [np.zeros(0)], [np.zeros(0)], list[int]()
+    for k, row in enumerate(rows):
+        head = 0
+        if isinstance(row, BranchRow):
+            head = 3
+            numbers["a"][k], numbers["b"][k] = node_of[row.a], node_of[row.b]
+        if not any(row.step is known for known in functions):
+            functions.append(row.step)
+        numbers["function"][k] = next(i for i, f in enumerate(functions) if f is row.step)
+        numbers["states"][k] = len(row.state)
+        numbers["books"][k] = len(row.books)
+        parameters.append(row.parameters)
+        state.append(row.state)
+        ports += [port_of[port] for port in row.ports]
+        sizes = {
+            "parameter0": len(row.parameters),
+            "state0": len(row.state),
+            "input0": (6 if head else 2) + 2 * len(row.ports),
+            "output0": head + len(row.ports) + len(row.state) + len(row.books),
+            "port0": len(row.ports),
+            "book0": len(row.books),
+        }
+        for key, size in sizes.items():
+            offsets[key][k + 1] = offsets[key][k] + size
+        offsets["book0"][k] = len(books.kinds)
+        label = " ".join(filter(None, (row.component, row.label)))
+        for book in row.books:
+            place = books.add(f"{label} {book.label}", _KINDS[book.kind])
+            if head and book.kind == "supply":
+                numbers["supply"][k] = place
+        offsets["book0"][k + 1] = len(books.kinds)
+        if head and numbers["supply"][k] < 0:
+            numbers["loss"][k] = books.add(f"{label} flow", LOSS)
+    return StepRows(
+        function=numbers["function"],
+        parameters=np.append(np.concatenate(parameters), 0.0),
+        parameter0=offsets["parameter0"],
+        state=np.append(np.concatenate(state), 0.0),
+        state0=offsets["state0"],
+        states=numbers["states"],
+        inputs=np.zeros(offsets["input0"][-1] + 1),
+        input0=offsets["input0"],
+        outputs=np.zeros(offsets["output0"][-1] + 1),
+        output0=offsets["output0"],
+        ports=np.array(ports, dtype=np.int64),
+        port0=offsets["port0"],
+        book0=offsets["book0"],
+        books=numbers["books"],
+        a=numbers["a"],
+        b=numbers["b"],
+        supply=numbers["supply"],
+        loss=numbers["loss"],
+    )
+
+
+@njit(STEP, cache=True)
+def _nothing(par: Any, state: Any, inp: Any, out: Any) -> int:
+    return 0
+
+
+def _table(functions: Sequence[StepFunction]) -> tuple[StepFunction, ...]:
+    size = _TABLE * max(1, ceil(len(functions) / _TABLE))
+    return (*functions, *(_nothing for _ in range(size - len(functions))))
+
+
+def _order_nodes(rows: Rows) -> tuple[int, ...]:
+    volumes = [handle for handle, node in rows.nodes.items() if node.volume > 0.0]
+    prescribed = [handle for handle, node in rows.nodes.items() if node.volume <= 0.0]
+    return (*volumes, *prescribed)
+
+
+def _nodes(
+    rows: Rows, order: Sequence[int], port_of: Mapping[int, int], bodies: Bodies, lines: Lines
+) -> Nodes:
+    node_of = {handle: i for i, handle in enumerate(order)}
+    given = [rows.nodes[handle] for handle in order]
+    volumes = sum(node.volume > 0.0 for node in given)
+    ambient = rows.ambient.pressure
+    fluid = np.zeros(8)
+    count = len(order)
+    p = np.array([node.pressure[0] for node in given], dtype=float)
+    density, rho, g = 1.0, np.ones(count), np.zeros(count)
+    hint = np.zeros(count, np.int64)
+    if rows.fluid is not None and count:
+        fluid = fluid_table(rows.fluid, ambient)
+        density = fluid_at(fluid, ambient, 0)[0]
+        for i in range(count):
+            rho[i], _, g[i], hint[i] = fluid_at(fluid, p[i], 0)
+    tables = [given[i] for i in range(volumes, count)]
+    sizes = [len(node.time) for node in tables]
+    volume = np.array([node.volume for node in given[:volumes]], dtype=float)
+    gamma = np.zeros((2, max(volumes, 1)))
+    walls = [(node_of[w.node], port_of[w.port], w.area) for w in rows.walls]
+    ports = bodies.y.size - 1
+    for i, a, area_a in walls:
+        for j, b, area_b in walls:
+            if i == j and i < volumes and a < ports and b < ports:
+                gamma[:, i] += area_a * bodies.G[:, a, b] * area_b
+    return Nodes(
+        volumes=volumes,
+        fluid=fluid,
+        ambient=ambient,
+        density=density,
+        hint=hint,
+        volume=volume,
+        mass=volume * rho[:volumes],
+        held=volume.copy(),
+        p=p,
+        before=p.copy(),
+        g=g,
+        gamma=gamma,
+        numeric=np.zeros(volumes),
+        supply=np.zeros(count - volumes),
+        time=np.concatenate([np.zeros(0), *(node.time for node in tables)]),
+        pressure=np.concatenate([np.zeros(0), *(node.pressure for node in tables)]),
+        table0=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        wall_node=np.array([w[0] for w in walls], dtype=np.int64),
+        wall_port=np.array([w[1] for w in walls], dtype=np.int64),
+        wall_area=np.array([w[2] for w in walls], dtype=float),
+        end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
+    )
+
+
+def _interfaces(rows: Rows, port_of: Mapping[int, int]) -> Interfaces:
+    count = len(rows.interfaces)
+    kind = np.full(count, NO_LAW, np.int64)
+    law0, alpha = np.zeros(count, np.int64), np.zeros(count)
+    law = [np.zeros(0)]
+    film = np.zeros((4, count))
+    film[2] = 1e-7
+    for c, row in enumerate(rows.interfaces):
+        law0[c] = sum(len(part) for part in law)
+        if row.law is not None:
+            flat = row.law.flat()
+            kind[c], alpha[c] = flat.kind, flat.dissipation
+            law.append(flat.parameters)
+        if row.film is not None:
+            film[:, c] = row.film.cubic, row.film.linear, row.film.cut_off, row.film.suction
+    gap = np.array([row.gap for row in rows.interfaces], dtype=float)
+    return Interfaces(
+        upper=np.array([port_of[row.upper] for row in rows.interfaces], dtype=np.int64),
+        lower=np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64),
+        gap0=gap,
+        kind=kind,
+        law=np.append(np.concatenate(law), 0.0),
+        law0=law0,
+        alpha=alpha,
+        series=np.array([row.series_compliance for row in rows.interfaces], dtype=float),
+        cubic=film[0].copy(),
+        linear=film[1].copy(),
+        cut_off=film[2].copy(),
+        suction=film[3].copy(),
+        hint=np.zeros(count, np.int64),
+        e=np.zeros(count),
+        gap=gap.copy(),
+        rate=np.zeros(count),
+        force=np.zeros(count),
+        before=np.zeros(count),
+        chi=np.zeros(count),
+        since=np.full(count, np.inf),
+        contact_loss=np.zeros(count),
+        film_loss=np.zeros(count),
+    )
+
+
+def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:
+    """Modal displacements and velocities of a body now."""
+    modes = network.rows.bodies[body].body.mode_count
+    q, v = [], []
+    bodies = network.bodies
+    for k in range(network.body_blocks[body], network.body_blocks[body + 1]):
+        W = bodies.fine[bodies.start[k] : bodies.start[k + 1]].reshape(-1, ROW)
+        q.append(W[ROW_Q])
+        v.append(W[ROW_V])
+    return np.concatenate(q)[:modes], np.concatenate(v)[:modes]
+
+
+def body_energy(body: ReducedBody, q: Vector, v: Vector) -> tuple[float, float]:
+    """Kinetic and strain energy [J]."""
+    return 0.5 * float(v @ v), 0.5 * float(np.sum((body.omega * q) ** 2))

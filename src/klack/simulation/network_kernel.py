@@ -1,0 +1,946 @@
+"""The time loop of a network: bodies, elements, fluid nodes, branches, lines, contacts and films.
+
+One step of length ``h`` (or ``M h`` while nothing touches):
+
+1. Every mode moves exactly, without the forces of this step.
+2. Sweeps: all elements, then all pressures (Newton), then all interfaces find their mean forces
+   from the port displacements at both ends of the step; the forces move the ports by ``G F``;
+   again, until no port moves by more than :data:`SETTLED`.
+3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
+   the modes.
+
+A coarse step is tried when all interfaces are far apart or at rest; if it ends in a contact, in a
+release or in a noticeable film, it is thrown away and done again in fine steps.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from klack.hydraulics.fluid_table import fluid_at
+from klack.network.step_function import pointer
+from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
+from klack.simulation.interface_step import solve_interface
+from klack.simulation.modal_step import ROW, advance, apply_forces, watch
+
+__all__ = [
+    "STATUS_BRANCH",
+    "STATUS_DONE",
+    "STATUS_ELEMENT",
+    "STATUS_FORCES",
+    "STATUS_PRESSURES",
+    "Bodies",
+    "Interfaces",
+    "Nodes",
+    "Recording",
+    "Scratch",
+    "StepRows",
+    "read_stores",
+    "record_points",
+    "run_network",
+    "scratch_memory",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Cube = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
+SETTLED = 1e-15  # [m] change of a port displacement at which the forces of a step have settled
+_SETTLED_BY_ROUND_OFF = 1e-12  # [m] accepted when sweeps no longer improve
+_MOST_SWEEPS = 200
+_MOST_NEWTON = 80
+_PRESSURE_LEFT = 1e-7  # last Newton step over the pressure
+_LEAST_PRESSURE = 1.0  # [Pa]
+_FILM_SMALL = 0.02  # [N] film force that a coarse step may meet
+_REST_TIME = 50e-6  # [s] closed for so long: at rest
+_SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
+STORE, SUPPLY, LOSS = 0, 1, 2
+
+
+class Bodies(NamedTuple):
+    """Modes in blocks and ports in body order; port number ``ports`` is the immovable ground."""
+
+    fine: Vector  # blocks at the fine step
+    coarse: Vector  # the same at the coarse step
+    start: Index  # (blocks + 1,) first number of each block
+    modes: Index  # (blocks,) in use, a multiple of four
+    port0: Index  # (blocks,) ports of the body of the block
+    port1: Index
+    first: Index  # (ports,) first port of the body of each port
+    last: Index
+    G: Cube  # (2, ports, ports) displacement at the end of a step per unit force during it
+    force: Vector  # (ports + 1,) forces of the last step
+    before: Vector  # (ports + 1,) forces of the step before
+    y: Vector  # (ports + 1,) displacements
+    work: Vector  # (ports + 1,) work done by the forces at each port
+
+
+class StepRows(NamedTuple):
+    """Elements or branches: where the numbers of each row lie."""
+
+    function: Index
+    parameters: Vector
+    parameter0: Index
+    state: Vector
+    state0: Index
+    states: Index
+    inputs: Vector
+    input0: Index
+    outputs: Vector
+    output0: Index
+    ports: Index  # flat list
+    port0: Index  # (rows + 1,) into ``ports``
+    book0: Index
+    books: Index
+    a: Index  # nodes of branches
+    b: Index
+    supply: Index  # book that takes all power of a source, or -1
+    loss: Index  # book that takes the loss of a branch, or -1
+
+
+class Nodes(NamedTuple):
+    """Pressures: volumes first, then prescribed ones."""
+
+    volumes: int
+    fluid: Vector
+    ambient: float
+    density: float  # at ambient pressure
+    hint: Index
+    volume: Vector  # at zero displacements
+    mass: Vector
+    held: Vector  # volume at the end of the last step
+    p: Vector
+    before: Vector
+    g: Vector
+    gamma: Matrix  # (2, volumes) own compliance of the walls, A G A
+    numeric: Vector  # out: loss of the implicit step
+    supply: Vector  # out: energy from prescribed pressures
+    time: Vector  # tables of the prescribed pressures
+    pressure: Vector
+    table0: Index
+    wall_node: Index
+    wall_port: Index
+    wall_area: Vector
+    end_node: Index  # of line ends
+
+
+class Interfaces(NamedTuple):
+    """Contacts and films."""
+
+    upper: Index
+    lower: Index
+    gap0: Vector
+    kind: Index
+    law: Vector
+    law0: Index
+    alpha: Vector
+    series: Vector
+    cubic: Vector
+    linear: Vector
+    cut_off: Vector
+    suction: Vector
+    hint: Index
+    e: Vector
+    gap: Vector
+    rate: Vector
+    force: Vector
+    before: Vector
+    chi: Vector
+    since: Vector  # closed since; infinity while open
+    contact_loss: Vector
+    film_loss: Vector
+
+
+class Scratch(NamedTuple):
+    """Memory of the time loop: it cannot ask for any itself."""
+
+    ports: Matrix
+    interfaces: Matrix
+    nodes: Matrix
+    branches: Matrix
+    ends: Matrix
+    matrix: Matrix
+    sums: Vector
+
+
+def scratch_memory(
+    *, ports: int, interfaces: int, nodes: int, branches: int, ends: int, sums: int
+) -> Scratch:
+    """Memory for a network of these sizes."""
+    return Scratch(
+        ports=np.zeros((8, ports + 1)),
+        interfaces=np.zeros((8, interfaces)),
+        nodes=np.zeros((9, nodes)),
+        branches=np.zeros((3, branches)),
+        ends=np.zeros((3, ends)),
+        matrix=np.zeros((nodes, nodes)),
+        sums=np.zeros(sums),
+    )
+
+
+class Recording(NamedTuple):
+    """What is kept: means over records, states at their ends, and every fine step in contact."""
+
+    means: Matrix  # (records, element forces + branches + 2 interfaces)
+    peaks: Matrix  # (records, interfaces)
+    points: Matrix  # (records, columns), see the compile step
+    states: Index  # which states of elements are recorded
+    branch_states: Index
+    cm_block0: Index  # blocks of each body whose centre of mass is watched
+    cm_block1: Index
+    port_block0: Index
+    port_block1: Index
+    port_row: Index
+    fine: Cube  # (interfaces, most, 5): start, step, contact force, film force, gap
+    filled: Index  # (interfaces,)
+
+
+@njit(cache=True)
+def _copy_state(source: Vector, target: Vector, start: Index, count: Index) -> None:
+    for k in range(count.size):
+        s = start[k]
+        for i in range(count[k]):
+            target[s + i] = source[s + i]
+            target[s + ROW + i] = source[s + ROW + i]
+
+
+@njit(cache=True)
+def _stop(W: Vector, start: Index, count: Index) -> None:
+    for k in range(count.size):
+        s = start[k] + ROW
+        W[s : s + count[k]] = 0.0
+
+
+@njit(cache=True)
+def _table(time: Vector, value: Vector, first: int, last: int, t: float) -> float:
+    if t <= time[first]:
+        return value[first]
+    for i in range(first + 1, last):
+        if t <= time[i]:
+            return value[i - 1] + (value[i] - value[i - 1]) * (t - time[i - 1]) / (
+                time[i] - time[i - 1]
+            )
+    return value[last - 1]
+
+
+@njit(cache=True)
+def _solve(A: Matrix, r: Vector, n: int) -> None:
+    """Gauss without pivoting: the matrix is diagonally dominant."""
+    for k in range(n):
+        for i in range(k + 1, n):
+            if A[i, k] != 0.0:
+                c = A[i, k] / A[k, k]
+                for j in range(k + 1, n):
+                    A[i, j] -= c * A[k, j]
+                r[i] -= c * r[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            r[k] -= A[k, j] * r[j]
+        r[k] /= A[k, k]
+
+
+@njit(cache=True)
+def _move(
+    y1: Vector, free: Vector, G: Cube, level: int, F: Vector, B_first: Index, B_last: Index
+) -> None:
+    for p in range(free.size - 1):
+        total = free[p]
+        for j in range(B_first[p], B_last[p]):
+            total += G[level, p, j] * F[j]
+        y1[p] = total
+
+
+# without the runtime of numba there is no counting of references, half the time of a step
+@njit(cache=True, _nrt=False)
+def run_network(
+    macros: int,
+    per_record: int,
+    record0: int,
+    clock: Index,
+    M: int,
+    h: float,
+    allow_coarse: bool,
+    settle: bool,
+    table: Any,
+    bodies: Bodies,
+    elements: StepRows,
+    branches: StepRows,
+    nodes: Nodes,
+    lines: Lines,
+    line_state: LineState,
+    line_books: Matrix,
+    interfaces: Interfaces,
+    recording: Recording,
+    scratch: Scratch,
+    books: Vector,
+    book_kind: Index,
+    report: Vector,
+) -> int:
+    """Integrate ``macros`` blocks of ``M`` fine steps, in place.
+
+    ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
+    ``record0`` is the first record to fill; ``report`` gets the row of a failure, its status and
+    its time.  With ``settle`` the velocities are taken out after every step and nothing but the
+    bodies moves: the static start.
+    """
+    at_ports, at_interfaces, at_nodes = scratch.ports, scratch.interfaces, scratch.nodes
+    at_branches, at_ends, A, sums = scratch.branches, scratch.ends, scratch.matrix, scratch.sums
+    # taken out of their tuples once: each access inside the loop would count references
+    body_G = bodies.G
+    body_before = bodies.before
+    body_coarse = bodies.coarse
+    body_fine = bodies.fine
+    body_first = bodies.first
+    body_force = bodies.force
+    body_last = bodies.last
+    body_modes = bodies.modes
+    body_port0 = bodies.port0
+    body_port1 = bodies.port1
+    body_start = bodies.start
+    body_work = bodies.work
+    body_y = bodies.y
+    element_book0 = elements.book0
+    element_books = elements.books
+    element_function = elements.function
+    element_input0 = elements.input0
+    element_inputs = elements.inputs
+    element_output0 = elements.output0
+    element_outputs = elements.outputs
+    element_parameter0 = elements.parameter0
+    element_parameters = elements.parameters
+    element_port0 = elements.port0
+    element_ports = elements.ports
+    element_state = elements.state
+    element_state0 = elements.state0
+    element_states = elements.states
+    branch_a = branches.a
+    branch_b = branches.b
+    branch_book0 = branches.book0
+    branch_books = branches.books
+    branch_function = branches.function
+    branch_input0 = branches.input0
+    branch_inputs = branches.inputs
+    branch_loss = branches.loss
+    branch_output0 = branches.output0
+    branch_outputs = branches.outputs
+    branch_parameter0 = branches.parameter0
+    branch_parameters = branches.parameters
+    branch_port0 = branches.port0
+    branch_ports = branches.ports
+    branch_state = branches.state
+    branch_state0 = branches.state0
+    branch_states = branches.states
+    branch_supply = branches.supply
+    node_ambient = nodes.ambient
+    node_before = nodes.before
+    node_density = nodes.density
+    node_end_node = nodes.end_node
+    node_fluid = nodes.fluid
+    node_g = nodes.g
+    node_gamma = nodes.gamma
+    node_held = nodes.held
+    node_hint = nodes.hint
+    node_mass = nodes.mass
+    node_numeric = nodes.numeric
+    node_p = nodes.p
+    node_pressure = nodes.pressure
+    node_supply = nodes.supply
+    node_table0 = nodes.table0
+    node_time = nodes.time
+    node_volume = nodes.volume
+    node_volumes = nodes.volumes
+    node_wall_area = nodes.wall_area
+    node_wall_node = nodes.wall_node
+    node_wall_port = nodes.wall_port
+    interface_alpha = interfaces.alpha
+    interface_before = interfaces.before
+    interface_chi = interfaces.chi
+    interface_contact_loss = interfaces.contact_loss
+    interface_cubic = interfaces.cubic
+    interface_cut_off = interfaces.cut_off
+    interface_e = interfaces.e
+    interface_film_loss = interfaces.film_loss
+    interface_force = interfaces.force
+    interface_gap = interfaces.gap
+    interface_gap0 = interfaces.gap0
+    interface_hint = interfaces.hint
+    interface_kind = interfaces.kind
+    interface_law = interfaces.law
+    interface_law0 = interfaces.law0
+    interface_linear = interfaces.linear
+    interface_lower = interfaces.lower
+    interface_rate = interfaces.rate
+    interface_series = interfaces.series
+    interface_since = interfaces.since
+    interface_suction = interfaces.suction
+    interface_upper = interfaces.upper
+    record_filled = recording.filled
+    record_fine = recording.fine
+    record_means = recording.means
+    record_peaks = recording.peaks
+    ports = body_y.size - 1
+    count_interfaces = interface_upper.size
+    volumes, count_nodes = node_volumes, node_p.size
+    ends = node_end_node.size
+    y0, y1, used, free = at_ports[0], at_ports[1], at_ports[2], at_ports[3]
+    F, smooth, pending, before = at_ports[4], at_ports[5], at_ports[6], at_ports[7]
+    f_contact, f_film, g1 = at_interfaces[0], at_interfaces[1], at_interfaces[2]
+    e1, lost_contact, lost_film = at_interfaces[3], at_interfaces[4], at_interfaces[5]
+    fi, peaks = at_interfaces[6], at_interfaces[7]
+    rho, slope, g, p = at_nodes[0], at_nodes[1], at_nodes[2], at_nodes[3]
+    p_used, V, V_used = at_nodes[4], at_nodes[5], at_nodes[6]
+    r, inflow = at_nodes[7], at_nodes[8]
+    mdot, slope_a, slope_b = at_branches[0], at_branches[1], at_branches[2]
+    c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
+    pending[:] = 0.0
+    for k in range(ports + 1):
+        F[k], before[k], y0[k] = body_force[k], body_before[k], body_y[k]
+    for k in range(count_interfaces):
+        fi[k] = interface_force[k]
+        peaks[k] = 0.0
+    for k in range(count_nodes):
+        p[k] = node_p[k]
+    Z_end[:] = 1.0
+    sums[:] = 0.0
+    count_branches = branch_function.size
+    count_elements = element_function.size
+    element_forces = element_ports.size
+    step, last_level = clock[0], clock[1]
+    in_record = 0
+    record = record0
+    record_time = 0.0
+    fine_steps, coarse_steps = 0, 0
+
+    for _macro in range(macros):
+        level = 0
+        if settle:
+            level = 1
+        elif allow_coarse:
+            level = 1
+            Hc = M * h
+            for c in range(count_interfaces):
+                rate = abs(interface_rate[c])
+                if interface_since[c] < np.inf:
+                    if step * h - interface_since[c] < _REST_TIME:
+                        level = 0
+                    continue
+                x = interface_gap[c] - 3.0 * rate * Hc
+                creeping = rate * Hc < 1e-3 * (max(interface_gap[c], 0.0) + interface_cut_off[c])
+                if x <= 0.0:
+                    if not (creeping and interface_cubic[c] > 0.0):
+                        level = 0
+                elif interface_cubic[c] > 0.0:
+                    film = rate * (interface_cubic[c] / x**3 + interface_linear[c] / x)
+                    if film > _FILM_SMALL and not creeping:
+                        level = 0
+        done = 0
+        if level == 1 and not settle:
+            _copy_state(body_fine, body_coarse, body_start, body_modes)
+        while done < M:
+            m = M if level == 1 else 1
+            H = m * h
+            t = step * h
+            # 1. modes
+            for i in range(ports):
+                free[i] = 0.0
+            for k in range(body_modes.size):
+                block = pointer(body_fine, body_start[k])
+                if level == 1:
+                    block = pointer(body_coarse, body_start[k])
+                advance(block, body_modes[k], pending, body_port0[k], body_port1[k], free)
+            # guesses from the past
+            if level == last_level and not settle:
+                for i in range(ports):
+                    guess = 2.0 * F[i] - before[i]
+                    before[i] = F[i]
+                    F[i] = guess
+                for i in range(volumes):
+                    p[i] = max(2.0 * node_p[i] - node_before[i], _LEAST_PRESSURE)
+            else:
+                for i in range(ports):
+                    before[i] = F[i]
+                for i in range(volumes):
+                    p[i] = node_p[i]
+            for i in range(volumes, count_nodes):
+                k = i - volumes
+                p[i] = _table(node_time, node_pressure, node_table0[k], node_table0[k + 1], t + H)
+            if ends > 0 and not settle:
+                lines_incoming(lines, line_state, m, c_end, Z_end)
+            # 2. sweeps
+            last_change = np.inf
+            for sweep in range(_MOST_SWEEPS):
+                _move(y1, free, body_G, level, F, body_first, body_last)
+                for i in range(ports):
+                    used[i] = y1[i]
+                    smooth[i] = 0.0
+                smooth[ports] = 0.0
+                for k in range(count_elements):
+                    i0, o0 = element_input0[k], element_output0[k]
+                    q0, q1 = element_port0[k], element_port0[k + 1]
+                    element_inputs[i0] = t
+                    element_inputs[i0 + 1] = H
+                    for j in range(q0, q1):
+                        port = element_ports[j]
+                        element_inputs[i0 + 2 + 2 * (j - q0)] = y0[port]
+                        element_inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
+                    status = table[element_function[k]](
+                        pointer(element_parameters, element_parameter0[k]),
+                        pointer(element_state, element_state0[k]),
+                        pointer(element_inputs, i0),
+                        pointer(element_outputs, o0),
+                    )
+                    if status != 0:
+                        report[0], report[1], report[2] = k, status, t
+                        return STATUS_ELEMENT
+                    for j in range(q0, q1):
+                        smooth[element_ports[j]] += element_outputs[o0 + j - q0]
+                # pressures
+                if count_nodes > 0:
+                    for i in range(volumes):
+                        V_used[i] = node_volume[i]
+                        p_used[i] = p[i]
+                    for w in range(node_wall_node.size):
+                        i = node_wall_node[w]
+                        if i < volumes:
+                            V_used[i] += node_wall_area[w] * used[node_wall_port[w]]
+                    for iteration in range(_MOST_NEWTON):
+                        if settle:
+                            break
+                        for i in range(count_nodes):
+                            rho[i], slope[i], g[i], node_hint[i] = fluid_at(
+                                node_fluid, p[i], node_hint[i]
+                            )
+                        for i in range(volumes):
+                            V[i] = V_used[i] + node_gamma[level, i] * (p[i] - p_used[i])
+                            r[i] = node_mass[i] - V[i] * rho[i]
+                            for j in range(volumes):
+                                A[i, j] = 0.0
+                            A[i, i] = V[i] * slope[i] + rho[i] * node_gamma[level, i]
+                        for k in range(count_branches):
+                            i0, o0 = branch_input0[k], branch_output0[k]
+                            q0, q1 = branch_port0[k], branch_port0[k + 1]
+                            a, b = branch_a[k], branch_b[k]
+                            branch_inputs[i0] = t
+                            branch_inputs[i0 + 1] = H
+                            branch_inputs[i0 + 2] = p[a]
+                            branch_inputs[i0 + 3] = p[b]
+                            branch_inputs[i0 + 4] = rho[a]
+                            branch_inputs[i0 + 5] = rho[b]
+                            for j in range(q0, q1):
+                                port = branch_ports[j]
+                                branch_inputs[i0 + 6 + 2 * (j - q0)] = y0[port]
+                                branch_inputs[i0 + 7 + 2 * (j - q0)] = used[port]
+                            status = table[branch_function[k]](
+                                pointer(branch_parameters, branch_parameter0[k]),
+                                pointer(branch_state, branch_state0[k]),
+                                pointer(branch_inputs, i0),
+                                pointer(branch_outputs, o0),
+                            )
+                            if status != 0:
+                                report[0], report[1], report[2] = k, status, t
+                                return STATUS_BRANCH
+                            mdot[k] = branch_outputs[o0]
+                            slope_a[k] = branch_outputs[o0 + 1]
+                            slope_b[k] = branch_outputs[o0 + 2]
+                            if a < volumes:
+                                r[a] -= H * mdot[k]
+                                A[a, a] += H * slope_a[k]
+                                if b < volumes:
+                                    A[a, b] += H * slope_b[k]
+                                    A[b, a] -= H * slope_a[k]
+                            if b < volumes:
+                                r[b] += H * mdot[k]
+                                A[b, b] -= H * slope_b[k]
+                        for e in range(ends):
+                            i = node_end_node[e]
+                            q_end[e] = (node_density * g[i] - c_end[e]) / Z_end[e]
+                            if i < volumes:
+                                r[i] -= H * node_density * q_end[e]
+                                A[i, i] += H * node_density * (node_density / rho[i]) / Z_end[e]
+                        if volumes == 1:
+                            r[0] /= A[0, 0]
+                        else:
+                            _solve(A, r, volumes)
+                        worst = 0.0
+                        for i in range(volumes):
+                            r[i] = max(r[i], 0.1 * _LEAST_PRESSURE - 0.9 * p[i])
+                            worst = max(worst, abs(r[i]) / max(p[i], node_ambient))
+                            p[i] += r[i]
+                        if worst < _PRESSURE_LEFT:
+                            break
+                        if iteration == _MOST_NEWTON - 1 or not worst < np.inf:
+                            report[0], report[2] = 0.0, t
+                            for i in range(volumes):
+                                if abs(r[i]) / max(p[i], node_ambient) == worst:
+                                    report[0] = i
+                            return STATUS_PRESSURES
+                    if not settle:
+                        # the last Newton step, taken with the slopes: mass is conserved exactly
+                        for k in range(count_branches):
+                            a, b = branch_a[k], branch_b[k]
+                            if a < volumes:
+                                mdot[k] += slope_a[k] * r[a]
+                            if b < volumes:
+                                mdot[k] += slope_b[k] * r[b]
+                        for i in range(volumes):
+                            V[i] = V_used[i] + node_gamma[level, i] * (p[i] - p_used[i])
+                    for w in range(node_wall_node.size):
+                        smooth[node_wall_port[w]] += node_wall_area[w] * (
+                            p[node_wall_node[w]] - node_ambient
+                        )
+                    if not settle:
+                        for k in range(count_branches):
+                            o0 = branch_output0[k] + 3
+                            q0, q1 = branch_port0[k], branch_port0[k + 1]
+                            for j in range(q0, q1):
+                                smooth[branch_ports[j]] += branch_outputs[o0 + j - q0]
+                # interfaces
+                for i in range(ports):
+                    F[i] = smooth[i]
+                for c in range(count_interfaces):
+                    F[interface_upper[c]] += fi[c]
+                    F[interface_lower[c]] -= fi[c]
+                _move(y1, free, body_G, level, F, body_first, body_last)
+                for c in range(count_interfaces):
+                    u, low = interface_upper[c], interface_lower[c]
+                    Gc = 0.0
+                    if u < ports:
+                        Gc += body_G[level, u, u]
+                    if low < ports:
+                        Gc += body_G[level, low, low]
+                    if body_first[u] == body_first[low] and u < ports and low < ports:
+                        Gc -= 2.0 * body_G[level, u, low]
+                    gap = interface_gap0[c] + y1[u] - y1[low]
+                    gap_free = gap - Gc * fi[c]
+                    g0 = interface_gap[c]
+                    if (
+                        interface_alpha[c] > 0.0
+                        and interface_chi[c] == 0.0
+                        and gap_free < 0.0
+                        and sweep == 0
+                    ):
+                        interface_chi[c] = interface_alpha[c] * H / max(g0 - gap_free, 1e-30)
+                    (
+                        f_contact[c],
+                        f_film[c],
+                        g1[c],
+                        e1[c],
+                        interface_hint[c],
+                        lost_contact[c],
+                        lost_film[c],
+                    ) = solve_interface(
+                        interface_kind[c],
+                        interface_law,
+                        interface_law0[c],
+                        interface_chi[c] / H,
+                        interface_cubic[c],
+                        interface_linear[c],
+                        interface_cut_off[c],
+                        interface_suction[c],
+                        H,
+                        Gc,
+                        interface_series[c],
+                        g0,
+                        gap_free,
+                        interface_e[c],
+                        fi[c],
+                        interface_hint[c],
+                    )
+                    change = f_contact[c] + f_film[c] - fi[c]
+                    fi[c] += change
+                    F[u] += change
+                    F[low] -= change
+                    if change != 0.0:
+                        if u < ports:
+                            for i in range(body_first[u], body_last[u]):
+                                y1[i] += body_G[level, i, u] * change
+                        if low < ports:
+                            for i in range(body_first[low], body_last[low]):
+                                y1[i] -= body_G[level, i, low] * change
+                moved = 0.0
+                for i in range(ports):
+                    moved = max(moved, abs(y1[i] - used[i]))
+                if moved <= SETTLED:
+                    break
+                if moved >= last_change and moved < _SETTLED_BY_ROUND_OFF:
+                    break
+                last_change = moved
+                if sweep == _MOST_SWEEPS - 1:
+                    report[0], report[2] = moved, t
+                    return STATUS_FORCES
+            F[ports] = 0.0
+            # a coarse step may not meet what it cannot see
+            if level == 1 and not settle:
+                fits = True
+                for c in range(count_interfaces):
+                    closed = interface_since[c] < np.inf
+                    if closed != (f_contact[c] > 0.0):
+                        fits = False
+                    if abs(f_film[c]) > 10.0 * _FILM_SMALL:
+                        fits = False
+                if not fits:
+                    level = 0
+                    last_level = -1
+                    for i in range(ports):
+                        F[i] = body_force[i]
+                        before[i] = body_force[i]
+                    for c in range(count_interfaces):
+                        fi[c] = interface_force[c]
+                    continue
+            # 3. commit
+            if not settle:
+                for k in range(count_elements):
+                    o0 = element_output0[k]
+                    q0, q1 = element_port0[k], element_port0[k + 1]
+                    for j in range(q0, q1):
+                        sums[j] += H * element_outputs[o0 + j - q0]
+                    o0 += q1 - q0
+                    for j in range(element_states[k]):
+                        element_state[element_state0[k] + j] = element_outputs[o0 + j]
+                    o0 += element_states[k]
+                    for j in range(element_books[k]):
+                        book = element_book0[k] + j
+                        if book_kind[book] == STORE:
+                            books[book] = element_outputs[o0 + j]
+                        else:
+                            books[book] += element_outputs[o0 + j]
+                if count_nodes > 0:
+                    for i in range(count_nodes):
+                        inflow[i] = 0.0
+                        rho[i], slope[i], g[i], node_hint[i] = fluid_at(
+                            node_fluid, p[i], node_hint[i]
+                        )
+                    for k in range(count_branches):
+                        a, b = branch_a[k], branch_b[k]
+                        inflow[a] -= H * mdot[k]
+                        inflow[b] += H * mdot[k]
+                        sums[element_forces + k] += H * mdot[k]
+                        o0 = branch_output0[k] + 3
+                        q0, q1 = branch_port0[k], branch_port0[k + 1]
+                        power = (g[a] - g[b]) * mdot[k] * H
+                        for j in range(q0, q1):
+                            port = branch_ports[j]
+                            power -= branch_outputs[o0 + j - q0] * (used[port] - y0[port])
+                        o0 += q1 - q0
+                        for j in range(branch_states[k]):
+                            branch_state[branch_state0[k] + j] = branch_outputs[o0 + j]
+                        o0 += branch_states[k]
+                        for j in range(branch_books[k]):
+                            book = branch_book0[k] + j
+                            value = branch_outputs[o0 + j]
+                            if book_kind[book] == STORE:
+                                power -= value - books[book]
+                                books[book] = value
+                        if branch_supply[k] >= 0:
+                            books[branch_supply[k]] -= power
+                        else:
+                            books[branch_loss[k]] += power
+                    for e in range(ends):
+                        i = node_end_node[e]
+                        # the pressures of the last Newton step belong to these flows
+                        q = q_end[e]
+                        if i < volumes:
+                            q += node_density / rho[i] / Z_end[e] * r[i]
+                        q_end[e] = q
+                        inflow[i] -= H * node_density * q
+                    if ends > 0:
+                        lines_commit(lines, line_state, m, q_end, line_books)
+                    for i in range(volumes):
+                        mass = node_mass[i] + inflow[i]
+                        excess = p[i] - node_ambient
+                        stored = mass * g[i] - excess * V[i]
+                        was = node_mass[i] * node_g[i]
+                        was -= (node_p[i] - node_ambient) * node_held[i]
+                        work = excess * (V[i] - node_held[i])
+                        node_numeric[i] += was - stored + g[i] * inflow[i] - work
+                        node_mass[i] = mass
+                        node_held[i] = V[i]
+                    for i in range(volumes, count_nodes):
+                        node_supply[i - volumes] -= g[i] * inflow[i]
+                    for i in range(count_nodes):
+                        node_before[i] = node_p[i]
+                        node_p[i] = p[i]
+                        node_g[i] = g[i]
+            for c in range(count_interfaces):
+                u, low = interface_upper[c], interface_lower[c]
+                gap = interface_gap0[c] + y1[u] - y1[low]
+                interface_rate[c] = (gap - interface_gap[c]) / H
+                interface_gap[c] = gap
+                interface_e[c] = e1[c]
+                interface_before[c] = interface_force[c]
+                interface_force[c] = fi[c]
+                if settle:
+                    continue
+                interface_contact_loss[c] += lost_contact[c]
+                interface_film_loss[c] += lost_film[c]
+                was_closed = interface_since[c] < np.inf
+                if f_contact[c] > 0.0:
+                    if interface_since[c] == np.inf:
+                        interface_since[c] = t
+                else:
+                    interface_since[c] = np.inf
+                if gap > _SEPARATED:
+                    interface_chi[c] = 0.0
+                column = element_forces + count_branches + 2 * c
+                sums[column] += H * f_contact[c]
+                sums[column + 1] += H * f_film[c]
+                peaks[c] = max(peaks[c], fi[c])
+                felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_SMALL
+                if level == 0 and (felt or was_closed):
+                    place = record_filled[c]
+                    if place < record_fine.shape[1]:
+                        record_fine[c, place, 0] = t
+                        record_fine[c, place, 1] = H
+                        record_fine[c, place, 2] = f_contact[c]
+                        record_fine[c, place, 3] = f_film[c]
+                        record_fine[c, place, 4] = gap
+                    record_filled[c] = place + 1
+            for i in range(ports):
+                body_work[i] += F[i] * (y1[i] - y0[i])
+                y0[i] = y1[i]
+                pending[i] = F[i]
+                body_force[i] = F[i]
+            last_level = level
+            done += m
+            step += m
+            if level == 1:
+                coarse_steps += 1
+            else:
+                fine_steps += 1
+        for k in range(body_modes.size):
+            block = pointer(body_fine, body_start[k])
+            if level == 1:
+                block = pointer(body_coarse, body_start[k])
+            apply_forces(
+                block,
+                body_modes[k],
+                pending,
+                body_port0[k],
+                body_port1[k],
+            )
+        for i in range(ports):
+            pending[i] = 0.0
+        if settle:
+            _stop(body_coarse, body_start, body_modes)
+            continue
+        if level == 1:
+            _copy_state(body_coarse, body_fine, body_start, body_modes)
+        in_record += 1
+        record_time += M * h
+        if in_record == per_record:
+            for j in range(sums.size):
+                record_means[record, j] = sums[j] / record_time
+                sums[j] = 0.0
+            for c in range(count_interfaces):
+                record_peaks[record, c] = peaks[c]
+                peaks[c] = 0.0
+            record_points(
+                recording,
+                record,
+                body_fine,
+                body_start,
+                body_modes,
+                y0,
+                node_p,
+                element_state,
+                branch_state,
+                interface_gap,
+            )
+            record += 1
+            in_record = 0
+            record_time = 0.0
+    for i in range(ports):
+        body_before[i], body_y[i] = before[i], y0[i]
+    clock[0], clock[1] = step, last_level
+    clock[2] += fine_steps
+    clock[3] += coarse_steps
+    return STATUS_DONE
+
+
+@njit(cache=True)
+def read_stores(
+    table: Any,
+    rows: StepRows,
+    head: int,
+    y: Vector,
+    p: Vector,
+    rho: Vector,
+    books: Vector,
+    book_kind: Index,
+) -> int:
+    """Fill the stores of elements (``head`` 0) or branches (3) at the start; a failed row or -1."""
+    for k in range(rows.function.size):
+        i0, o0 = rows.input0[k], rows.output0[k]
+        q0, q1 = rows.port0[k], rows.port0[k + 1]
+        rows.inputs[i0] = rows.inputs[i0 + 1] = 0.0
+        first = 2
+        if head > 0:
+            a, b = rows.a[k], rows.b[k]
+            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
+            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
+            first = 6
+        for j in range(q0, q1):
+            for end in range(2):
+                rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
+        status = table[rows.function[k]](
+            pointer(rows.parameters, rows.parameter0[k]),
+            pointer(rows.state, rows.state0[k]),
+            pointer(rows.inputs, i0),
+            pointer(rows.outputs, o0),
+        )
+        if status != 0:
+            return k
+        o0 += head + q1 - q0 + rows.states[k]
+        for j in range(rows.books[k]):
+            if book_kind[rows.book0[k] + j] == STORE:
+                books[rows.book0[k] + j] = rows.outputs[o0 + j]
+    return -1
+
+
+@njit(cache=True)
+def record_points(
+    recording: Recording,
+    record: int,
+    W: Vector,
+    start: Index,
+    count: Index,
+    y: Vector,
+    p: Vector,
+    state: Vector,
+    branch_state: Vector,
+    gap: Vector,
+) -> None:
+    """Columns: port displacements, port velocities, centres of mass, pressures, states, gaps."""
+    out, place = recording.points, 0
+    ports = y.size - 1
+    for i in range(ports):
+        out[record, place + i] = y[i]
+    place += ports
+    for i in range(ports):
+        total = 0.0
+        for k in range(recording.port_block0[i], recording.port_block1[i]):
+            total += watch(pointer(W, start[k]), count[k], 1, recording.port_row[i])
+        out[record, place + i] = total
+    place += ports
+    for b in range(recording.cm_block0.size):
+        total = 0.0
+        for k in range(recording.cm_block0[b], recording.cm_block1[b]):
+            last = (start[k + 1] - start[k]) // ROW - 1
+            total += watch(pointer(W, start[k]), count[k], 1, last)
+        out[record, place + b] = total
+    place += recording.cm_block0.size
+    for i in range(p.size):
+        out[record, place + i] = p[i]
+    place += p.size
+    for i in range(recording.states.size):
+        out[record, place + i] = state[recording.states[i]]
+    place += recording.states.size
+    for i in range(recording.branch_states.size):
+        out[record, place + i] = branch_state[recording.branch_states[i]]
+    place += recording.branch_states.size
+    for c in range(gap.size):
+        out[record, place + c] = gap[c]

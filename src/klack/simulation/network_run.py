@@ -1,0 +1,529 @@
+"""Run a network: static start, time loop, channels, impacts, energy books."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import ConvergenceError, InputError, require_positive
+from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.simulation.delay_line import LINE_LOSSES, line_store
+from klack.simulation.impact_events import impact_events
+from klack.simulation.interface_step import interface_store
+from klack.simulation.modal_step import FIXED_ROWS, ROW
+from klack.simulation.network_compile import (
+    CompiledNetwork,
+    body_energy,
+    compile_bodies,
+    compile_network,
+    modal_state,
+)
+from klack.simulation.network_kernel import (
+    STATUS_BRANCH,
+    STATUS_DONE,
+    STATUS_ELEMENT,
+    STATUS_PRESSURES,
+    STORE,
+    SUPPLY,
+    Recording,
+    Scratch,
+    read_stores,
+    record_points,
+    run_network,
+    scratch_memory,
+)
+from klack.simulation.network_result import (
+    ChannelData,
+    EnergyBooks,
+    InterfaceRecord,
+    NetworkResult,
+)
+from klack.units import format_si
+
+__all__ = ["simulate_network"]
+
+Vector = NDArray[np.float64]
+State = Mapping[str, NDArray[np.generic]]
+
+_SETTLE_STEP = 1e-6  # [s]
+_SETTLE_STEPS = 6000
+_CHUNK = 25_000  # fine steps between two looks at the clock and the keyboard
+_MOST_FINE = 1_000_000  # recorded fine steps per interface
+_MOST_VALUES = 400_000_000
+
+
+def simulate_network(
+    rows: Rows,
+    *,
+    duration: float,
+    step: float = 20e-9,
+    coarse: int = 16,
+    record: float = 0.5e-6,
+    start: Literal["rest", "free"] = "rest",
+    state: State | None = None,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> NetworkResult:
+    """Compute a network over time.
+
+    Parameters
+    ----------
+    rows : Rows
+        From :meth:`klack.network.network.Network.rows`.
+    duration : float [s]
+        Rounded up to whole records.
+    step : float [s]
+        Fine step: 20 ns resolves first impacts to 0.1 %, 50 ns is enough for sweeps.
+    coarse : int
+        Fine steps of a coarse step, taken while nothing touches; 1 switches them off.
+    record : float [s]
+        Spacing of the records; rounded to whole coarse steps.
+    start : "rest" or "free"
+        ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
+        ``"free"``: undeformed, with the speeds of their rows.
+    state : mapping of str to array, optional
+        :attr:`NetworkResult.state` of a former run of the same network and steps, to go on from;
+        ``start`` then has no meaning, time goes on, and the books count from there.
+    progress : callable
+        Told the fraction done.
+
+    Raises
+    ------
+    InputError
+        For steps that do not fit, and for a state of another network.
+    ConvergenceError
+        When a step fails: time, component, its state, and what to try.
+    """
+    for name, value in (("duration", duration), ("step", step), ("record", record)):
+        require_positive(f"simulate_network: {name}", value, "s")
+    if coarse < 1:
+        raise InputError(
+            "simulate_network: coarse",
+            got=str(coarse),
+            expected="1 or more",
+            hint="1 switches coarse steps off, 16 is usual.",
+        )
+    network = compile_network(rows, step=step, coarse=coarse)
+    per_record = max(1, round(record / (coarse * step)))
+    records = max(1, int(np.ceil(duration / (per_record * coarse * step) - 1e-9)))
+    recorder = _Recorder(network, records)
+    clock = np.array([0, -1, 0, 0], dtype=np.int64)
+    if state is not None:
+        _restore(network, clock, state)
+    elif start == "rest":
+        _settle(network, recorder.recording)
+    first_step, done_before = int(clock[0]), clock[2:4].copy()
+    _reset_books(network)
+    _read_stores(network)
+    before = _stores(network)
+    recorder.take(0)
+    chunk = max(1, _CHUNK // (per_record * coarse))
+    begin = perf_counter()
+    for first in range(0, records, chunk):
+        count = min(chunk, records - first)
+        _advance(
+            network,
+            recorder.recording,
+            clock,
+            count * per_record,
+            per_record,
+            first + 1,
+            step,
+            coarse,
+        )
+        progress((first + count) / records)
+    wall_time = perf_counter() - begin
+    time = (first_step + per_record * coarse * np.arange(records + 1)) * step
+    channels = recorder.channels()
+    interfaces = recorder.interfaces()
+    return NetworkResult(
+        time=time,
+        channels=channels,
+        interfaces=interfaces,
+        events=impact_events(rows, time, channels, interfaces),
+        books=_energy_books(network, before),
+        step=step,
+        fine_steps=int(clock[2] - done_before[0]),
+        coarse_steps=int(clock[3] - done_before[1]),
+        wall_time=wall_time,
+        state=_save(network, clock),
+    )
+
+
+def _advance(
+    network: CompiledNetwork,
+    recording: Recording,
+    clock: NDArray[np.int64],
+    macros: int,
+    per_record: int,
+    record0: int,
+    step: float,
+    coarse: int,
+) -> None:
+    report = np.zeros(3)
+    status = run_network(
+        macros,
+        per_record,
+        record0,
+        clock,
+        coarse,
+        step,
+        coarse > 1,
+        False,
+        network.table,
+        network.bodies,
+        network.elements,
+        network.branches,
+        network.nodes,
+        network.lines,
+        network.line_state,
+        network.line_books,
+        network.interfaces,
+        recording,
+        _scratch(network, recording),
+        network.books,
+        network.book_kind,
+        report,
+    )
+    if status != STATUS_DONE:
+        raise _failure(network, status, report)
+
+
+def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
+    return scratch_memory(
+        ports=len(network.ports),
+        interfaces=len(network.rows.interfaces),
+        nodes=len(network.nodes.p),
+        branches=len(network.rows.branches),
+        ends=len(network.nodes.end_node),
+        sums=recording.means.shape[1],
+    )
+
+
+def _settle(network: CompiledNetwork, recording: Recording) -> None:
+    """Find the static start: large steps, all velocities taken out after each."""
+    bodies, _ = compile_bodies(network.rows.bodies, (_SETTLE_STEP, _SETTLE_STEP))
+    report, clock = np.zeros(3), np.array([0, -1, 0, 0], dtype=np.int64)
+    status = run_network(
+        _SETTLE_STEPS,
+        1,
+        0,
+        clock,
+        1,
+        _SETTLE_STEP,
+        False,
+        True,
+        network.table,
+        bodies,
+        network.elements,
+        network.branches,
+        network.nodes,
+        network.lines,
+        network.line_state,
+        network.line_books,
+        network.interfaces,
+        recording,
+        _scratch(network, recording),
+        network.books,
+        network.book_kind,
+        report,
+    )
+    if status != STATUS_DONE:
+        raise _failure(network, status, report)
+    real, interfaces = network.bodies, network.interfaces
+    for k in range(len(real.modes)):
+        begin = real.start[k]
+        real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
+    for name in ("force", "before", "y"):
+        getattr(real, name)[:] = getattr(bodies, name)
+    real.before[:] = real.force
+    interfaces.rate[:] = 0.0
+    interfaces.since[interfaces.gap + interfaces.e < 0.0] = -1.0
+
+
+def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
+    row, code, time = int(report[0]), int(report[1]), float(report[2])
+    when = f"at {format_si(time, 's', 8)}"
+    if status in (STATUS_ELEMENT, STATUS_BRANCH):
+        rows: list[ElementRow] | list[BranchRow]
+        rows = network.rows.elements if status == STATUS_ELEMENT else network.rows.branches
+        failed = rows[row]
+        errors = getattr(failed.step, "errors", [])
+        if errors:
+            raise errors.pop(0)
+        data = network.elements if status == STATUS_ELEMENT else network.branches
+        values = data.state[data.state0[row] : data.state0[row + 1]]
+        words = failed.failures.get(code, f"status {code} of its step function")
+        return ConvergenceError(
+            f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
+            "Try: a smaller step, and look whether its parameters and start values make sense."
+        )
+    if status == STATUS_PRESSURES:
+        handle = network.node_order[row]
+        name = network.rows.nodes[handle].component
+        return ConvergenceError(
+            f"{name}: the pressures did not settle {when}.\n"
+            f"State: {_numbers(network.nodes.p)} Pa.\n"
+            "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
+            "entrained gas."
+        )
+    return ConvergenceError(
+        f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
+        f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
+        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
+    )
+
+
+def _numbers(values: Vector) -> str:
+    return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    name: str
+    unit: str
+
+
+class _Recorder:
+    """Memory for the records, and the words for its columns."""
+
+    def __init__(self, network: CompiledNetwork, records: int) -> None:
+        self.network = network
+        rows, elements = network.rows, network.elements
+        states = [
+            (elements.state0[k] + channel.index, _column(row, channel.label), channel.unit)
+            for k, row in enumerate(rows.elements)
+            for channel in row.channels
+        ]
+        branch_states = [
+            (network.branches.state0[k] + channel.index, _column(row, channel.label), channel.unit)
+            for k, row in enumerate(rows.branches)
+            for channel in row.channels
+        ]
+        free = [b for b, row in enumerate(rows.bodies) if row.body.rigid_count > 0]
+        blocks = network.body_blocks
+        owner = [b for b, row in enumerate(rows.bodies) for _ in row.ports]
+        place = [i for row in rows.bodies for i in range(len(row.ports))]
+        self.means = [
+            *(
+                _Column(_column(row, "force", port), "N")
+                for row in rows.elements
+                for port in row.names
+            ),
+            *(_Column(_column(row, "flow"), "kg/s") for row in rows.branches),
+            *(
+                _Column(f"{row.component} {kind} force", "N")
+                for row in rows.interfaces
+                for kind in ("contact", "film")
+            ),
+        ]
+        ports = [f"{name.component}.{name.port}" for name in network.ports]
+        nodes = [rows.nodes[handle].component for handle in network.node_order]
+        self.points = [
+            *(_Column(f"{port} displacement", "m") for port in ports),
+            *(_Column(f"{port} velocity", "m/s") for port in ports),
+            *(_Column(f"{rows.bodies[b].component} velocity", "m/s") for b in free),
+            *(_Column(f"{node} pressure", "Pa") for node in nodes),
+            *(_Column(name, unit) for _, name, unit in states + branch_states),
+            *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
+        ]
+        values = (records + 1) * (len(self.means) + len(self.points))
+        if values > _MOST_VALUES:
+            raise InputError(
+                "record",
+                got=f"{records} records of {len(self.means) + len(self.points)} channels",
+                expected=f"{_MOST_VALUES} values or fewer",
+                hint="take a longer record, or a shorter duration.",
+            )
+        count = len(rows.interfaces)
+        self.recording = Recording(
+            means=np.zeros((records + 1, len(self.means))),
+            peaks=np.zeros((records + 1, count)),
+            points=np.zeros((records + 1, len(self.points))),
+            states=np.array([index for index, _, _ in states], dtype=np.int64),
+            branch_states=np.array([index for index, _, _ in branch_states], dtype=np.int64),
+            cm_block0=blocks[free].astype(np.int64),
+            cm_block1=blocks[[b + 1 for b in free]].astype(np.int64),
+            port_block0=blocks[owner].astype(np.int64),
+            port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
+            port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
+            fine=np.empty((count, _MOST_FINE, 5)),
+            filled=np.zeros(count, np.int64),
+        )
+
+    def take(self, record: int) -> None:
+        """Record the present state."""
+        network = self.network
+        record_points(
+            self.recording,
+            record,
+            network.bodies.fine,
+            network.bodies.start,
+            network.bodies.modes,
+            network.bodies.y,
+            network.nodes.p,
+            network.elements.state,
+            network.branches.state,
+            network.interfaces.gap,
+        )
+
+    def channels(self) -> dict[str, ChannelData]:
+        """All channels by name."""
+        recording = self.recording
+        recording.means[0] = recording.means[1]
+        recording.peaks[0] = recording.peaks[1]
+        result = {}
+        for columns, values in ((self.means, recording.means), (self.points, recording.points)):
+            for i, column in enumerate(columns):
+                result[column.name] = ChannelData(unit=column.unit, values=values[:, i].copy())
+        for c, row in enumerate(self.network.rows.interfaces):
+            peak = ChannelData(unit="N", values=recording.peaks[:, c].copy())
+            result[f"{row.component} peak force"] = peak
+        return result
+
+    def interfaces(self) -> dict[str, InterfaceRecord]:
+        """Every fine step in which an interface carried force."""
+        result = {}
+        for c, row in enumerate(self.network.rows.interfaces):
+            filled = int(self.recording.filled[c])
+            part = self.recording.fine[c, : min(filled, _MOST_FINE)]
+            columns = [part[:, i].copy() for i in range(5)]
+            result[row.component] = InterfaceRecord(
+                time=columns[0],
+                step=columns[1],
+                contact_force=columns[2],
+                film_force=columns[3],
+                gap=columns[4],
+                complete=filled <= _MOST_FINE,
+            )
+        return result
+
+
+def _column(row: ElementRow | BranchRow, what: str, port: str = "") -> str:
+    owner = f"{row.component}.{port}" if port else row.component
+    return " ".join(filter(None, (owner, row.label, what)))
+
+
+def _read_stores(network: CompiledNetwork) -> None:
+    nodes = network.nodes
+    rho = np.full(len(nodes.p), nodes.density)
+    for rows, head in ((network.elements, 0), (network.branches, 3)):
+        failed = read_stores(
+            network.table,
+            rows,
+            head,
+            network.bodies.y,
+            nodes.p,
+            rho,
+            network.books,
+            network.book_kind,
+        )
+        if failed >= 0:
+            status = STATUS_BRANCH if head else STATUS_ELEMENT
+            raise _failure(network, status, np.array([float(failed), 0.0, 0.0]))
+
+
+def _reset_books(network: CompiledNetwork) -> None:
+    nodes, interfaces = network.nodes, network.interfaces
+    accounts = (network.books, network.line_books, network.bodies.work, nodes.numeric)
+    for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
+        account[:] = 0.0
+
+
+def _stores(network: CompiledNetwork) -> dict[str, float]:
+    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    stores = {}
+    for b, row in enumerate(rows.bodies):
+        kinetic, strain = body_energy(row.body, *modal_state(network, b))
+        stores[f"{row.component} kinetic and strain"] = kinetic + strain
+    for i, kind in enumerate(network.book_kind):
+        if kind == STORE:
+            stores[network.book_names[i]] = float(network.books[i])
+    for c, contact in enumerate(rows.interfaces):
+        stores[f"{contact.component} contact"] = float(
+            interface_store(
+                int(interfaces.kind[c]),
+                interfaces.law,
+                int(interfaces.law0[c]),
+                float(interfaces.series[c]),
+                float(interfaces.gap[c]),
+                float(interfaces.e[c]),
+            )
+        )
+    for i in range(nodes.volumes):
+        excess = nodes.p[i] - nodes.ambient
+        name = rows.nodes[network.node_order[i]].component
+        stores[f"{name} compression"] = float(nodes.mass[i] * nodes.g[i] - excess * nodes.held[i])
+    for k, line in enumerate(rows.lines):
+        stores[f"{line.component} waves"] = float(line_store(network.lines, network.line_state, k))
+    return stores
+
+
+def _energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
+    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    after = _stores(network)
+    supplies, losses = {}, {}
+    for i, kind in enumerate(network.book_kind):
+        if kind != STORE:
+            (supplies if kind == SUPPLY else losses)[network.book_names[i]] = float(
+                network.books[i]
+            )
+    for i, energy in enumerate(nodes.supply):
+        name = rows.nodes[network.node_order[nodes.volumes + i]].component
+        supplies[f"{name} pressure"] = supplies.get(f"{name} pressure", 0.0) + float(energy)
+    for i in range(nodes.volumes):
+        name = rows.nodes[network.node_order[i]].component
+        losses[f"{name} implicit step"] = float(nodes.numeric[i])
+    for c, contact in enumerate(rows.interfaces):
+        losses[f"{contact.component} contact"] = float(interfaces.contact_loss[c])
+        losses[f"{contact.component} film"] = float(interfaces.film_loss[c])
+    for k, line in enumerate(rows.lines):
+        for j, what in enumerate(LINE_LOSSES):
+            losses[f"{line.component} {what}"] = float(network.line_books[k, j])
+    place = 0
+    for row in rows.bodies:
+        work = float(network.bodies.work[place : place + len(row.ports)].sum())
+        place += len(row.ports)
+        if np.any(row.body.damping > 0.0):
+            name = f"{row.component} kinetic and strain"
+            losses[f"{row.component} damping"] = work - (after[name] - before[name])
+    return EnergyBooks(
+        supplies=supplies, losses=losses, stores_before=dict(before), stores_after=after
+    )
+
+
+_SAVED = {
+    "bodies": ("fine", "force", "before", "y"),
+    "elements": ("state",),
+    "branches": ("state",),
+    "nodes": ("mass", "held", "p", "before", "g", "hint"),
+    "line_state": ("samples", "head", "memory", "cavity"),
+    "interfaces": ("hint", "e", "gap", "rate", "force", "before", "chi", "since"),
+}
+
+
+def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, NDArray[np.generic]]:
+    saved: dict[str, NDArray[np.generic]] = {"clock": clock.copy()}
+    for owner, names in _SAVED.items():
+        for name in names:
+            saved[f"{owner}.{name}"] = getattr(getattr(network, owner), name).copy()
+    return saved
+
+
+def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
+    targets: dict[str, NDArray[np.generic]] = {"clock": clock}
+    for owner, names in _SAVED.items():
+        for name in names:
+            targets[f"{owner}.{name}"] = getattr(getattr(network, owner), name)
+    for key, target in targets.items():
+        if key not in state or state[key].shape != target.shape:
+            came = f"shape {state[key].shape}" if key in state else "nothing"
+            raise InputError(
+                f"state: {key}",
+                got=came,
+                expected=f"shape {target.shape}",
+                hint="go on with the same network, step and coarse that the state was made with.",
+            )
+        target[...] = state[key]
