@@ -18,7 +18,6 @@ from klack.hydraulics.liquid import (
     walther_viscosity,
 )
 from klack.hydraulics.mixture import EntrainedGas, Vapour
-from klack.units import format_si
 
 __all__ = [
     "Constant",
@@ -34,6 +33,8 @@ _GAS_CONSTANT = 8.314462618  # [J/(mol K)], CODATA 2018
 _MOLAR_MASS = 0.1  # [kg/mol] of a fluid of which nothing is known
 _REFERENCE_TEMPERATURE = 293.15
 _FIFTEEN = 288.15
+_ZERO_CELSIUS = 273.15
+_SLACK = 1e-6  # [K] for sums of degrees Celsius and 273.15
 
 
 def _vapour_density(pressure: float, temperature: float, molar_mass: float) -> float:
@@ -302,8 +303,8 @@ class FluidDefinition:
 
     @property
     def verified(self) -> bool:
-        """Whether the source of every constant was read or recomputed."""
-        return all(constant.verified for constant in self.constants)
+        """Whether the source of every constant was read or recomputed; False without constants."""
+        return bool(self.constants) and all(c.verified for c in self.constants)
 
     def at(
         self,
@@ -325,14 +326,14 @@ class FluidDefinition:
         boiling_half_width : float [Pa]
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """
-        if not self.lowest_temperature <= temperature <= self.highest_temperature:
-            low, high = self.lowest_temperature - 273.15, self.highest_temperature - 273.15
+        low, high = self.lowest_temperature, self.highest_temperature
+        if not low - _SLACK <= temperature <= high + _SLACK:
             raise InputError(
                 f"fluid '{self.name}': temperature",
-                got=f"{format_si(temperature - 273.15, 'degC')}",
-                expected=f"{low:g} to {high:g} degC, where its constants hold",
-                hint="give your own fluid by density, viscosity and bulk_modulus at this "
-                "temperature.",
+                got=f"{temperature - _ZERO_CELSIUS:g} degC",
+                expected=f"{low - _ZERO_CELSIUS:g} to {high - _ZERO_CELSIUS:g} degC",
+                hint="describe a fluid of your own by density, viscosity and bulk_modulus at this "
+                "temperature; the constants of the library hold within the range.",
             )
         state = self.properties.at(temperature)
         return Fluid(

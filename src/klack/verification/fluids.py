@@ -220,7 +220,7 @@ def _table() -> list[Check]:
     fluid = library_fluid("n-heptane").at(293.15, gas_fraction=1e-3)
     table = fluid_table(fluid, ATMOSPHERE)
     p = np.geomspace(1.0, 3e8, 30_011)
-    rho, slope, g = np.array([fluid_at(table, x, 0)[:3] for x in p]).T
+    rho, slope = np.array([fluid_at(table, x, 0)[:2] for x in p]).T
     v, tangent = fluid.specific_volume(p)
     worst = 0.0
     places = [100.0, 1e3, *fluid.kinks, 2e4, ATMOSPHERE, 6e5, 1e7, 3e8]

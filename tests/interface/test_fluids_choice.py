@@ -1,0 +1,159 @@
+"""What a case file may say of a fluid, and what it is told when that cannot be used."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from klack.errors import ConvergenceError, InputError
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.fluid_definition import FluidDefinition
+from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
+from klack.hydraulics.fluid_table import fluid_table
+from klack.hydraulics.liquid import Murnaghan, TabulatedLiquid
+from klack.hydraulics.mixture import EntrainedGas, Vapour
+
+OWN = {"name": "T16", "density": "780 kg/m^3", "bulk_modulus": "1.2 GPa", "viscosity": "1 mPa*s"}
+
+
+def read(value) -> FluidChoice:
+    """As a file is read: every number needs its unit."""
+    return FluidChoice.model_validate(value, context={})
+
+
+def problem(value) -> InputError:
+    with pytest.raises(ValidationError) as caught:
+        read(value)
+    cause = caught.value.errors()[0].get("ctx", {}).get("error")
+    assert isinstance(cause, InputError)
+    return cause
+
+
+@pytest.mark.parametrize("text", ["n-heptane", "N-Heptane", "n heptane", {"name": "nheptane"}])
+def test_a_name_is_enough(text):
+    fluid = read(text).at(293.15)
+    assert isinstance(fluid, Fluid)
+    assert fluid.name == "n-heptane"
+    assert float(fluid.sound_speed(6e5)) == pytest.approx(1152.99, rel=1e-4)
+
+
+def test_gas_is_mixed_in():
+    fluid = read({"name": "ISO 4113", "gas_fraction": "0.1 %", "gas_exponent": 1.2}).at(300.0)
+    assert fluid.gas == EntrainedGas(fraction=1e-3, exponent=1.2)
+    assert fluid.temperature == 300.0
+
+
+def test_few_numbers_make_a_fluid():
+    fluid = read(OWN | {"viscosity_pressure": "1000 bar", "vapour_pressure": "1 kPa"}).at(320.0)
+    assert float(fluid.density(101_325.0)) == pytest.approx(780.0, rel=1e-12)
+    assert float(fluid.bulk_modulus(101_325.0)) == pytest.approx(1.2e9, rel=1e-12)
+    assert float(fluid.viscosity(1e8 + 101_325.0)) == pytest.approx(1e-3 * np.e, rel=1e-12)
+    assert fluid.vapour_pressure == 1e3
+
+
+def test_sound_speed_and_kinematic_viscosity_do_as_well():
+    own = {"name": "T16", "density": "780 kg/m^3", "sound_speed": "1200 m/s"}
+    fluid = read(own | {"kinematic_viscosity": "2 mm^2/s"}).at(293.15)
+    assert float(fluid.sound_speed(101_325.0)) == pytest.approx(1200.0, rel=1e-12)
+    assert float(fluid.viscosity(101_325.0)) == pytest.approx(2e-6 * 780.0, rel=1e-12)
+
+
+def test_a_table_makes_a_fluid():
+    table = {
+        "pressure": ["1 bar", "10 bar", "200 bar"],
+        "density": ["684 kg/m^3", "684.7 kg/m^3", "698.4 kg/m^3"],
+    }
+    fluid = read({"name": "T16", "table": table, "viscosity": "0.4 mPa*s"}).at(293.15)
+    assert float(fluid.density(1e6)) == pytest.approx(684.7, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("n-heptan", "did you mean 'n-heptane'?"),
+        ({"name": "T16"}, "add density, viscosity and bulk_modulus"),
+        ({"name": "water", "density": "990 kg/m^3"}, "my-water"),
+        ({k: v for k, v in OWN.items() if k != "viscosity"}, "viscosity"),
+        ({k: v for k, v in OWN.items() if k != "bulk_modulus"}, "the stiffness"),
+        (OWN | {"sound_speed": "1200 m/s"}, "bulk_modulus and sound_speed together"),
+        (OWN | {"bulk_modulus": "5 bar"}, "check the unit"),
+        (OWN | {"release_pressure": "1 bar"}, "leave both out"),
+        (OWN | {"release_pressure": "2 bar", "saturation_pressure": "1 bar"}, "leave both out"),
+        (OWN | {"density": 780}, "add a unit"),
+        (OWN | {"densty": 780}, "did you mean 'density'?"),
+        (
+            {
+                "name": "T16",
+                "viscosity": "1 mPa*s",
+                "table": {
+                    "pressure": ["1 bar", "2 bar"],
+                    "density": ["800 kg/m^3", "799 kg/m^3"],
+                },
+            },
+            "both increase strictly",
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_told(value, text):
+    assert text in str(problem(value))
+
+
+def test_unknown_names_and_temperatures_are_told():
+    assert find_fluid("T16") is None
+    with pytest.raises(InputError, match="did you mean 'ISO VG 46'"):
+        library_fluid("ISO VG 64")
+    with pytest.raises(InputError, match=r"got 150 degC, expected 0 to 100 degC"):
+        FLUIDS["water"].at(423.15)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: EntrainedGas(fraction=1.0), "below 1"),
+        (lambda: EntrainedGas(exponent=0.5), "isothermal"),
+        (lambda: EntrainedGas(saturation_pressure=1e5), "both or none"),
+        (lambda: Vapour(pressure=0.0, density=1.0), "above 0 Pa"),
+        (lambda: TabulatedLiquid([1e5], [800.0]), "at least two"),
+        (lambda: Murnaghan(density_at_reference=800.0, bulk_modulus_at_reference=1e5), "above 0"),
+        (lambda: FLUIDS["water"].at(293.15, gas_fraction=-0.1), "share of the volume"),
+    ],
+)
+def test_fluids_refuse_what_has_no_meaning(make, text):
+    with pytest.raises(InputError, match=text):
+        make()
+
+
+def test_a_heavy_vapour_is_refused():
+    with pytest.raises(InputError, match="vapour density"):
+        read(OWN | {"vapour_density": "900 kg/m^3"}).at(293.15)
+
+
+def test_a_table_that_never_settles_says_where():
+    class Rough:
+        kinks = ()
+
+        def density(self, pressure):
+            return 800.0 + np.floor(np.asarray(pressure, dtype=float) / 1e3) * 1e-3
+
+        def bulk_modulus(self, pressure):
+            return np.full_like(np.asarray(pressure, dtype=float), 1e9)
+
+    fluid = Fluid(
+        name="stairs",
+        temperature=293.15,
+        liquid=Rough(),
+        base_viscosity=1e-3,
+        vapour=Vapour(pressure=10.0, density=4e-4),
+    )
+    with pytest.raises(ConvergenceError, match=r"'stairs' is not settled .* Pa"):
+        fluid_table(fluid, 101_325.0)
+
+
+def test_a_definition_can_be_written_in_python():
+    class Air:
+        def at(self, temperature):
+            return FLUIDS["water"].properties.at(temperature)
+
+    own = FluidDefinition(name="mine", properties=Air())
+    assert float(own.at(293.15).density(1e5)) == pytest.approx(998.2, rel=1e-4)
+    assert not own.verified  # nothing is known of its sources
