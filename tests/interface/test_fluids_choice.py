@@ -1,8 +1,11 @@
 """What a case file may say of a fluid, and what it is told when that cannot be used."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from ruamel.yaml import YAML
 
 from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.fluid import Fluid
@@ -157,3 +160,12 @@ def test_a_definition_can_be_written_in_python():
     own = FluidDefinition(name="mine", properties=Air())
     assert float(own.at(293.15).density(1e5)) == pytest.approx(998.2, rel=1e-4)
     assert not own.verified  # nothing is known of its sources
+
+
+def test_the_fluids_of_the_documentation_can_be_read():
+    page = (Path(__file__).parents[2] / "docs" / "theory" / "fluids.md").read_text()
+    block = page.split("```yaml\n")[1].split("```")[0]
+    texts = ["fluid:" + part for part in block.split("fluid:")[1:]]
+    fluids = [read(YAML(typ="safe").load(text)["fluid"]).at(293.15) for text in texts]
+    assert [fluid.name for fluid in fluids] == ["n-heptane", "ISO 4113", "ours", "ours"]
+    assert float(fluids[3].sound_speed(5e6)) == pytest.approx(1240.0, rel=0.05)

@@ -29,7 +29,7 @@ def column(table: list[dict[str, str]], name: str) -> np.ndarray:
 @pytest.mark.parametrize("name", ["n-heptane", "n-decane", "n-dodecane", "water"])
 @pytest.mark.parametrize("highest", [1e6, 350e5])
 def test_pure_fluids_follow_their_equations_of_state(name, highest):
-    """Near the operating pressure to 3e-4, 3e-3 and 2e-3; to 350 bar K(p) is one straight line.
+    """Near the operating pressure to 3e-4, 1.5e-3 and 2e-3; to 350 bar K(p) is one straight line.
 
     The density leaves the table of constant temperature because the library follows an isentrope,
     which warms by compression: up to 1.2 % at 350 bar, by theory (1/K_s against 1/K_T).
@@ -48,7 +48,7 @@ def test_pure_fluids_follow_their_equations_of_state(name, highest):
     stiffness = [float(f.liquid.bulk_modulus(x)) for f, x in zip(fluids, p, strict=True)]
     viscosity = [float(f.viscosity(x)) for f, x in zip(fluids, p, strict=True)]
     assert worst(density, "density_kg_m3") < (3e-4 if near else 1.25e-2)
-    assert worst(stiffness, "K_isentropic_Pa") < (3e-3 if near else 1.25e-2)
+    assert worst(stiffness, "K_isentropic_Pa") < (1.5e-3 if near else 1.25e-2)
     assert worst(viscosity, "dyn_viscosity_Pa_s") < (2e-3 if near else 1.9e-2)
     boiling = [f.vapour_pressure for f in fluids]
     assert worst(boiling, "vapour_pressure_Pa") < 1e-5
