@@ -46,6 +46,9 @@ class GuideFriction(Component):
     Taken at the mean velocity of the step: the loss ``-F v h`` is never negative.  ``tanh``
     replaces the jump at rest, so a body under a force below ``F_s`` does not stick but creeps with
     less than ``v_d``; an opening delay by sticking needs a model with memory.
+
+    Limit: the time step, the coarse one too, must stay below ``2 m v_d/F_s`` (5 us for 1 g, 1 mm/s
+    and 0.4 N), or the forces of a step do not settle near rest.
     """
 
     type: ClassVar[str] = "guide-friction"

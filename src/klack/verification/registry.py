@@ -16,6 +16,7 @@ GROUPS = (
     "impact",
     "transient",
     "spectra",
+    "mechanics",
     "fluids",
     "films",
 )
