@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
@@ -156,8 +157,8 @@ class Film(Section):
         if cavitation is None:
             cavitation = fluid.vapour_pressure
         if cavitation > around:
-            raise CaseProblem(
-                ("cavitation_pressure",),
+            raise InputError(
+                f"{rows.component}.film.cavitation_pressure",
                 got=f"{format_si(cavitation, 'Pa')} absolute",
                 expected=f"less than the pressure around the film, {format_si(around, 'Pa')}",
                 hint="pressures are absolute; leave it out for the vapour pressure.",

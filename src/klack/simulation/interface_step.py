@@ -215,7 +215,7 @@ def _relaxing(
     z0: float,
     reach: float,
 ) -> float:
-    """``theta`` of a step that starts open; falls to 1/2 as the step comes to close the gap."""
+    """``theta`` of a step that starts open; falls to 1/2 where the step closes most of the gap."""
     if not filmed:
         return 1.0 if reach >= 0.0 else 0.5
     x0 = z0 + cut_off
@@ -223,7 +223,7 @@ def _relaxing(
     most = 0.5 - series * damping / h
     if most <= 0.0:
         return 0.5
-    return 0.5 + most * min(max(reach / z0, 0.0), 1.0)
+    return 0.5 + most * min(max(2.0 * reach / z0, 0.0), 1.0)
 
 
 @njit(cache=True, inline="always", error_model="numpy")
