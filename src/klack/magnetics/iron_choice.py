@@ -1,0 +1,77 @@
+"""How a case names its iron: from the library, by a formula, or by a table."""
+
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem
+from klack.input.section import Number, Section, Text
+from klack.magnetics.iron import IronCurve, brauer, froehlich, measured, tanh_curve
+from klack.magnetics.iron_library import iron_curve
+from klack.units import FieldStrength, FluxDensity
+
+__all__ = ["BrauerNumbers", "IronChoice", "IronPoints", "SaturationNumbers"]
+
+
+class SaturationNumbers(Section):
+    """Two numbers of a data sheet."""
+
+    saturation: FluxDensity = Field(gt=0, description="Saturation polarisation; pure iron 2.15 T.")
+    permeability: Number = Field(gt=1, description="Initial relative permeability.")
+
+
+class BrauerNumbers(Section):
+    """Exponential curve H = (k1 exp(k2 B^2) + k3) B, in SI."""
+
+    k1: Number = Field(gt=0, description="Coefficient k1 [m/H].")
+    k2: Number = Field(gt=0, description="Coefficient k2 [1/T^2].")
+    k3: Number = Field(description="Coefficient k3 [m/H].")
+
+
+class IronPoints(Section):
+    """Measured initial magnetisation curve."""
+
+    flux_density: tuple[FluxDensity, ...] = Field(min_length=1, description="B, increasing.")
+    field_strength: tuple[FieldStrength, ...] = Field(min_length=1, description="H, increasing.")
+
+
+class IronChoice(Section):
+    """Magnetisation curve of a part; a bare text is a name of the library."""
+
+    name: Text | None = Field(default=None, description="Material of the library.")
+    froehlich: SaturationNumbers | None = Field(default=None, description="Curve, smooth knee.")
+    tanh: SaturationNumbers | None = Field(default=None, description="Curve with a sharp knee.")
+    brauer: BrauerNumbers | None = Field(default=None, description="Exponential curve.")
+    table: IronPoints | None = Field(default=None, description="Measured points.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        chosen = self._exactly_one(
+            ("name", "froehlich", "tanh", "brauer", "table"), "which iron it is"
+        )
+        try:
+            self.curve()
+        except InputError as error:
+            raise CaseProblem(
+                (chosen,), got=error.got, expected=error.expected, hint=error.hint
+            ) from None
+        return self
+
+    def curve(self) -> IronCurve:
+        """Return the magnetisation curve."""
+        if self.name is not None:
+            return iron_curve(self.name)
+        if self.froehlich is not None:
+            return froehlich(self.froehlich.saturation, self.froehlich.permeability)
+        if self.tanh is not None:
+            return tanh_curve(self.tanh.saturation, self.tanh.permeability)
+        if self.brauer is not None:
+            return brauer(self.brauer.k1, self.brauer.k2, self.brauer.k3)
+        assert self.table is not None
+        return measured(self.table.flux_density, self.table.field_strength)

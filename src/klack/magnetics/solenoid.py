@@ -1,0 +1,195 @@
+"""The solenoid of a valve: coil, pole gaps, iron, leakage, eddy currents."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from klack.input.section import Number
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.driver import driver_of
+from klack.magnetics.flux_step import flux_rows
+from klack.magnetics.reluctance import GapReluctance, LinearReluctance
+from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
+from klack.magnetics.static import static_state
+from klack.magnetics.tabulation import hermite_grid
+from klack.network.component import Component
+from klack.network.port import COIL, ELEMENT, Port
+from klack.network.rows import Rows
+from klack.units import Flux, Length, Permeance, Ratio, Resistance, Temperature
+
+__all__ = ["COPPER_COEFFICIENT", "Solenoid"]
+
+COPPER_COEFFICIENT = 3.93e-3
+"""Relative rise of the resistance of copper [1/K] from 20 degC (IEC 60028)."""
+
+_REFERENCE_TEMPERATURE = 293.15
+_MAIN, _LEAKAGE = 0, 1
+_TABLE_TOLERANCE = 1e-8
+
+
+class Solenoid(Component):
+    r"""Coil that pulls an armature by magnetic flux.
+
+    The main flux :math:`\varphi` passes the pole gaps, the parasitic gaps and the iron in series;
+    a leakage flux passes the coil only:
+
+    .. math::
+
+        N i = \Bigl[\sum_k R_k(x) + \sum_k R_{p,k}\Bigr]\varphi + \sum_j l_j H_j(\varphi/A_j)
+              - \Theta_0 + \Theta_\text{eddy}, \qquad
+        N i = \varphi_\text{leak}/\Lambda, \qquad
+        u = R i + N\,\frac{\mathrm d}{\mathrm dt}(\varphi + \varphi_\text{leak}) .
+
+    The force on the armature is :math:`-\tfrac12\varphi^2\,\sum R_k'(x)` along the gap ``x``, which
+    is shared by all poles; ``base`` feels the opposite one.  The leakage is a state of its own
+    because without it the current would jump with the voltage (eddy currents carry no inductance),
+    and a two-point driver would switch without end.
+
+    ``residual_gap`` is what stays open when iron would touch: coating, shim, roughness.
+    ``residual_flux`` sets a constant remanence such that this flux passes the closed gap without
+    current; it lets an armature stick.
+
+    Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
+    is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
+    :mod:`klack.magnetics.lifting_magnet` shows; no hysteresis.
+    """
+
+    type: ClassVar[str] = "solenoid"
+    ports: ClassVar[Mapping[str, Port]] = {
+        "armature": ELEMENT,
+        "base": Port("mechanical", ELEMENT.role, optional=True),
+        "terminals": COIL,
+    }
+
+    turns: Number = Field(gt=0, description="Turns of the coil.")
+    resistance: Resistance = Field(gt=0, description="Of coil and harness, at 20 degC.")
+    winding_temperature: Temperature = Field(
+        default=_REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    )
+    gap: Length = Field(gt=0, description="Working gap at the start, without the residual gap.")
+    closes: Literal["upward", "downward"] = Field(
+        default="upward", description="Armature motion that closes the gap; upward opens a valve."
+    )
+    residual_gap: Length = Field(
+        gt=0, description="Magnetic gap that stays when pole and armature touch."
+    )
+    poles: tuple[PoleGap, ...] = Field(
+        min_length=1, description="Working gaps in series, all closed by the same stroke."
+    )
+    parasitic: tuple[ParasiticGap, ...] = Field(
+        default=(), description="Further gaps in series that the stroke does not change."
+    )
+    iron: tuple[IronPart, ...] = Field(default=(), description="Iron parts in series.")
+    leakage: Permeance | None = Field(
+        default=None, gt=0, description="Permeance of the coil's own leakage; see leakage_share."
+    )
+    leakage_share: Ratio = Field(
+        default=0.1,
+        gt=0,
+        description="Leakage as a share of the main permeance at the start gap, without iron; "
+        "usually 5 to 15 %. Not used if 'leakage' is given.",
+    )
+    eddy: tuple[EddyPart, ...] = Field(default=(), description="Solid iron with eddy currents.")
+    residual_flux: Flux = Field(
+        default=0.0, ge=0, description="Main flux that remains without current, gap closed."
+    )
+
+    def warm_resistance(self) -> float:
+        """Resistance [ohm] at the temperature of the winding."""
+        rise = self.winding_temperature - _REFERENCE_TEMPERATURE
+        return self.resistance * (1.0 + COPPER_COEFFICIENT * rise)
+
+    def circuit(self) -> MagneticCircuit:
+        """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
+        turns = float(self.turns)
+        gap = self._gap_law()
+        parasitic = sum(part.reluctance for part in self.parasitic)
+        leakage = self.leakage
+        if leakage is None:
+            leakage = self.leakage_share / (float(gap.reluctance_at(self.gap)) + parasitic)
+        branches = [
+            MagneticBranch(
+                name="gap", law=gap, turns=turns, remanence=self._remanence(gap, parasitic)
+            )
+        ]
+        if parasitic > 0.0:
+            branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
+        branches += [
+            MagneticBranch(
+                name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area)
+            )
+            for k, part in enumerate(self.iron)
+        ]
+        loops = [[1, 0] for _ in branches]
+        branches.append(
+            MagneticBranch(name="leakage", law=LinearReluctance(1.0 / leakage), turns=turns)
+        )
+        loops.append([0, 1])
+        _add_ladders(branches, loops, self.eddy)
+        width = max(len(row) for row in loops)
+        matrix = np.array([row + [0] * (width - len(row)) for row in loops])
+        return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add the coil with its driver."""
+        circuit = self.circuit()
+        flux_rows(
+            rows,
+            circuit,
+            resistance=self.warm_resistance(),
+            driver=driver_of(rows, "terminals"),
+            gap=self.gap,
+            closing=self.closes == "upward",
+            armature=rows.port("armature"),
+            base=rows.port("base"),
+            fluxes=static_state(circuit, current=0.0, gap=self.gap).loop_fluxes,
+        )
+
+    def _gap_law(self) -> GapReluctance:
+        """All poles in series, from half the residual gap of overlap to twice the start gap."""
+
+        def reluctance(x: Any) -> tuple[Any, Any]:
+            parts = [pole.reluctance(x + self.residual_gap) for pole in self.poles]
+            return sum(R for R, _ in parts), sum(dR for _, dR in parts)
+
+        start, end = -0.5 * self.residual_gap, 2.0 * self.gap + self.residual_gap
+        return GapReluctance.of(
+            reluctance, hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
+        )
+
+    def _remanence(self, gap: GapReluctance, parasitic: float) -> float:
+        """Constant mmf [A] that drives the residual flux through the closed circuit."""
+        flux = self.residual_flux
+        laws = [part.material.curve().law(part.length, part.area) for part in self.iron]
+        iron = sum(float(law.mmf(flux, 0.0)) for law in laws)
+        return (float(gap.reluctance_at(0.0)) + parasitic) * flux + iron
+
+
+def _add_ladders(
+    branches: list[MagneticBranch], loops: list[list[int]], parts: tuple[EddyPart, ...]
+) -> None:
+    """Put the ladders in series with the main flux; each term after the first is a loop more.
+
+    The first shorted turn sees the main flux less that of the inner loop, and so on inwards.
+    """
+    width = 2
+    for k, part in enumerate(parts):
+        ladder, outer = part.ladder(), _MAIN
+        for term, conductance in enumerate(ladder.conductances):
+            row = [0] * width
+            row[outer] = 1
+            last = term == len(ladder.conductances) - 1
+            if not last:
+                row.append(-1)
+            name = f"eddy {k + 1}.{term + 1}"
+            branches.append(MagneticBranch(name=name, law=LinearReluctance(0.0), eddy=conductance))
+            loops.append(row)
+            if last:
+                break
+            inner = [0] * width + [1]
+            law = LinearReluctance(ladder.reluctances[term])
+            branches.append(MagneticBranch(name=f"core {k + 1}.{term + 1}", law=law))
+            loops.append(inner)
+            outer, width = width, width + 1

@@ -1,0 +1,196 @@
+"""Parts of a solenoid as a case describes them: pole gaps, guides, iron, eddy currents."""
+
+from math import pi
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from klack.input.problem import CaseProblem
+from klack.input.section import Count, Section
+from klack.magnetics.air_gap import (
+    edge_on_plane,
+    edges_beside_wall,
+    equal_edges,
+    face_permeance,
+    ring_permeance,
+)
+from klack.magnetics.eddy import MOST_TERMS, EddyLadder, cylinder_ladder, sheet_ladder
+from klack.magnetics.iron import VACUUM_PERMEABILITY
+from klack.magnetics.iron_choice import IronChoice
+from klack.units import Area, Conductivity, Length, Permeance, Ratio
+
+__all__ = ["EddyPart", "IronPart", "ParasiticGap", "PoleGap"]
+
+Vector = NDArray[np.float64]
+
+
+class PoleGap(Section):
+    r"""One working gap between pole and armature, closed by the stroke.
+
+    .. math:: P = \mu_0 \frac{A}{g} + \mu_0\, c(g)\, l_\text{edge}
+
+    with ``g`` the gap plus the residual gap, and ``c`` an edge number of
+    :mod:`klack.magnetics.air_gap`.
+    """
+
+    outer_radius: Length = Field(gt=0, description="Outer radius of the pole face.")
+    inner_radius: Length = Field(default=0.0, ge=0, description="Inner radius; 0: a full disc.")
+    fringing: Literal["none", "equal", "plane", "wall"] = Field(
+        description="Edge field: none, equal (two equal poles), plane (pole on a larger plane), "
+        "wall (two equal poles inside a tube)."
+    )
+    shoulder: Length | None = Field(
+        default=None, gt=0, description="Side face behind the edge, for equal and plane."
+    )
+    wall: Length | None = Field(
+        default=None, gt=0, description="Distance of the tube from the side face, for wall."
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.inner_radius >= self.outer_radius:
+            raise CaseProblem(
+                ("inner_radius",),
+                got=f"{self.inner_radius:g} m beside an outer radius of {self.outer_radius:g} m",
+                expected="an inner radius below the outer radius",
+                hint="swap the two radii.",
+            )
+        needed = {"none": None, "equal": "shoulder", "plane": "shoulder", "wall": "wall"}
+        key = needed[self.fringing]
+        for name in ("shoulder", "wall"):
+            if name != key:
+                self._refuse_with((name,), f"fringing: {self.fringing}", "it is not used there")
+        if key is not None and getattr(self, key) is None:
+            raise CaseProblem(
+                (),
+                got=f"fringing: {self.fringing} without {key}",
+                expected=f"a length '{key}'",
+                hint=f"add {key}, or choose fringing: none.",
+            )
+        return self
+
+    @property
+    def area(self) -> float:
+        """Face area [m^2]."""
+        return pi * (self.outer_radius**2 - self.inner_radius**2)
+
+    def reluctance(self, gap: Vector) -> tuple[Vector, Vector]:
+        """Reluctance [A/Wb] at a gap [m] above zero, and its derivative by the gap."""
+        edge = VACUUM_PERMEABILITY * 2.0 * pi * (self.outer_radius + self.inner_radius)
+        P, dP = face_permeance(self.area, gap), -face_permeance(self.area, gap) / gap
+        if self.fringing != "none":
+            c, dc = self._edge(gap)
+            P, dP = P + edge * c, dP + edge * dc
+        return 1.0 / P, -dP / P**2
+
+    def _edge(self, gap: Vector) -> tuple[Vector, Vector]:
+        if self.fringing == "wall":
+            return edges_beside_wall(gap, self.wall or 0.0)
+        law = equal_edges if self.fringing == "equal" else edge_on_plane
+        return law(gap, self.shoulder or 0.0)
+
+
+class ParasiticGap(Section):
+    """A gap that the stroke does not change: the guide of the armature, a joint, a weld ring."""
+
+    permeance: Permeance | None = Field(default=None, gt=0, description="Given directly.")
+    radius: Length | None = Field(default=None, gt=0, description="Inner radius of a guide ring.")
+    clearance: Length | None = Field(default=None, gt=0, description="Radial clearance there.")
+    length: Length | None = Field(default=None, gt=0, description="Axial length of the ring.")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        ring = ("radius", "clearance", "length")
+        if self.permeance is not None:
+            return self._refuse_with(ring, "permeance", "the permeance says it all")
+        if any(getattr(self, name) is None for name in ring):
+            raise CaseProblem(
+                (),
+                got="an incomplete gap",
+                expected="either permeance, or radius, clearance and length",
+                hint="add the missing lengths of the guide ring.",
+            )
+        return self
+
+    @property
+    def reluctance(self) -> float:
+        """Reluctance [A/Wb]."""
+        if self.permeance is not None:
+            return 1.0 / self.permeance
+        assert self.radius is not None
+        assert self.clearance is not None
+        assert self.length is not None
+        return 1.0 / ring_permeance(self.radius, self.radius + self.clearance, self.length)
+
+
+class IronPart(Section):
+    """A piece of iron that the main flux passes, of constant section."""
+
+    material: IronChoice = Field(description="Name of a library material, or a curve.")
+    length: Length = Field(gt=0, description="Mean path of the flux in the part.")
+    area: Area = Field(gt=0, description="Cross-section across the flux.")
+
+
+class EddyPart(Section):
+    """Solid iron whose eddy currents hold back the main flux; see :mod:`klack.magnetics.eddy`."""
+
+    shape: Literal["cylinder", "sheet"] = Field(
+        default="cylinder", description="Solid round core, or sheet / thin-walled tube."
+    )
+    conductivity: Conductivity = Field(
+        gt=0, description="Of the iron; ferritic stainless 1.3 to 1.7 MS/m, pure iron 10 MS/m."
+    )
+    length: Length = Field(gt=0, description="Along the flux.")
+    radius: Length | None = Field(default=None, gt=0, description="Of a cylinder.")
+    thickness: Length | None = Field(default=None, gt=0, description="Of a sheet or tube wall.")
+    width: Length | None = Field(default=None, gt=0, description="Of a sheet; circumference.")
+    terms: Count = Field(default=1, le=MOST_TERMS, description="Terms of the ladder, 1 to 4.")
+    permeability: Ratio | None = Field(
+        default=None, gt=1, description="Relative permeability, for more than one term."
+    )
+    slots: Ratio = Field(
+        default=1.0, gt=0, le=1, description="Factor on the eddy conductance of slotted iron."
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        cylinder, sheet = ("radius",), ("thickness", "width")
+        wanted, unused = (cylinder, sheet) if self.shape == "cylinder" else (sheet, cylinder)
+        self._refuse_with(unused, f"shape: {self.shape}", f"it takes {', '.join(wanted)}")
+        if self.terms > 1:
+            wanted = (*wanted, "permeability")
+        for name in wanted:
+            if getattr(self, name) is None:
+                raise CaseProblem(
+                    (),
+                    got=f"no key '{name}'",
+                    expected=f"{name}, for shape: {self.shape} with {self.terms} terms",
+                    hint=f"add {name}.",
+                )
+        return self
+
+    def ladder(self) -> EddyLadder:
+        """Return the ladder."""
+        mu = self.permeability or 1e3  # one term does not depend on it
+        sigma = self.conductivity * self.slots
+        if self.shape == "cylinder":
+            assert self.radius is not None
+            return cylinder_ladder(
+                conductivity=sigma,
+                length=self.length,
+                radius=self.radius,
+                permeability=mu,
+                terms=self.terms,
+            )
+        assert self.thickness is not None
+        assert self.width is not None
+        return sheet_ladder(
+            conductivity=sigma,
+            length=self.length,
+            thickness=self.thickness,
+            width=self.width,
+            permeability=mu,
+            terms=self.terms,
+        )
