@@ -31,19 +31,19 @@ __all__ = [
     "circuit_current",
     "circuit_energy",
     "circuit_flux",
+    "circuit_gaps",
     "circuit_loss_and_force",
     "circuit_step",
     "linked",
     "stack",
 ]
 
-_CLOSE = 1e-8
-"""Newton step over flux scale that leaves an error of its square: round-off."""
-
 
 @intrinsic(prefer_literal=True)
 def stack(typingctx: Any, size: Any) -> Any:
     """Return ``size`` (a literal) numbers of work space on the stack of the calling function."""
+    if not isinstance(size, types.IntegerLiteral):
+        return None
     signature = types.CPointer(types.float64)(size)
     count = size.literal_value
 
@@ -211,79 +211,100 @@ def linked(par: Any, at: int, phi: Any) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
-def circuit_current(par: Any, at: int, hints: Any, phi: Any, x: float) -> float:
-    """Current [A] that belongs to fluxes and gap."""
+@njit(cache=True, error_model="numpy", inline="always")
+def circuit_gaps(
+    par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
+) -> None:
+    """Reluctance of each tube [A/Wb]: mean of both ends, at the end, and its quotient over x."""
+    loops = int(par[at])
+    p = at + _HEADER + loops
+    for k in range(int(par[at + 1])):
+        fixed = par[p + 1]
+        middle[k], end[k], slope[k] = fixed, fixed, 0.0
+        if par[p + 3] != 0.0:
+            table = at + int(par[p + 3])
+            i = interval(par, table, int(hints[2 * k]), x1)
+            hints[2 * k] = i
+            row = table + 1 + 6 * i
+            s0, s1 = x0 - par[row], x1 - par[row]
+            r1 = _cubic(par, row, s1)
+            first = i == 0 or s0 >= 0.0
+            if first and (i + 1 >= int(par[table]) or x0 < par[row + 6]):
+                slope[k] = _quotient_of(par, row, s0, s1)
+                r0 = _cubic(par, row, s0)
+            else:
+                slope[k] = gap_slope(par, table, i, x0, x1)
+                r0 = gap_reluctance(par, table, i, x0)
+            middle[k], end[k] = fixed + 0.5 * (r0 + r1), fixed + r1
+        p += _SIZE + loops
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
+    """Current [A] that belongs to ``phi + change`` and the reluctances ``end`` of the tubes."""
+    loops = int(par[at])
+    p = at + _HEADER + loops
     current = 0.0
     for k in range(int(par[at + 1])):
-        p = _tube(par, at, k)
         weight = par[p + 5]
         if weight != 0.0:
-            b = circuit_flux(par, at, k, phi)
-            mmf = par[p + 1] * b - par[p + 2]
-            if par[p + 3] != 0.0:
-                mmf += b * gap_reluctance(par, at + int(par[p + 3]), int(hints[2 * k]), x)
+            row = p + _SIZE
+            b = par[row] * (phi[0] + change[0])
+            for j in range(1, loops):
+                b += par[row + j] * (phi[j] + change[j])
+            mmf = end[k] * b - par[p + 2]
             if par[p + 4] != 0.0:
                 mmf += iron_mmf(par, at + int(par[p + 4]), int(hints[2 * k + 1]), b)
             current += weight * mmf
+        p += _SIZE + loops
     return current
 
 
-@njit(cache=True, error_model="numpy")
-def circuit_energy(par: Any, at: int, hints: Any, phi: Any, x: float) -> float:
-    """Stored energy [J]; writes where in the tables it was found into ``hints``."""
+@njit(cache=True, error_model="numpy", inline="always")
+def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
+    """Stored energy [J]; notes in ``hints`` where in the tables of iron it was found."""
+    loops = int(par[at])
+    p = at + _HEADER + loops
     energy = 0.0
     for k in range(int(par[at + 1])):
-        p = _tube(par, at, k)
-        b = circuit_flux(par, at, k, phi)
-        reluctance = par[p + 1]
-        if par[p + 3] != 0.0:
-            table = at + int(par[p + 3])
-            i = interval(par, table, int(hints[2 * k]), x)
-            hints[2 * k] = i
-            row = table + 1 + 6 * i
-            reluctance += _cubic(par, row, x - par[row])
-        energy += (0.5 * reluctance * b - par[p + 2]) * b
+        b = par[p + _SIZE] * phi[0]
+        for j in range(1, loops):
+            b += par[p + _SIZE + j] * phi[j]
+        energy += (0.5 * end[k] * b - par[p + 2]) * b
         if par[p + 4] != 0.0:
             table = at + int(par[p + 4])
             i = interval(par, table, int(hints[2 * k + 1]), abs(b))
             hints[2 * k + 1] = i
             row = table + 1 + 6 * i
             energy += par[row + 5] + _cubic_integral(par, row, abs(b) - par[row])
+        p += _SIZE + loops
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def circuit_loss_and_force(
-    par: Any, at: int, hints: Any, phi: Any, change: Any, x0: float, x1: float, h: float
+    par: Any, at: int, phi: Any, change: Any, slope: Any
 ) -> tuple[float, float]:
-    """Eddy loss [J] and mean force along the gap [N] of a step with a change of loop fluxes."""
+    """Eddy loss times length [J s] and mean force along the gap [N] of a change of loop fluxes."""
+    loops = int(par[at])
+    p = at + _HEADER + loops
     loss, force = 0.0, 0.0
     for k in range(int(par[at + 1])):
-        p = _tube(par, at, k)
-        db = circuit_flux(par, at, k, change)
+        row = p + _SIZE
+        b0, db = par[row] * phi[0], par[row] * change[0]
+        for j in range(1, loops):
+            b0 += par[row + j] * phi[j]
+            db += par[row + j] * change[j]
+        b1 = b0 + db
         loss += par[p] * db * db
-        if par[p + 3] != 0.0:
-            b0 = circuit_flux(par, at, k, phi)
-            b1 = b0 + db
-            slope = gap_slope(par, at + int(par[p + 3]), int(hints[2 * k]), x0, x1)
-            force -= 0.25 * slope * (b0 * b0 + b1 * b1)
-    return loss / h, force
+        force -= 0.25 * slope[k] * (b0 * b0 + b1 * b1)
+        p += _SIZE + loops
+    return loss, force
 
 
 @njit(cache=True, error_model="numpy")
 def _solve(A: Any, g: Any, n: int) -> bool:
     """Replace ``g`` by ``A^-1 g`` (symmetric, positive definite, lower half given)."""
-    if n == 1:
-        g[0] /= A[0]
-        return A[0] > 0.0
-    if n == 2:
-        a, b, c = A[0], A[2], A[3]
-        ratio = b / a
-        pivot = c - ratio * b
-        g[1] = (g[1] - ratio * g[0]) / pivot
-        g[0] = (g[0] - b * g[1]) / a
-        return a > 0.0 and pivot > 0.0
     for j in range(n):
         d = A[j * n + j]
         for m in range(j):
@@ -318,29 +339,30 @@ def circuit_step(
     hints: Any,
     phi: Any,
     change: Any,
-    x0: float,
-    x1: float,
-    h: float,
+    reluctance: Any,
+    per_time: float,
     voltage: float,
-    resistance: float,
+    per_ohm: float,
     conducts: bool,
 ) -> bool:
     """Find the change of the loop fluxes (in: a guess); False if the iteration does not settle.
 
-    Without ``conducts`` the coil is open: no current, whatever the voltage.
+    ``reluctance`` are the means of the tubes, ``per_time = 1/h``, ``per_ohm = 1/R``.  Without
+    ``conducts`` the coil is open: no current, whatever the voltage.
     """
+    if par[at] == 2.0:
+        return _two_loops(
+            par, at, hints, phi, change, reluctance, per_time, voltage, per_ohm, conducts
+        )
     A, g = stack(36), stack(6)
     loops, tubes = int(par[at]), int(par[at + 1])
     turns = at + _HEADER
     most = int(par[at + 2])
-    per_time = 1.0 / h
-    per_ohm = 1.0 / resistance
     for _ in range(most):
+        current = stiff = 0.0
         if conducts:
             current = (voltage - linked(par, at, change) * per_time) * per_ohm
             stiff = per_time * per_ohm
-        else:
-            current = stiff = 0.0
         for i in range(loops):
             ni = par[turns + i]
             g[i] = ni * current
@@ -350,19 +372,12 @@ def circuit_step(
             p = _tube(par, at, k)
             b0 = circuit_flux(par, at, k, phi)
             db = circuit_flux(par, at, k, change)
-            reluctance = par[p + 1]
-            if par[p + 3] != 0.0:
-                table, hint = at + int(par[p + 3]), int(hints[2 * k])
-                reluctance += 0.5 * (
-                    gap_reluctance(par, table, hint, x0) + gap_reluctance(par, table, hint, x1)
-                )
             eddy = par[p] * per_time
-            mmf = eddy * db + reluctance * (b0 + 0.5 * db) - par[p + 2]
-            slope = eddy + 0.5 * reluctance
+            mmf = eddy * db + reluctance[k] * (b0 + 0.5 * db) - par[p + 2]
+            slope = eddy + 0.5 * reluctance[k]
             if par[p + 4] != 0.0:
-                iron, iron_slope = _iron_mean(
-                    par, at + int(par[p + 4]), int(hints[2 * k + 1]), b0, b0 + db
-                )
+                table, hint = at + int(par[p + 4]), int(hints[2 * k + 1])
+                iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
                 mmf += iron
                 slope += iron_slope
             row = p + _SIZE
@@ -376,13 +391,68 @@ def circuit_step(
             return False
         for i in range(loops):
             change[i] += g[i]
-        if most == 1:
+        largest = 0.0
+        for i in range(loops):
+            largest = max(largest, abs(g[i]))
+        if most == 1 or largest <= par[at + 5]:
             return True
-        settled = True
+    return False
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _two_loops(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    reluctance: Any,
+    per_time: float,
+    voltage: float,
+    per_ohm: float,
+    conducts: bool,
+) -> bool:
+    """Do the same for two loops (main and leakage), the usual case, in registers."""
+    tubes = int(par[at + 1])
+    most = int(par[at + 2])
+    n0, n1 = par[at + _HEADER], par[at + _HEADER + 1]
+    f0, f1, d0, d1 = phi[0], phi[1], change[0], change[1]
+    if not conducts:
+        per_ohm = 0.0
+    stiff = per_time * per_ohm
+    for _ in range(most):
+        current = (voltage - (n0 * d0 + n1 * d1) * per_time) * per_ohm
+        g0, g1 = n0 * current, n1 * current
+        a00, a10, a11 = n0 * n0 * stiff, n0 * n1 * stiff, n1 * n1 * stiff
+        p = at + _HEADER + 2
         for k in range(tubes):
-            p = _tube(par, at, k)
+            c0, c1 = par[p + _SIZE], par[p + _SIZE + 1]
+            b0, db = c0 * f0 + c1 * f1, c0 * d0 + c1 * d1
+            eddy = par[p] * per_time
+            half = 0.5 * reluctance[k]
+            mmf = eddy * db + half * (2.0 * b0 + db) - par[p + 2]
+            slope = eddy + half
             if par[p + 4] != 0.0:
-                settled = settled and abs(circuit_flux(par, at, k, g)) <= _CLOSE * par[p + 6]
+                table, hint = at + int(par[p + 4]), int(hints[2 * k + 1])
+                iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
+                mmf += iron
+                slope += iron_slope
+            g0 -= c0 * mmf
+            g1 -= c1 * mmf
+            a00 += c0 * c0 * slope
+            a10 += c0 * c1 * slope
+            a11 += c1 * c1 * slope
+            p += _SIZE + 2
+        ratio = a10 / a00
+        pivot = a11 - ratio * a10
+        g1 = (g1 - ratio * g0) / pivot
+        g0 = g0 / a00 - ratio * g1
+        d0 += g0
+        d1 += g1
+        if not (a00 > 0.0 and pivot > 0.0):
+            return False
+        settled = most == 1 or max(abs(g0), abs(g1)) <= par[at + 5]
         if settled:
+            change[0], change[1] = d0, d1
             return True
     return False

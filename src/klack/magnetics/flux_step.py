@@ -16,8 +16,7 @@ identity stays exact:
 from typing import Any
 
 import numpy as np
-from numba import njit, types
-from numba.extending import intrinsic
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import require_positive
@@ -34,12 +33,14 @@ from klack.magnetics.flux_kernel import (
     circuit_current,
     circuit_energy,
     circuit_flux,
+    circuit_gaps,
     circuit_loss_and_force,
     circuit_step,
     linked,
     stack,
 )
-from klack.magnetics.flux_table import circuit_numbers
+from klack.magnetics.flux_table import MOST_TUBES, circuit_numbers
+from klack.magnetics.quiet_step import DIODE, FRONT, quiet_step
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
 
@@ -75,24 +76,13 @@ FAILURES = {
     " leakage",
 }
 
-_FRONT = 8
-"""States in front: drive state, entered, cycle, open, current, voltage, main flux, last step."""
-
+_TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
 _MOST_EVENTS = 30
 _LOCATED = 1e-12
+_FRONT, _DIODE = FRONT, DIODE
+_NONE, _BLOCKS = -1, -2
 _CIRCUIT = 0.0
 _HEADER = 8
-
-
-@intrinsic
-def shift(typingctx: Any, start: Any, offset: Any) -> Any:
-    """Return the pointer ``start + offset``."""
-    signature = types.CPointer(types.float64)(start, offset)
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.gep(args[0], [args[1]])
-
-    return signature, codegen
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,7 +96,6 @@ def _locate(
     speed: float,
     length: float,
     voltage: float,
-    resistance: float,
     before: float,
     after: float,
     target: float,
@@ -115,6 +104,7 @@ def _locate(
 
     ``change`` comes with the change over ``length`` and leaves with that of the located piece.
     """
+    middle, end, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
     loops = int(par[at])
     low, high = 0.0, length
     f_low, f_high = before - target, after - target
@@ -127,10 +117,10 @@ def _locate(
         for j in range(loops):
             change[j] *= guess / size
         size = guess
-        end = x0 + speed * size
-        if not circuit_step(par, at, hints, phi, change, x0, end, size, voltage, resistance, True):
+        circuit_gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
+        if not circuit_step(par, at, hints, phi, change, middle, 1.0 / size, voltage, par[7], True):
             return -1.0
-        f = _end_current(par, at, hints, phi, change, end) - target
+        f = circuit_current(par, at, hints, phi, change, end) - target
         if abs(f) <= accepted or high - low <= _LOCATED * length:
             return size
         if f * f_high > 0.0:
@@ -146,170 +136,181 @@ def _locate(
     return -1.0
 
 
-@njit(cache=True, error_model="numpy")
-def _end_current(par: Any, at: int, hints: Any, phi: Any, change: Any, x: float) -> float:
-    end = stack(6)
-    for j in range(int(par[at])):
-        end[j] = phi[j] + change[j]
-    return circuit_current(par, at, hints, end, x)
+@njit(cache=True, error_model="numpy", inline="always")
+def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, int]:
+    """Return the current and the switch that is reached first on the way to ``end``."""
+    target, which, earliest = 0.0, _NONE, 2.0
+    if par[block + 1] != 0.0 and end < 0.0:
+        which, earliest = _BLOCKS, current / (current - end)
+    k = crossed_switch(par, block, 0, end)
+    while k >= 0:
+        value = par[block + 4 + 4 * k]
+        part = (value - current) / (end - current)
+        if part < earliest:
+            target, which, earliest = value, k, part
+        k = crossed_switch(par, block, k + 1, end)
+    return target, which
 
 
-@njit(cache=True, error_model="numpy")
-def _go(par: Any, block: int, switch: int, now: float, nxt: Any) -> None:
-    """Enter the next state: by the clock exactly when it says, otherwise now."""
+@njit(cache=True, error_model="numpy", inline="always")
+def _next_state(
+    par: Any, block: int, switch: int, now: float, entered: float, cycle: float
+) -> tuple[float, float, float]:
+    """Enter the next state, by the clock exactly when it says: state, entered, cycle."""
     s = block + 3 + 4 * switch
     when, value = par[s], par[s + 1]
     clock = now
     if when == 2.0:
-        clock = nxt[1] + value
+        clock = entered + value
     elif when == 3.0:
-        clock = nxt[2] + value
-    if par[s + 3] != 0.0:
-        nxt[2] = clock
-    nxt[0] = par[s + 2]
-    nxt[1] = clock if clock >= nxt[1] else now
-    nxt[7] = 0.0  # rates belong to the voltage before
+        clock = cycle + value
+    return par[s + 2], max(clock, entered), clock if par[s + 3] != 0.0 else cycle
 
 
 @step_function
 def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     """Step of a solenoid: ports armature and base; see the module text."""
-    t, h = inp[0], inp[1]
-    direction = par[3]
-    x0 = par[2] + direction * (inp[2] - inp[4])
-    x1 = par[2] + direction * (inp[3] - inp[5])
-    resistance, at, drive, size = par[1], int(par[4]), int(par[5]), int(par[6])
-    loops = int(par[at])
-    nxt = shift(out, 2)
-    for j in range(size):
-        nxt[j] = state[j]
-    phi, rate = shift(nxt, _FRONT), shift(nxt, _FRONT + loops)
-    bend, hints = shift(nxt, _FRONT + 2 * loops), shift(nxt, _FRONT + 3 * loops)
-    books = shift(nxt, size)
-    out[0] = out[1] = 0.0
-    books[0] = books[1] = books[2] = 0.0
-    if h <= 0.0:
-        books[3] = circuit_energy(par, at, hints, phi, x0)
+    if quiet_step(par, state, inp, out):
         return 0
+    t, h = inp[0], inp[1]
+    x0 = par[2] + par[3] * (inp[2] - inp[4])
+    x1 = par[2] + par[3] * (inp[3] - inp[5])
+    at, drive, size = int(par[4]), int(par[5]), int(par[6])
+    loops, spots = int(par[at]), 2 * int(par[at + 1])
+    mode, entered, cycle = state[0], state[1], state[2]
+    is_open, current, last = state[3] != 0.0, state[4], state[7]
+    # on the stack, where nothing else can be meant: the compiler keeps what it has read
+    phi, rate, bend, change = stack(6), stack(6), stack(6), stack(6)
+    hints = stack(_SPOTS)
+    middle, final, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
+    for j in range(loops):
+        phi[j] = state[_FRONT + j]
+        rate[j] = state[_FRONT + loops + j]
+        bend[j] = state[_FRONT + 2 * loops + j]
+    for j in range(spots):
+        hints[j] = state[_FRONT + 3 * loops + j]
 
-    change = stack(6)
-    speed = (x1 - x0) / h
-    close = 1e-9 * h + 1e-15 * abs(t)
     supply = ohmic = eddy = push = pulse = 0.0
     done = 0.0
     events = 0
     blocked = False  # the diode has blocked at this very instant
+    per_step = 1.0 / h if h > 0.0 else 0.0
+    speed = (x1 - x0) * per_step
+    close = 1e-9 * h + 1e-15 * abs(t)
+    if h <= 0.0:
+        circuit_gaps(par, at, hints, x0, x0, middle, final, slope)
     while done < h:
         now = t + done
-        block = state_block(par, drive, int(nxt[0]))
-        current = nxt[4]
-        k = due_switch(par, block, now, nxt[1], nxt[2], current, close)
-        if k >= 0:
-            _go(par, block, k, now, nxt)
+        block = state_block(par, drive, int(mode))
+        which = due_switch(par, block, now, entered, cycle, current, close)
+        if which >= 0:
+            mode, entered, cycle = _next_state(par, block, which, now, entered, cycle)
+            last = 0.0  # the rates belong to the voltage before
+            blocked = False
             events += 1
             if events > _MOST_EVENTS:
                 return 2
-            blocked = False
             continue
-        left = h - done
-        piece = left
-        due = next_time(par, block, now + close, nxt[1], nxt[2]) - now
-        if due < left - close:
+        piece, per_time = h - done, per_step
+        due = next_time(par, block, now + close, entered, cycle) - now
+        whole = due >= piece - close
+        if not whole:
             piece = due
-        whole = piece == left
+        if piece != h:
+            per_time = 1.0 / piece
         xa = x0 if done == 0.0 else x0 + speed * done
         xb = x1 if whole else x0 + speed * (done + piece)
-        voltage = state_voltage(par, block, now + 0.5 * piece - nxt[2])
-        ahead = 0.5 * (nxt[7] + piece)
+        voltage = state_voltage(par, block, now + 0.5 * piece - cycle)
+        ahead = 0.5 * (last + piece)
         for j in range(loops):
             change[j] = piece * (rate[j] + bend[j] * ahead)
-        conducts = nxt[3] == 0.0
+        circuit_gaps(par, at, hints, xa, xb, middle, final, slope)
         if not circuit_step(
-            par, at, hints, phi, change, xa, xb, piece, voltage, resistance, conducts
+            par, at, hints, phi, change, middle, per_time, voltage, par[7], not is_open
         ):
             return 1
-        if not conducts and not blocked:
-            induced = linked(par, at, change) / piece
-            if voltage > induced + 1e-6:
-                conducts = True
-                nxt[3] = nxt[7] = 0.0
-                if not circuit_step(
-                    par, at, hints, phi, change, xa, xb, piece, voltage, resistance, True
-                ):
-                    return 1
+        through = linked(par, at, change)
+        if is_open and not blocked and voltage > through * per_time + _DIODE:
+            is_open = False
+            last = 0.0
+            if not circuit_step(
+                par, at, hints, phi, change, middle, per_time, voltage, par[7], True
+            ):
+                return 1
+            through = linked(par, at, change)
         end = 0.0
-        which = -1
-        if conducts:
-            end = _end_current(par, at, hints, phi, change, xb)
-            which = crossed_switch(par, block, 0, end)
-            diode = par[block + 1] != 0.0 and end < 0.0
-            if diode and current <= 0.0:
-                nxt[3], nxt[7] = 1.0, 0.0
-                blocked = True
-                events += 1
-                if events > _MOST_EVENTS:
-                    return 2
-                continue
-            if which >= 0 or diode:
-                target = 0.0
-                earliest = 2.0
-                if diode:
-                    earliest = current / (current - end)
-                    which = -2
-                k = crossed_switch(par, block, 0, end)
-                while k >= 0:
-                    value = par[block + 4 + 4 * k]
-                    part = (value - current) / (end - current)
-                    if part < earliest:
-                        earliest, target, which = part, value, k
-                    k = crossed_switch(par, block, k + 1, end)
+        which = _NONE
+        if not is_open:
+            end = circuit_current(par, at, hints, phi, change, final)
+            target, which = _crossing(par, block, current, end)
+            if which != _NONE:
+                if which == _BLOCKS and current <= 0.0:
+                    is_open = blocked = True
+                    last = 0.0
+                    events += 1
+                    if events > _MOST_EVENTS:
+                        return 2
+                    continue
                 piece = _locate(
-                    par, at, hints, phi, change, xa, speed, piece, voltage, resistance,
-                    current, end, target,
-                )  # fmt: skip
+                    par, at, hints, phi, change, xa, speed, piece, voltage, current, end, target
+                )
                 if piece <= 0.0:
                     return 1
+                per_time = 1.0 / piece
                 whole = False
                 xb = xa + speed * piece
                 end = target
-        through = linked(par, at, change)
-        if conducts:
-            mean = (voltage - through / piece) / resistance
+                circuit_gaps(par, at, hints, xa, xb, middle, final, slope)
+                through = linked(par, at, change)
+            mean = (voltage - through * per_time) * par[7]
             supply += voltage * mean * piece
-            ohmic += resistance * mean * mean * piece
+            ohmic += par[1] * mean * mean * piece
             pulse += voltage * piece
         else:
             pulse += through
-        loss, force = circuit_loss_and_force(par, at, hints, phi, change, xa, xb, piece)
-        eddy += loss
+        loss, force = circuit_loss_and_force(par, at, phi, change, slope)
+        eddy += loss * per_time
         push += force * piece
-        per = 1.0 / piece
-        curve = 1.0 / ahead if nxt[7] > 0.0 else 0.0
+        curve = 0.0
+        if last == piece:
+            curve = per_time
+        elif last > 0.0:
+            curve = 1.0 / ahead
         for j in range(loops):
             phi[j] += change[j]
-            now_rate = change[j] * per
+            now_rate = change[j] * per_time
             bend[j] = (now_rate - rate[j]) * curve
             rate[j] = now_rate
-        nxt[7] = piece
-        nxt[4] = end
+        last = piece
+        current = end
         blocked = False
         done = h if whole else done + piece
-        if which != -1:
-            if which == -2:
-                nxt[3], nxt[7] = 1.0, 0.0
-                blocked = True
+        if which != _NONE:
+            last = 0.0
+            if which == _BLOCKS:
+                is_open = blocked = True
             else:
-                _go(par, block, which, t + done, nxt)
+                mode, entered, cycle = _next_state(par, block, which, t + done, entered, cycle)
             events += 1
             if events > _MOST_EVENTS:
                 return 2
-    nxt[5] = pulse / h
-    nxt[6] = par[at + 4] * circuit_flux(par, at, int(par[at + 3]), phi)
-    force = push / h
-    out[0] = direction * force
-    out[1] = -direction * force
-    books[0], books[1], books[2] = supply, ohmic, eddy
-    books[3] = circuit_energy(par, at, hints, phi, x1)
+
+    force = push * per_step
+    energy = circuit_energy(par, at, hints, phi, final)
+    out[0] = par[3] * force
+    out[1] = -par[3] * force
+    out[2], out[3], out[4], out[5] = mode, entered, cycle, 1.0 if is_open else 0.0
+    out[6], out[7] = current, pulse * per_step
+    out[8] = par[at + 4] * circuit_flux(par, at, int(par[at + 3]), phi)
+    out[9] = last
+    for j in range(loops):
+        out[2 + _FRONT + j] = phi[j]
+        out[2 + _FRONT + loops + j] = rate[j]
+        out[2 + _FRONT + 2 * loops + j] = bend[j]
+    for j in range(spots):
+        out[2 + _FRONT + 3 * loops + j] = hints[j]
+    books = 2 + size
+    out[books], out[books + 1], out[books + 2], out[books + 3] = supply, ohmic, eddy, energy
     return 0
 
 
@@ -327,6 +328,7 @@ def flux_numbers(
     direction = -1.0 if closing else 1.0
     size = _FRONT + 3 * int(plant[0]) + 2 * int(plant[1])
     head = [_CIRCUIT, resistance, gap, direction, _HEADER, _HEADER + plant.size, size, 0.0]
+    head[7] = 1.0 / resistance
     return np.concatenate((head, plant, program))
 
 

@@ -21,7 +21,7 @@ from klack.errors import InputError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
 
-__all__ = ["BRANCH_SIZE", "HEADER", "circuit_numbers", "current_weights"]
+__all__ = ["BRANCH_SIZE", "HEADER", "MOST_TUBES", "circuit_numbers", "current_weights"]
 
 Vector = NDArray[np.float64]
 
@@ -30,6 +30,12 @@ HEADER = 12
 
 BRANCH_SIZE = 8
 """Numbers of a branch in front of its row of loops."""
+
+MOST_TUBES = 18
+"""Most different branch fluxes."""
+
+CLOSE = 1e-8
+"""Newton step, over the flux at which the iron's curve ends, that leaves round-off: its square."""
 
 _SAFE = 1e-9
 
@@ -82,16 +88,29 @@ def current_weights(circuit: MagneticCircuit) -> Vector:
 def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
 
-    ``[loops, tubes, largest iterations (1 if linear), main tube, sign of its flux, 7 spare]``,
+    ``[loops, tubes, most iterations (1 if linear), main tube, sign of its flux, accepted change of
+    a loop flux, whether two loops share one gap, 5 spare]``,
     the turns of each loop, then per tube ``eddy, reluctance, remanence, gap table, iron table,
-    weight in the current, flux scale, spare`` and its row of loops, then the tables.  Offsets of
+    weight in the current, 2 spare`` and its row of loops, then the tables.  Offsets of
     tables count from the start; 0 says that there is none.
     """
     tubes, main, sign = _tubes(circuit)
+    if len(tubes) > MOST_TUBES:
+        raise InputError(
+            "magnetic circuit",
+            got=f"{len(tubes)} different branch fluxes",
+            expected=f"at most {MOST_TUBES}",
+            hint="put branches that carry the same flux in series in one loop.",
+        )
     loops = circuit.loops.shape[1]
     head = np.zeros(HEADER)
     linear = all(tube.iron.size == 0 for tube in tubes)
     head[:5] = loops, len(tubes), 1 if linear else 40, main, sign
+    head[6] = loops == 2 and [tube.gap.size > 0 for tube in tubes] == [True] + [False] * (
+        len(tubes) - 1
+    )
+    limits = [tube.iron[-1, 0] / np.sum(np.abs(tube.row)) for tube in tubes if tube.iron.size]
+    head[5] = CLOSE * min(limits, default=0.0)
     offset = HEADER + loops + len(tubes) * (BRANCH_SIZE + loops)
     blocks, tables = [], []
     for tube in tubes:
@@ -101,8 +120,7 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
             if rows.size:
                 tables.append(np.append(float(rows.shape[0]), rows.ravel()))
                 offset += tables[-1].size
-        scale = tube.iron[-1, 0] if tube.iron.size else 0.0
-        numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, scale, 0.0]
+        numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, 0.0, 0.0]
         blocks.append(np.concatenate((numbers, tube.row)))
     return np.concatenate((head, circuit.loop_turns, *blocks, *tables))
 
@@ -125,7 +143,8 @@ def _tubes(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:
         for sign, k in members:
             if circuit.branches[k].name == circuit.main:
                 main = (j, sign)
-    return tubes, main[0], main[1]
+    order = sorted(range(len(tubes)), key=lambda j: tubes[j].gap.size == 0)  # gaps first
+    return [tubes[j] for j in order], order.index(main[0]), main[1]
 
 
 def _tube(row: Vector, branches: list[tuple[float, MagneticBranch]], weight: float) -> _Tube:
