@@ -107,8 +107,8 @@ def _from_constants(
 
 HEPTANE = _measured(
     "n-heptane",
-    "CoolProp 8.0.0: Span (unpublished, 2003) Helmholtz equation; viscosity Michailidou et al., "
-    "J. Phys. Chem. Ref. Data 43 (2014)",
+    "CoolProp 8.0.0: Span and Wagner, Int. J. Thermophys. 24 (2003) 41; viscosity Michailidou "
+    "et al., J. Phys. Chem. Ref. Data 43 (2014)",
     0.100202,
     density=(700.862, 684.196, 667.261, 649.925, 632.032, 613.385),
     bulk_modulus=(1.0725e9, 9.0843e8, 7.6385e8, 6.3631e8, 5.2372e8, 4.2431e8),
@@ -163,7 +163,11 @@ ISO_4113 = _from_constants(
     _OIL,
     273.15,
     373.15,
-    density=(825.0, "middle of the band of ISO 4113:2010, 820 to 830 kg/m^3", True),
+    density=(
+        825.0,
+        "middle of the band of ISO 4113:2010 (read as KS R ISO 4113:2012), 820 to 830 kg/m^3",
+        True,
+    ),
     expansion=(8.3e-4, _GUIDE, False),
     bulk_modulus=(1.53e9, f"{_GUIDE}; compare Bazile, Boned and Daridon, 19th ECTP", False),
     bulk_modulus_slope=(10.9, f"{_GENERIC_OIL}, taken over for a lighter oil", False),

@@ -163,11 +163,13 @@ def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, i
     if i == last or s < 0.0:
         return _beyond(v0, c1, table[i + 7], s, i)
     c2, c3, c4, c5 = table[i + 3], table[i + 4], table[i + 5], table[i + 6]
-    v = v0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
-    slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
-    g = table[i + 7] + s * (
-        v0 + s * (0.5 * c1 + s * (_THIRD * c2 + s * (0.25 * c3 + s * (0.2 * c4 + s * _SIXTH * c5))))
-    )
+    # in pairs: their products run side by side, a nested form would wait for each
+    s2 = s * s
+    s4 = s2 * s2
+    v = (v0 + s * c1) + s2 * (c2 + s * c3) + s4 * (c4 + s * c5)
+    slope = (c1 + s * (2.0 * c2)) + s2 * (3.0 * c3 + s * (4.0 * c4)) + s4 * (5.0 * c5)
+    area = (v0 + s * (0.5 * c1)) + s2 * (_THIRD * c2 + s * (0.25 * c3))
+    g = table[i + 7] + s * (area + s4 * (0.2 * c4 + s * (_SIXTH * c5)))
     rho = 1.0 / v
     return rho, -slope * rho * rho, g, i
 

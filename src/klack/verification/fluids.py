@@ -76,7 +76,7 @@ def _heptane() -> list[Check]:
             1360.70,
             float(library_fluid("n-heptane").at(293.15).sound_speed(350e5)),
             1e-2,
-            "Span's equation (CoolProp 8.0.0); one bulk modulus line from 5 to 350 bar",
+            "Span and Wagner 2003 (CoolProp 8.0.0); one bulk modulus line from 5 to 350 bar",
         ),
     ]
 
