@@ -74,9 +74,10 @@ def static_state(
         step = -np.linalg.solve((C.T * circuit.slope(C @ phi, gap)) @ C, here)
         if np.max(np.abs(step)) <= _SETTLED * np.max(np.abs(phi)):
             return _state(circuit, phi + step, current, gap)
-        # of a convex function only the slope along the step is needed, which round-off spares
+        # of a convex function the slope along the step is enough, which round-off spares: it
+        # starts at -downhill, and a step is too long where it has risen well above zero
         downhill, share = abs(float(here @ step)), 1.0
-        while abs(float(gradient(phi + share * step) @ step)) > 0.9 * downhill and share > 1e-6:
+        while float(gradient(phi + share * step) @ step) > 0.5 * downhill and share > 1e-9:
             share *= 0.5
         phi = phi + share * step
     raise ConvergenceError(

@@ -1,0 +1,214 @@
+r"""A solenoid known by a table only: linkage ``psi(i, x)``, as finite elements or a bench give it.
+
+Everything follows from the stored energy :math:`W(\psi, x)`,
+
+.. math:: i = \frac{\partial W}{\partial \psi}, \qquad F = -\frac{\partial W}{\partial x} ,
+
+so a force that was given besides is not used, only compared: two tables that contradict each
+other would make a machine that creates energy.  Per gap of the table, ``psi(i)`` is a monotone
+cubic; its inverse ``i(psi)`` is tabulated on common linkages, integrated exactly, and joined over
+the gap by cubic splines.  The result is one bicubic surface, C1: current and force are continuous.
+
+Limits: no eddy currents (add them as a resistance, or describe the circuit); beyond the table
+the surface goes on straight in each direction, in ``psi`` with the last differential inductance.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
+
+from klack.errors import AccuracyWarning, InputError
+
+__all__ = ["FluxMap"]
+
+Vector = NDArray[np.float64]
+
+_LINKAGES = 129
+_ACCEPTED = 0.05  # largest disagreement of a given force, of its peak
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FluxMap:
+    """Stored energy over linkage and gap on a rectangular grid.
+
+    Parameters
+    ----------
+    linkage : array, shape (m,) [Wb]
+        Evenly spaced from 0.
+    gap : array, shape (n,) [m]
+        Increasing.
+    energy, current, slope, mixed : array, shape (m, n)
+        ``W`` [J], ``dW/dpsi`` [A], ``dW/dx`` [N] and ``d2W/dpsi dx`` [A/m] on the grid.
+    """
+
+    linkage: Vector
+    gap: Vector
+    energy: Vector
+    current: Vector
+    slope: Vector
+    mixed: Vector
+
+    @classmethod
+    def of(
+        cls, *, current: ArrayLike, gap: ArrayLike, linkage: ArrayLike, force: ArrayLike | None
+    ) -> "FluxMap":
+        """Build the map from a table.
+
+        Parameters
+        ----------
+        current : array, shape (k,) [A]
+            Increasing from 0 or above; no linkage is assumed at 0.
+        gap : array, shape (n,) [m]
+            Increasing.
+        linkage : array, shape (k, n) [Wb]
+            Increasing with the current.
+        force : array, shape (k, n) [N], optional
+            Negative where it closes the gap; compared only.
+
+        Warns
+        -----
+        AccuracyWarning
+            If the given force differs by more than 5 % of its peak.
+        """
+        i, x, psi = _checked(current, gap, linkage)
+        common = np.linspace(0.0, float(psi.max()), _LINKAGES)
+        columns = [_column(i, psi[:, j], common) for j in range(x.size)]
+        energy = np.column_stack([column[0] for column in columns])
+        through = np.column_stack([column[1] for column in columns])
+        made = cls(
+            common,
+            x,
+            energy,
+            through,
+            CubicSpline(x, energy, axis=1)(x, 1),
+            CubicSpline(x, through, axis=1)(x, 1),
+        )
+        if force is not None:
+            made._compare(psi, x, np.array(force, dtype=float).reshape(psi.shape))
+        return made
+
+    def energy_at(self, linkage: float, gap: float) -> float:
+        """Return ``W`` [J]."""
+        return self._evaluate(linkage, gap)[0]
+
+    def current_at(self, linkage: float, gap: float) -> float:
+        """Return ``i`` [A]; odd in the linkage."""
+        return float(np.copysign(1.0, linkage)) * self._evaluate(linkage, gap)[1]
+
+    def force_at(self, linkage: float, gap: float) -> float:
+        """Return the force along the gap [N]; negative closes it."""
+        return -self._evaluate(linkage, gap)[2]
+
+    def table(self) -> Vector:
+        """Return flat numbers for a compiled loop.
+
+        ``[m, n, step of psi]``, the ``n`` gaps, then for each cell ``(k, j)``, ``k`` slowest, 16
+        numbers ``c[a, b]``, ``b`` fastest: ``W = sum c[a, b] u^a v^b`` with ``u`` and ``v`` the
+        linkage and the gap from the corner of the cell, in the cell's lengths (0 to 1).
+        """
+        step = float(self.linkage[1])
+        head = np.array([float(self.linkage.size), float(self.gap.size), step])
+        cells = [
+            self._cell(k, j).ravel()
+            for k in range(self.linkage.size - 1)
+            for j in range(self.gap.size - 1)
+        ]
+        return np.concatenate((head, self.gap, *cells))
+
+    def _cell(self, k: int, j: int) -> Vector:
+        """Sixteen coefficients of the bicubic Hermite patch of a cell."""
+        h, d = float(self.linkage[1]), float(self.gap[j + 1] - self.gap[j])
+        part = np.s_[k : k + 2, j : j + 2]
+        corner = np.block(
+            [
+                [self.energy[part], d * self.slope[part]],
+                [h * self.current[part], h * d * self.mixed[part]],
+            ]
+        )
+        return _HERMITE @ corner @ _HERMITE.T
+
+    def _evaluate(self, linkage: float, gap: float) -> tuple[float, float, float]:
+        """``W`` and its two derivatives; straight on beyond the grid."""
+        size, h = abs(linkage), float(self.linkage[1])
+        inside = np.clip((size, gap), (0.0, self.gap[0]), (self.linkage[-1], self.gap[-1]))
+        k = min(int(inside[0] / h), self.linkage.size - 2)
+        j = int(np.clip(np.searchsorted(self.gap, inside[1], "right") - 1, 0, self.gap.size - 2))
+        d = float(self.gap[j + 1] - self.gap[j])
+        u, v = (inside[0] - self.linkage[k]) / h, (inside[1] - self.gap[j]) / d
+        c = self._cell(k, j)
+        U = np.array([[1.0, u, u * u, u**3], [0.0, 1.0, 2 * u, 3 * u * u], [0.0, 0.0, 2.0, 6 * u]])
+        V = np.array([[1.0, v, v * v, v**3], [0.0, 1.0, 2 * v, 3 * v * v]])
+        W = U @ c @ V.T / np.outer([1.0, h, h * h], [1.0, d])
+        p, q = size - inside[0], gap - inside[1]
+        energy = W[0, 0] + q * W[0, 1] + p * (W[1, 0] + q * W[1, 1]) + 0.5 * p * p * W[2, 0]
+        current = W[1, 0] + q * W[1, 1] + p * W[2, 0]
+        slope = W[0, 1] + p * W[1, 1]
+        if p > 0.0:
+            slope += 0.5 * p * p * W[2, 1]
+            energy += 0.5 * p * p * q * W[2, 1]
+            current += p * q * W[2, 1]
+        return float(energy), float(current), float(slope)
+
+    def _compare(self, psi: Vector, x: Vector, force: Vector) -> None:
+        derived = np.array(
+            [[self.force_at(p, g) for p, g in zip(row, x, strict=True)] for row in psi]
+        )
+        worst = float(np.max(np.abs(derived - force)))
+        peak = float(np.max(np.abs(force)))
+        if worst > _ACCEPTED * peak:
+            k, j = np.unravel_index(int(np.argmax(np.abs(derived - force))), force.shape)
+            warnings.warn(
+                f"force map: the given force is {force[k, j]:.4g} N at a gap of {x[j]:.4g} m, the "
+                f"linkage asks for {derived[k, j]:.4g} N there. The linkage is used, because only "
+                "one of both can keep the energy. Try: more gaps in the table, and force and "
+                "linkage from the same computation.",
+                AccuracyWarning,
+                stacklevel=3,
+            )
+
+
+_HERMITE = np.array(
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]]
+)
+"""Values and slopes at 0 and 1 -> coefficients of a cubic."""
+
+
+def _checked(
+    current: ArrayLike, gap: ArrayLike, linkage: ArrayLike
+) -> tuple[Vector, Vector, Vector]:
+    i, x = (np.array(v, dtype=float).ravel() for v in (current, gap))
+    psi = np.array(linkage, dtype=float)
+    if psi.shape != (i.size, x.size) or i.size < 2 or x.size < 3:
+        raise InputError(
+            "FluxMap",
+            got=f"{i.size} currents, {x.size} gaps, linkages of shape {psi.shape}",
+            expected="a linkage for each of at least 2 currents (rows) and 3 gaps (columns)",
+            hint="one row of linkages per current.",
+        )
+    rising = np.all(np.diff(i) > 0) and np.all(np.diff(x) > 0) and np.all(np.diff(psi, axis=0) > 0)
+    if not rising or i[0] < 0.0 or (i[0] == 0.0 and np.any(psi[0] != 0.0)) or np.any(psi[0] < 0):
+        raise InputError(
+            "FluxMap",
+            got="a table that is not increasing",
+            expected="currents from 0 or above, gaps, and linkages (over the current) that increase"
+            ", no linkage at 0 A",
+            hint="sort the table; take out remanence.",
+        )
+    if i[0] > 0.0:
+        i, psi = np.concatenate(([0.0], i)), np.vstack((np.zeros(x.size), psi))
+    return i, x, psi
+
+
+def _column(i: Vector, psi: Vector, common: Vector) -> tuple[Vector, Vector]:
+    """Energy and current over the common linkages, at one gap."""
+    curve: PPoly = PchipInterpolator(psi, i)
+    slope = float(curve(psi[-1], 1)) or float((i[-1] - i[-2]) / (psi[-1] - psi[-2]))
+    inside = np.minimum(common, psi[-1])
+    beyond = common - inside
+    work = curve.antiderivative()
+    at_end = float(curve(psi[-1]))
+    energy = work(inside) + beyond * (at_end + 0.5 * slope * beyond)
+    return np.asarray(energy), np.asarray(curve(inside) + slope * beyond)
