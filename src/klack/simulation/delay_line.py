@@ -82,11 +82,12 @@ class Lines(NamedTuple):
     first_segment : array of int, shape (n + 1,)
         The segments of a line, from a to b, are ``first_segment[line] : first_segment[line + 1]``.
     depth : array of int, shape (s,)
-        Samples in each ring: whole steps of the delay, plus one.
+        Samples under way in each wave: whole steps of the delay, plus one.
     fraction : array, shape (s,) [-]
         Rest of the delay, in steps.
     start : array of int, shape (s, 2)
-        Where the rings of the wave towards b (0) and towards a (1) start in the samples.
+        Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
+        twice as long as needed, the window of samples under way moves up, then back to its start.
     first_term : array of int, shape (n + 1,)
         Terms of frequency-dependent friction of each line.
     first_memory : array of int, shape (n,)
@@ -122,9 +123,9 @@ class LineState(NamedTuple):
     Parameters
     ----------
     samples : array [Pa]
-        Rings of all waves ``w``, means over fine steps.
+        All waves ``w``, means over fine steps.
     head : array of int, shape (s,)
-        Oldest sample in both rings of a segment.
+        Oldest sample under way in both waves of a segment, from its start.
     memory : array [m^3/s]
         Flows ``i_k`` of the friction terms; counted into the line at its ends, towards b inside.
     cavity : array, shape (s,) [m^3]
@@ -175,8 +176,7 @@ def compile_lines(
             whole.append(int(steps))
             fraction.append(steps - int(steps))
     depth = np.array(whole, dtype=np.int64) + 1
-    ends = np.cumsum(np.repeat(depth, 2))
-    start = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+    start = _offsets(np.repeat(2 * depth + coarse, 2))
     segments = np.array([row.segments for row in rows], dtype=np.int64)
     terms = np.array([len(row.unsteady_gain) for row in rows], dtype=np.int64)
     memories = terms * (segments + 1)
@@ -193,7 +193,7 @@ def compile_lines(
         first_segment=_offsets(segments),
         depth=depth,
         fraction=np.array(fraction, dtype=float),
-        start=np.ascontiguousarray(start, dtype=np.int64).reshape(-1, 2),
+        start=np.ascontiguousarray(start[:-1].reshape(-1, 2)),
         first_term=_offsets(terms),
         first_memory=_offsets(memories)[:-1],
         impedance_of_term=gain * -np.expm1(-durations) / durations,
@@ -201,7 +201,7 @@ def compile_lines(
         inductance=gain / rate,
     )
     state = LineState(
-        samples=np.zeros(2 * int(depth.sum())),
+        samples=np.zeros(start[-1]),
         head=np.zeros(len(depth), dtype=np.int64),
         memory=np.zeros(int(memories.sum())),
         cavity=np.zeros(len(depth)),
@@ -239,9 +239,9 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
             age = np.clip(depth - 0.5 - np.arange(depth), 0.0, delays[k])
             places = (before + age, before + delays[k] - age)
             for wave, sign in ((0, 1.0), (1, -1.0)):
-                ring = slice(lines.start[segment, wave], lines.start[segment, wave] + depth)
+                window = slice(lines.start[segment, wave], lines.start[segment, wave] + depth)
                 Z = lines.impedance[line]
-                state.samples[ring] = level + slope * places[wave] + sign * Z * Q
+                state.samples[window] = level + slope * places[wave] + sign * Z * Q
             before += delays[k]
         K = lines.first_term[line + 1] - lines.first_term[line]
         first = lines.first_memory[line]
@@ -277,47 +277,6 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _read(
-    samples: Vector, start: int, depth: int, head: int, m: int, f: float
-) -> tuple[float, float]:
-    """Mean of ``m`` delayed samples, and the sum of squares that they lose by it [Pa^2]."""
-    lost = 0.0
-    total = 0.0
-    i = head
-    before = samples[start + i]
-    for _ in range(m):
-        i += 1
-        if i == depth:
-            i = 0
-        x = samples[start + i]
-        total += f * before + (1.0 - f) * x
-        lost += (x - before) ** 2
-        before = x
-    lost *= f * (1.0 - f)
-    mean = total / m
-    i = head
-    before = samples[start + i]
-    for _ in range(m):
-        i += 1
-        if i == depth:
-            i = 0
-        x = samples[start + i]
-        lost += (f * before + (1.0 - f) * x - mean) ** 2
-        before = x
-    return mean, lost
-
-
-@njit(cache=True, error_model="numpy")
-def _write(samples: Vector, start: int, depth: int, head: int, m: int, w: float) -> None:
-    i = head
-    for _ in range(m):
-        samples[start + i] = w
-        i += 1
-        if i == depth:
-            i = 0
-
-
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _lump(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> tuple[float, float]:
     """Unsteady friction of a lump as ``offset + slope q``."""
     offset, slope = 0.0, 0.0
@@ -341,7 +300,7 @@ def _rub(
     return heat
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
     """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
 
@@ -361,18 +320,28 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
         lost = 0.0
         for s in range(s0, s1):
-            depth, head, f = lines.depth[s], state.head[s], lines.fraction[s]
-            after = head + 1 if head + 1 < depth else 0
+            f = lines.fraction[s]
             for wave in range(2):
-                start = lines.start[s, wave]
+                oldest = lines.start[s, wave] + state.head[s]
                 if m == 1:
-                    before, x = state.samples[start + head], state.samples[start + after]
+                    before, x = state.samples[oldest], state.samples[oldest + 1]
                     state.incoming[s, wave] = x + f * (before - x)
                     lost += f * (1.0 - f) * (x - before) ** 2
                 else:
-                    mean, more = _read(state.samples, start, depth, head, m, f)
-                    state.incoming[s, wave] = mean
-                    lost += more
+                    # sums about the first sample; not a function of its own, since numba then
+                    # counts references to every array in each call, ten times the work itself
+                    first = state.samples[oldest]
+                    total, spread, jumps = 0.0, 0.0, 0.0
+                    for i in range(oldest, oldest + m):
+                        x = state.samples[i + 1]
+                        jump = state.samples[i] - x
+                        y = x - first + f * jump
+                        total += y
+                        spread += y * y
+                        jumps += jump * jump
+                    mean = total / m
+                    state.incoming[s, wave] = first + mean
+                    lost += f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
         impedance = lines.impedance[line]
         state.scatter[line] = lines.step / (4.0 * impedance) * lost
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
@@ -389,7 +358,7 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
             Z[b] += 0.5 * slope
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
 def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matrix) -> None:
     """Finish the step that :func:`lines_incoming` began: send the waves, move on by ``m`` steps.
 
@@ -421,7 +390,9 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         collapse = 0.0
         for s in range(s0, s1):
             depth, head = lines.depth[s], state.head[s]
-            _write(state.samples, lines.start[s, 0], depth, head, m, out)
+            newest = lines.start[s, 0] + head + depth
+            for i in range(newest, newest + m):
+                state.samples[i] = out
             if s + 1 == s1:
                 back = state.incoming[s, 0] + 2.0 * Z * q_b
             else:
@@ -442,9 +413,16 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
                     state.cavity[s] = V1
                 back = left - 2.0 * Z * (Q + dQ)
                 out = right + 2.0 * Z * (Q - dQ)
-            _write(state.samples, lines.start[s, 1], depth, head, m, back)
-            head += m
-            state.head[s] = head - depth if head >= depth else head
+            newest = lines.start[s, 1] + head + depth
+            for i in range(newest, newest + m):
+                state.samples[i] = back
+            state.head[s] = head + m
+            if head + m > depth:
+                for wave in range(2):
+                    start = lines.start[s, wave]
+                    for i in range(start, start + depth):
+                        state.samples[i] = state.samples[i + head + m]
+                state.head[s] = 0
         books[line, 0] += heat
         books[line, 1] += state.scatter[line]
         books[line, 2] += collapse
@@ -493,10 +471,10 @@ def line_cavity(lines: Lines, state: LineState, line: int) -> float:
 @njit(cache=True, error_model="numpy")
 def _held(lines: Lines, state: LineState, segment: int, wave: int, power: int) -> float:
     """Sum of the samples, or of their squares, that are still under way."""
-    start, depth = lines.start[segment, wave], lines.depth[segment]
+    oldest = lines.start[segment, wave] + state.head[segment]
     total = 0.0
-    for i in range(depth):
-        share = lines.fraction[segment] if i == state.head[segment] else 1.0
-        x = state.samples[start + i]
+    for i in range(oldest, oldest + lines.depth[segment]):
+        share = lines.fraction[segment] if i == oldest else 1.0
+        x = state.samples[i]
         total += share * x if power == 1 else share * x * x
     return total
