@@ -18,6 +18,7 @@ GROUPS = (
     "spectra",
     "mechanics",
     "fluids",
+    "hydraulics",
     "films",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
