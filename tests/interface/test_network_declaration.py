@@ -1,5 +1,6 @@
 """The section ``network`` of a case file, and the catalogue behind it."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
+from ruamel.yaml import YAML
 
 import klack
 from klack.errors import InputError
@@ -236,3 +238,13 @@ def test_the_json_schema_describes_every_type():
 def test_an_unknown_type_lists_what_there_is():
     with pytest.raises(InputError, match="one of: rigid-mass, flexible-body, spring"):
         component_class("valve")
+
+
+def test_the_network_of_the_theory_page_can_be_computed():
+    page = Path(klack.__file__).parents[2] / "docs" / "theory" / "network.md"
+    (text,) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
+    section = YAML(typ="safe").load(text)["network"]
+
+    rows = NetworkSection.model_validate(section, context=IN_A_FILE).network().rows()
+
+    assert len(rows.bodies) == len(rows.interfaces) == len(rows.walls) == len(rows.branches) == 1
