@@ -128,7 +128,8 @@ class FluxMap:
                 [h * self.current[part], h * d * self.mixed[part]],
             ]
         )
-        return _HERMITE @ corner @ _HERMITE.T
+        cell: Vector = _HERMITE @ corner @ _HERMITE.T
+        return cell
 
     def _evaluate(self, linkage: float, gap: float) -> tuple[float, float, float]:
         """``W`` and its two derivatives; straight on beyond the grid."""

@@ -20,6 +20,7 @@ GROUPS = (
     "fluids",
     "hydraulics",
     "films",
+    "magnetics",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
 
