@@ -157,8 +157,8 @@ def solve_interface(
     theta = 0.5
     S, base = G, g_free
     if series > 0.0:
-        if z0 > 0.0 or (not filmed and z0 >= 0.0):
-            theta = _relaxing(filmed, cubic, linear, cut_off, h, series, z0, g_free - e0)
+        if filmed and z0 > 0.0:
+            theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
         S = G + series / theta
         base = g_free - (1.0 - theta) / theta * e0
     if filmed:
@@ -183,7 +183,7 @@ def solve_interface(
         contact, hint = _contact_alone(
             kind, law_data, law_start, chi_over_h, S, z0, base, guess, hint
         )
-        if contact == 0.0 and e0 != 0.0 and theta < 1.0:  # clipped damping: let e vanish
+        if contact == 0.0 and e0 != 0.0:  # released
             theta = 1.0
             contact, hint = _contact_alone(
                 kind, law_data, law_start, chi_over_h, G + series, z0, g_free, 0.0, hint
@@ -206,7 +206,6 @@ def solve_interface(
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _relaxing(
-    filmed: bool,
     cubic: float,
     linear: float,
     cut_off: float,
@@ -215,9 +214,7 @@ def _relaxing(
     z0: float,
     reach: float,
 ) -> float:
-    """``theta`` of a step that starts open; falls to 1/2 where the step closes most of the gap."""
-    if not filmed:
-        return 1.0 if reach >= 0.0 else 0.5
+    """``theta`` of a step that starts open in a film; 1/2 where the step closes the gap."""
     x0 = z0 + cut_off
     damping = (cubic / (x0 * x0) + linear) / x0
     most = 0.5 - series * damping / h
