@@ -39,7 +39,15 @@ from klack.magnetics.flux_kernel import (
     linked,
     stack,
 )
-from klack.magnetics.flux_table import MOST_TUBES, circuit_numbers
+from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.flux_table import MAP, MOST_TUBES, circuit_numbers
+from klack.magnetics.map_kernel import (
+    map_current,
+    map_energy,
+    map_force,
+    map_numbers,
+    map_step,
+)
 from klack.magnetics.quiet_step import DIODE, FRONT, quiet_step
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
@@ -81,8 +89,48 @@ _MOST_EVENTS = 30
 _LOCATED = 1e-12
 _FRONT, _DIODE = FRONT, DIODE
 _NONE, _BLOCKS = -1, -2
-_CIRCUIT = 0.0
+_MAP = MAP
 _HEADER = 8
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _gaps(
+    par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
+) -> None:
+    """Prepare what a piece needs to know of its gaps; of a map just the gaps themselves."""
+    if par[at + _MAP] != 0.0:
+        middle[0], end[0], slope[0] = x0, x1, 0.0
+    else:
+        circuit_gaps(par, at, hints, x0, x1, middle, end, slope)
+
+
+@njit(cache=True, error_model="numpy")
+def _advance(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    middle: Any,
+    end: Any,
+    per_time: float,
+    voltage: float,
+    conducts: bool,
+) -> bool:
+    """Find the change of the fluxes over a piece."""
+    if par[at + _MAP] != 0.0:
+        return map_step(
+            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[7], conducts
+        )
+    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[7], conducts)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
+    """Return the current at the end of a piece [A]."""
+    if par[at + _MAP] != 0.0:
+        return map_current(par, at, phi[0] + change[0], end[0])
+    return circuit_current(par, at, hints, phi, change, end)
 
 
 @njit(cache=True, error_model="numpy")
@@ -117,10 +165,10 @@ def _locate(
         for j in range(loops):
             change[j] *= guess / size
         size = guess
-        circuit_gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
-        if not circuit_step(par, at, hints, phi, change, middle, 1.0 / size, voltage, par[7], True):
+        _gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
+        if not _advance(par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True):
             return -1.0
-        f = circuit_current(par, at, hints, phi, change, end) - target
+        f = _current(par, at, hints, phi, change, end) - target
         if abs(f) <= accepted or high - low <= _LOCATED * length:
             return size
         if f * f_high > 0.0:
@@ -198,7 +246,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
     if h <= 0.0:
-        circuit_gaps(par, at, hints, x0, x0, middle, final, slope)
+        _gaps(par, at, hints, x0, x0, middle, final, slope)
     while done < h:
         now = t + done
         block = state_block(par, drive, int(mode))
@@ -224,24 +272,20 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         ahead = 0.5 * (last + piece)
         for j in range(loops):
             change[j] = piece * (rate[j] + bend[j] * ahead)
-        circuit_gaps(par, at, hints, xa, xb, middle, final, slope)
-        if not circuit_step(
-            par, at, hints, phi, change, middle, per_time, voltage, par[7], not is_open
-        ):
+        _gaps(par, at, hints, xa, xb, middle, final, slope)
+        if not _advance(par, at, hints, phi, change, middle, final, per_time, voltage, not is_open):
             return 1
         through = linked(par, at, change)
         if is_open and not blocked and voltage > through * per_time + _DIODE:
             is_open = False
             last = 0.0
-            if not circuit_step(
-                par, at, hints, phi, change, middle, per_time, voltage, par[7], True
-            ):
+            if not _advance(par, at, hints, phi, change, middle, final, per_time, voltage, True):
                 return 1
             through = linked(par, at, change)
         end = 0.0
         which = _NONE
         if not is_open:
-            end = circuit_current(par, at, hints, phi, change, final)
+            end = _current(par, at, hints, phi, change, final)
             target, which = _crossing(par, block, current, end)
             if which != _NONE:
                 if which == _BLOCKS and current <= 0.0:
@@ -260,7 +304,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 whole = False
                 xb = xa + speed * piece
                 end = target
-                circuit_gaps(par, at, hints, xa, xb, middle, final, slope)
+                _gaps(par, at, hints, xa, xb, middle, final, slope)
                 through = linked(par, at, change)
             mean = (voltage - through * per_time) * par[7]
             supply += voltage * mean * piece
@@ -269,6 +313,8 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         else:
             pulse += through
         loss, force = circuit_loss_and_force(par, at, phi, change, slope)
+        if par[at + _MAP] != 0.0:
+            force = map_force(par, at, phi[0], change[0], middle[0], final[0])
         eddy += loss * per_time
         push += force * piece
         curve = 0.0
@@ -296,7 +342,10 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 return 2
 
     force = push * per_step
-    energy = circuit_energy(par, at, hints, phi, final)
+    if par[at + _MAP] != 0.0:
+        energy = map_energy(par, at, phi[0], final[0])
+    else:
+        energy = circuit_energy(par, at, hints, phi, final)
     out[0] = par[3] * force
     out[1] = -par[3] * force
     out[2], out[3], out[4], out[5] = mode, entered, cycle, 1.0 if is_open else 0.0
@@ -315,7 +364,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
 
 
 def flux_numbers(
-    circuit: MagneticCircuit,
+    plant: MagneticCircuit | FluxMap,
     *,
     resistance: float,
     driver: DriveProgram,
@@ -324,12 +373,12 @@ def flux_numbers(
 ) -> NDArray[np.float64]:
     """Parameters of :func:`magnet_step`; see :func:`flux_rows`."""
     require_positive("coil resistance", resistance, "ohm")
-    plant, program = circuit_numbers(circuit), driver.numbers()
-    direction = -1.0 if closing else 1.0
-    size = _FRONT + 3 * int(plant[0]) + 2 * int(plant[1])
-    head = [_CIRCUIT, resistance, gap, direction, _HEADER, _HEADER + plant.size, size, 0.0]
-    head[7] = 1.0 / resistance
-    return np.concatenate((head, plant, program))
+    numbers = map_numbers(plant) if isinstance(plant, FluxMap) else circuit_numbers(plant)
+    program = driver.numbers()
+    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1])
+    head = [0.0, resistance, gap, -1.0 if closing else 1.0]
+    head += [_HEADER, _HEADER + numbers.size, size, 1.0 / resistance]
+    return np.concatenate((head, numbers, program))
 
 
 def flux_state(parameters: NDArray[np.float64], fluxes: ArrayLike = ()) -> NDArray[np.float64]:
@@ -343,7 +392,7 @@ def flux_state(parameters: NDArray[np.float64], fluxes: ArrayLike = ()) -> NDArr
 
 def flux_rows(
     rows: Rows,
-    circuit: MagneticCircuit,
+    plant: MagneticCircuit | FluxMap,
     *,
     resistance: float,
     driver: DriveProgram,
@@ -358,23 +407,27 @@ def flux_rows(
     Parameters
     ----------
     rows : Rows
-    circuit : MagneticCircuit
+    plant : MagneticCircuit or FluxMap
+        Of a map, the recorded flux is the linkage.
     resistance : float [ohm]
         Of coil and harness, at temperature.
     driver : DriveProgram
         For example ``driver_of(rows, "terminals")``.
     gap : float [m]
-        Working gap ``x`` of the circuit while both ports are at rest.
+        Working gap ``x`` of circuit or map while both ports are at rest.
     closing : bool
         Whether the gap closes as the armature moves along +z (away from the base).
     armature, base : int
         Mechanical ports, perhaps :data:`klack.network.rows.GROUND`.
     fluxes : array, shape (n_loops,) [Wb]
         Loop fluxes at the start, at zero current: remanence.
+
+    Raises
+    ------
+    InputError
+        If the circuit has no leakage path without eddy currents, or too many different fluxes.
     """
-    parameters = flux_numbers(
-        circuit, resistance=resistance, driver=driver, gap=gap, closing=closing
-    )
+    parameters = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap, closing=closing)
     rows.element(
         magnet_step,
         ports=(armature, base),

@@ -21,12 +21,15 @@ from klack.errors import InputError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
 
-__all__ = ["BRANCH_SIZE", "HEADER", "MOST_TUBES", "circuit_numbers", "current_weights"]
+__all__ = ["BRANCH_SIZE", "HEADER", "MAP", "MOST_TUBES", "circuit_numbers", "current_weights"]
 
 Vector = NDArray[np.float64]
 
 HEADER = 12
 """Numbers in front of a plant; see :func:`circuit_numbers`."""
+
+MAP = 7
+"""Number of the header that says that a map follows instead of a circuit."""
 
 BRANCH_SIZE = 8
 """Numbers of a branch in front of its row of loops."""
@@ -89,7 +92,7 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
 
     ``[loops, tubes, most iterations (1 if linear), main tube, sign of its flux, accepted change of
-    a loop flux, whether two loops share one gap, 5 spare]``,
+    a loop flux, whether two loops share one gap, whether it is a map, 4 spare]``,
     the turns of each loop, then per tube ``eddy, reluctance, remanence, gap table, iron table,
     weight in the current, 2 spare`` and its row of loops, then the tables.  Offsets of
     tables count from the start; 0 says that there is none.
