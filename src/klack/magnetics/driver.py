@@ -17,19 +17,31 @@ harness to the resistance of the coil).
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
 
 from klack.errors import InputError
+from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.network.port import VOLTAGE, Port
 from klack.network.rows import Rows
+from klack.units import Time, Voltage
 
-__all__ = ["DriveProgram", "DriveState", "Driver", "Switch", "VoltageCourse", "When", "driver_of"]
+__all__ = [
+    "DriveProgram",
+    "DriveState",
+    "Driver",
+    "Switch",
+    "TimedDriver",
+    "VoltageCourse",
+    "When",
+    "driver_of",
+]
 
 
 class When(IntEnum):
@@ -200,6 +212,61 @@ class Driver(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add nothing: the coil runs the program."""
+
+
+class TimedDriver(Driver):
+    """A driver that works from ``start`` to ``end``, perhaps again and again.
+
+    Before and after, the coil sees the decay voltage against its current through a diode: what
+    flows comes down fast, and then the coil is open.
+    """
+
+    start: Time = Field(default=0.0, ge=0, description="When the driver begins to work.")
+    end: Time | None = Field(default=None, gt=0, description="When it lets go; never if left out.")
+    repeat_every: Time | None = Field(
+        default=None, gt=0, description="Period after which all begins again; once if left out."
+    )
+    freewheel: Voltage = Field(
+        default=0.7, ge=0, description="Forward voltage of the diode while the coil freewheels."
+    )
+    decay: Voltage | None = Field(
+        default=None,
+        ge=0,
+        description="Voltage against the current after the end (zener diode, boost capacitor); "
+        "that of freewheeling if left out.",
+    )
+
+    @model_validator(mode="after")
+    def _order_of_times(self) -> Self:
+        if self.end is not None and not self.end > self.start:
+            raise CaseProblem(
+                ("end",),
+                got=f"an end at {self.end:g} s",
+                expected=f"a time after the start at {self.start:g} s",
+                hint="times count from the start of the run.",
+            )
+        if self.repeat_every is not None and (self.end is None or self.repeat_every < self.end):
+            raise CaseProblem(
+                ("repeat_every",),
+                got=f"a period of {self.repeat_every:g} s",
+                expected="an end, and a period that is not shorter",
+                hint="give 'end', or a longer period.",
+            )
+        return self
+
+    def framed(self, *working: DriveState) -> DriveProgram:
+        """Program of the working states, the first one entered at ``start``, with both ends."""
+        down = -(self.freewheel if self.decay is None else self.decay)
+        states = [DriveState("idle", down, (Switch(When.TIME, self.start, working[0].name),))]
+        for state in working:
+            end = () if self.end is None else (Switch(When.TIME, self.end, "off"),)
+            states.append(replace(state, switches=(*end, *state.switches)))
+        if self.end is not None:
+            again: tuple[Switch, ...] = ()
+            if self.repeat_every is not None:
+                again = (Switch(When.TIME, self.repeat_every, "idle", new_cycle=True),)
+            states.append(DriveState("off", down, again))
+        return DriveProgram(tuple(states))
 
 
 def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:

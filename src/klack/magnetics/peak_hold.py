@@ -1,0 +1,101 @@
+"""Peak and hold: the usual driver of an injector."""
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from klack.input.problem import CaseProblem
+from klack.magnetics.driver import DriveProgram, DriveState, Switch, TimedDriver, When
+from klack.units import Current, Time, Voltage
+
+__all__ = ["PeakHold"]
+
+
+class PeakHold(TimedDriver):
+    """Boost to a peak current, then hold a lower one by two-point control.
+
+    =============  ===================  ======================================================
+    state          voltage              until
+    =============  ===================  ======================================================
+    boost          boost                the peak current
+    peak-off, -on  freewheel, supply    ``peak_until``: two-point control below the peak
+    fall           freewheel or decay   the current is down in the band of the hold
+    hold-on, -off  supply, freewheel    ``end``: two-point control around the hold current
+    off            decay                the current is zero; then the coil is open
+    =============  ===================  ======================================================
+
+    Usual values: direct injection 50 to 65 V to 8 to 15 A, hold 2 to 4 A, band 0.5 to 1 A.
+    """
+
+    type: ClassVar[str] = "peak-hold"
+
+    boost_voltage: Voltage = Field(gt=0, description="Until the peak current is reached.")
+    peak_current: Current = Field(gt=0, description="Where the boost ends.")
+    supply_voltage: Voltage = Field(gt=0, description="For holding (battery).")
+    hold_current: Current = Field(gt=0, description="Middle of the band that is held.")
+    hold_band: Current = Field(gt=0, description="Upper less lower current of the hold.")
+    peak_until: Time | None = Field(
+        default=None,
+        gt=0,
+        description="Until when the peak is held, in a band below it as wide as that of the hold; "
+        "not held if left out.",
+    )
+    fall: Literal["freewheel", "decay"] = Field(
+        default="freewheel", description="Voltage against the current from peak to hold."
+    )
+
+    @model_validator(mode="after")
+    def _order_of_currents(self) -> Self:
+        if not self.hold_band < 2.0 * self.hold_current:
+            raise CaseProblem(
+                ("hold_band",),
+                got=f"{self.hold_band:g} A",
+                expected="less than twice the hold current",
+                hint="0.5 to 1 A is usual.",
+            )
+        if not self.hold_current + 0.5 * self.hold_band < self.peak_current:
+            raise CaseProblem(
+                ("peak_current",),
+                got=f"{self.peak_current:g} A",
+                expected="a current above the band of the hold",
+                hint="a driver without a peak is 'two-point'.",
+            )
+        inside = self.peak_until is None or (
+            self.start < self.peak_until and (self.end is None or self.peak_until < self.end)
+        )
+        if not inside:
+            raise CaseProblem(
+                ("peak_until",),
+                got=f"{self.peak_until:g} s",
+                expected="a time between start and end",
+                hint="times count from the start of the run.",
+            )
+        return self
+
+    def program(self) -> DriveProgram:
+        """States idle, boost, peak, fall, hold, off."""
+        upper = self.hold_current + 0.5 * self.hold_band
+        lower = self.hold_current - 0.5 * self.hold_band
+        down = -self.freewheel
+        against = self.freewheel if self.fall == "freewheel" or self.decay is None else self.decay
+        working = [DriveState("fall", -against, (Switch(When.CURRENT_BELOW, upper, "hold-off"),))]
+        after = "fall"
+        if self.peak_until is not None:
+            leave = Switch(When.TIME, self.peak_until, "fall")
+            least = Switch(When.CURRENT_BELOW, self.peak_current - self.hold_band, "peak-on")
+            most = Switch(When.CURRENT_ABOVE, self.peak_current, "peak-off")
+            working.append(DriveState("peak-off", down, (leave, least)))
+            working.append(DriveState("peak-on", self.supply_voltage, (leave, most)))
+            after = "peak-off"
+        hold_off = Switch(When.CURRENT_BELOW, lower, "hold-on")
+        hold_on = Switch(When.CURRENT_ABOVE, upper, "hold-off")
+        return self.framed(
+            DriveState(
+                "boost",
+                self.boost_voltage,
+                (Switch(When.CURRENT_ABOVE, self.peak_current, after),),
+            ),
+            *working,
+            DriveState("hold-off", down, (hold_off,)),
+            DriveState("hold-on", self.supply_voltage, (hold_on,)),
+        )
