@@ -42,8 +42,8 @@ class Line(Component):
     a few per cent, free gas by far more); laminar friction, which fits transients of ms from rest
     also above Re = 2300; bends and fittings belong into an orifice.  A line needs a chamber or a
     pressure at each end; a tiny chamber closes it.
-    Sources: Wylie & Streeter 1993, ch. 3 and 8; Krus et al. (transmission-line modelling); Kagawa
-    et al. 1983; wall: Wylie & Streeter 1993, eq. 1.21 for a thin wall free to stretch along its axis.
+    Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
+    Krus et al. (transmission-line modelling); Kagawa et al. 1983.
     """
 
     type: ClassVar[str] = "line"

@@ -19,6 +19,7 @@ GROUPS = (
     "mechanics",
     "fluids",
     "hydraulics",
+    "lines",
     "films",
     "magnetics",
 )

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.hydraulics.line_friction import ExponentialWeights
 from klack.network.rows import LineRow
 from klack.simulation.delay_line import (
     Lines,
@@ -19,7 +20,15 @@ from klack.simulation.delay_line import (
     start_lines,
 )
 
-__all__ = ["End", "LineRun", "laminar_decay", "plain_line", "run_line"]
+__all__ = [
+    "End",
+    "LineRun",
+    "exponential_decay",
+    "laminar_decay",
+    "plain_line",
+    "ringing",
+    "run_line",
+]
 
 Vector = NDArray[np.float64]
 
@@ -157,7 +166,7 @@ def run_line(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _march(
     lines: Lines,
     state: LineState,
@@ -198,3 +207,37 @@ def laminar_decay(*, delay: float, radius: float, kinematic_viscosity: float) ->
         z = radius * np.sqrt(s / kinematic_viscosity)
         s = 0.5j * np.pi / delay * np.sqrt(ive(2, z) / ive(0, z))
     return complex(s)
+
+
+def exponential_decay(
+    weights: ExponentialWeights, *, delay: float, radius: float, kinematic_viscosity: float
+) -> complex:
+    """Give the root of :func:`laminar_decay` for friction by ``weights`` spread along the line."""
+    unit = kinematic_viscosity / radius**2
+    factors, rates = np.array(weights.factors), unit * np.array(weights.rates)
+    s = complex(-1.0, np.pi / (2.0 * delay))
+    for _ in range(200):
+        friction = 8.0 * unit * (1.0 + 0.5 * np.sum(factors * s / (s + rates)))
+        s = 0.5j * np.pi / delay / np.sqrt(1.0 + friction / s)
+    return complex(s)
+
+
+def ringing(time: Vector, values: Vector, frequency: float, *, apart: float) -> complex:
+    """Decay [1/s] and angular frequency [rad/s] of one tone, from two windows of 16 periods.
+
+    Parameters
+    ----------
+    time, values : array, shape (n,)
+        Evenly spaced.
+    frequency : float [Hz]
+        About that of the tone; others are suppressed by the window.
+    apart : float [s]
+        Distance of the windows; the later one ends with the record.
+    """
+    step = time[1] - time[0]
+    size, shift = round(16 / frequency / step), round(apart / step)
+    tone = np.blackman(size) * np.exp(-2j * np.pi * frequency * step * np.arange(size))
+    first = len(values) - size - shift
+    early, late = (tone @ values[i : i + size] for i in (first, first + shift))
+    turned = np.log(late / early * np.exp(-2j * np.pi * frequency * shift * step))
+    return complex(turned / (shift * step) + 2j * np.pi * frequency)
