@@ -25,12 +25,15 @@ from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.mixture import LOWEST_PRESSURE
 
-__all__ = ["HIGHEST_PRESSURE", "fluid_at", "fluid_table"]
+__all__ = ["HIGHEST_PRESSURE", "fluid_at", "fluid_table", "pressure_at"]
 
 HIGHEST_PRESSURE = 4e8
 """Absolute pressure [Pa] up to which tables reach; beyond it the density goes on as a line."""
 
 _ROW = 8
+_TRACE = 1e-9  # [kg/m^3]
+_MOST_NEWTON = 60
+_SETTLED = 1e-15  # last step of an inversion over the pressure
 _THIRD, _SIXTH = 1.0 / 3.0, 1.0 / 6.0
 _ACCURACY = 1e-10  # of the specific volume, relative
 _MOST_PIECES = 20_000
@@ -184,3 +187,59 @@ def _beyond(
     rise = -slope / (v0 * v0)
     rho = 1.0 / v0 + rise * s
     return rho, rise, g0 + log1p(rise * v0 * s) / rise, place
+
+
+@njit(cache=True, error_model="numpy")
+def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
+    """Absolute pressure [Pa] at which the fluid has the density ``rho`` [kg/m^3], and its place.
+
+    Inverse of :func:`fluid_at`: Newton inside one piece, kept between its ends.  A solver that
+    looks for the pressure of a volume should take its steps in the density and come back through
+    this function where the fluid starts to boil: there the density falls by a factor of a thousand
+    within some kilopascals, and a step in pressure from one side lands far beyond the other.
+
+    Parameters
+    ----------
+    table : array
+        Of :func:`fluid_table`.
+    rho : float [kg/m^3]
+        Values of 0 and less are taken as a trace of vapour.
+    hint : int
+        As for :func:`fluid_at`; both share their places.
+    """
+    v = 1.0 / max(rho, _TRACE)
+    last = _ROW * (int(table[0]) + 1)
+    i = max(hint, _ROW)
+    while i > _ROW and v > table[i + 1]:
+        i -= _ROW
+    while i < last and v <= table[i + _ROW + 1]:
+        i += _ROW
+    p0, v0, slope = table[i], table[i + 1], table[i + 2]
+    if v > v0:  # below the first piece
+        return p0 + (v - v0) / slope, i
+    if i == last:
+        return p0 + (rho - 1.0 / v0) / (-slope / (v0 * v0)), i
+    low, high = 0.0, table[i + _ROW] - p0
+    s = high * (v - v0) / (table[i + _ROW + 1] - v0)
+    for _ in range(_MOST_NEWTON):
+        found, tangent = _volume(table, i, s)
+        if found > v:
+            low = s
+        else:
+            high = s
+        step = (v - found) / tangent
+        if abs(step) <= _SETTLED * (p0 + s):
+            return p0 + min(max(s + step, low), high), i
+        s += step
+        if not low < s < high:
+            s = 0.5 * (low + high)
+    return p0 + s, i
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _volume(table: Vector, i: int, s: float) -> tuple[float, float]:
+    """Specific volume and its slope in the piece at offset ``i``."""
+    c1, c2, c3, c4, c5 = table[i + 2], table[i + 3], table[i + 4], table[i + 5], table[i + 6]
+    v = table[i + 1] + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+    return v, slope
