@@ -37,6 +37,11 @@ COMPONENTS = (
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),
     # magnetics and drivers
+    ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
+    ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),
+    ("two-point", "klack.magnetics.two_point.TwoPoint"),
+    ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
+    ("pwm", "klack.magnetics.pwm.PulseWidth"),
 )
 """Type word and dotted path of the class, for each component type."""
 
