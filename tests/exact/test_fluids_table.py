@@ -127,7 +127,9 @@ def test_steps_in_density_find_the_pressure_of_a_volume_that_starts_or_stops_to_
         mass = fluid_at(table, p, 0)[0]  # of 1 m^3
         volume = 1.0 + 10.0 ** random.uniform(-6.0, -1.5) * random.choice([-1.0, 1.0])
         outflow = random.choice([0.0, 7e-7]) * 10.0 ** random.uniform(-3.0, 2.0)
-        for count in range(1, 60):
+        count = 0
+        while count < 60:
+            count += 1
             rho, slope, _, hint = fluid_at(table, p, hint)
             missing = mass - volume * rho - outflow * (p - 5e5)
             before = p
