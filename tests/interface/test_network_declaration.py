@@ -191,6 +191,13 @@ def test_every_registered_type_is_documented(word):
         assert field.description, f"{word}.{name}"
 
 
+def test_every_word_stands_for_one_class():
+    words, paths = zip(*COMPONENTS, strict=True)
+
+    assert sorted(set(words)) == sorted(words)
+    assert sorted(set(paths)) == sorted(paths)
+
+
 def test_every_component_of_the_domains_is_registered():
     registered = {path for _, path in COMPONENTS}
     existing = set()

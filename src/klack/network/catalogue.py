@@ -24,7 +24,6 @@ COMPONENTS = (
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
     ("end-stop", "klack.mechanics.end_stop.EndStop"),
-    ("end-stop", "klack.mechanics.end_stop.EndStop"),
     # hydraulics
     ("chamber", "klack.hydraulics.chamber.Chamber"),
     ("pressure-source", "klack.hydraulics.pressure_source.PressureSource"),
