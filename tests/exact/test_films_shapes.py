@@ -80,11 +80,14 @@ def test_cone_does_the_work_that_the_fluid_dissipates(degrees):
     assert (cubic / axial**3 + linear / axial) * V**2 == pytest.approx(dissipated, rel=1e-6)
 
 
-def test_flow_factor_of_patir_and_cheng():
-    """Their table of the isotropic surface: 0.48 at h/sigma = 1, 0.94 at 5 (plot, 2 digits)."""
-    assert flow_factor(1.0) == pytest.approx(0.486, abs=1e-3)
-    assert flow_factor(5.0) == pytest.approx(0.945, abs=1e-3)
+def test_flow_factor_rises_from_a_tenth_to_one():
+    """The fit itself: 0.1 at h = 0, half the defect per 1.24 sigma, 1 far away."""
+    half = np.log(2.0) / 0.56
+
+    assert flow_factor(0.0) == pytest.approx(0.1)
+    assert 1.0 - flow_factor(2.0 + half) == pytest.approx(0.5 * (1.0 - flow_factor(2.0)))
     assert flow_factor(3.0) < mean_flow_factor(3.0) < 1.0
+    assert mean_flow_factor(1e4) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_rough_film_has_the_impulse_of_the_height_dependent_factor():

@@ -26,19 +26,19 @@ __all__ = [
 
 SMOOTH_CUT_OFF = 0.3e-6  # [m]
 _CUT_OFF_HEIGHTS = 3.0  # asperities begin to touch at three times the roughness
-_LOWEST_HEIGHTS = 0.5  # the flow factor was fitted down to here
+_LOWEST_HEIGHTS = 0.5  # the flow factor is a fit above it
 
 
 def flow_factor(height: float) -> float:
     r"""Pressure flow factor of an isotropic rough gap, ``phi = 1 - 0.9 exp(-0.56 h/sigma)``.
 
-    The share of the flow of a smooth gap of the same mean height (Patir and Cheng 1978, eq. 12 and
-    table 1 for gamma = 1).
+    The share of the flow of a smooth gap of the same mean height (Patir and Cheng 1978, for
+    surfaces without a direction).
 
     Parameters
     ----------
     height : float [-]
-        Gap over composite roughness, ``h/sigma``; fitted above 0.5.
+        Gap over composite roughness, ``h/sigma``; a fit for about 0.5 and above.
     """
     return 1.0 - 0.9 * exp(-0.56 * height)
 
