@@ -36,6 +36,7 @@ COMPONENTS = (
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),
     # magnetics and drivers
+    ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
     ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
