@@ -40,7 +40,16 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-__all__ = ["STEP", "StepFunction", "evaluate", "pointer", "python_step", "step_function"]
+__all__ = [
+    "STEP",
+    "StepFunction",
+    "evaluate",
+    "first",
+    "pointer",
+    "python_step",
+    "shift",
+    "step_function",
+]
 
 _POINTER = types.CPointer(types.float64)
 STEP = types.int64(_POINTER, _POINTER, _POINTER, _POINTER)
@@ -71,6 +80,31 @@ def pointer(typingctx: Any, array: Any, offset: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         view = context.make_array(sig.args[0])(context, builder, args[0])
         return builder.gep(view.data, [args[1]])
+
+    return signature, codegen
+
+
+@intrinsic
+def first(typingctx: Any, array: Any) -> Any:
+    """Pointer to the first number of a contiguous array, in compiled code.
+
+    Indexing it costs one load: no bounds, no negative indices, no strides.
+    """
+    signature = types.CPointer(array.dtype)(array)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.make_array(sig.args[0])(context, builder, args[0]).data
+
+    return signature, codegen
+
+
+@intrinsic
+def shift(typingctx: Any, start: Any, offset: Any) -> Any:
+    """Pointer ``offset`` numbers further on, in compiled code."""
+    signature = start(start, offset)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.gep(args[0], [args[1]])
 
     return signature, codegen
 

@@ -24,7 +24,8 @@ def impact_events(
     """Find the impacts on all interfaces, in order of time.
 
     Contacts that follow each other within the longest period of the two bodies are one impact.  A
-    contact that is closed at the start is none.
+    contact that is closed at the start is none.  A film acts before the first touch and after the
+    last one: the speeds are the highest ones while it presses, and while it pulls.
     """
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     events: list[ImpactEvent] = []
@@ -88,9 +89,14 @@ def _of_interface(
         if begin[first] <= time[0] + record.step[starts[first]]:
             continue  # closed from the start
         t0, t1 = begin[first], stop[last]
-        window = slice(_film_start(record, starts[first]), ends[last])
-        before = _at(t0, time, gap_rate, earlier=True)
-        after = _at(t1, time, gap_rate, earlier=False) if np.isfinite(t1) else np.nan
+        window = slice(_film_start(record, starts[first]), _film_end(record, ends[last]))
+        felt = record.time[window.start]
+        let_go = record.time[window.stop - 1] + record.step[window.stop - 1]
+        before = -max(_fastest(felt, t0, time, -gap_rate), -_at(t0, time, gap_rate, earlier=True))
+        after = np.nan
+        if np.isfinite(t1):
+            leaving = _at(t1, time, gap_rate, earlier=False)
+            after = max(_fastest(t1, let_go, time, gap_rate), leaving)
         force, steps = total[window], record.step[window]
         peak = int(np.argmax(force))
         closed_steps = np.concatenate(
@@ -139,6 +145,23 @@ def _clusters(begin: Vector, stop: Vector, within: float) -> list[tuple[int, int
         else:
             groups.append([i, i])
     return [(a, b) for a, b in groups]
+
+
+def _fastest(begin: float, end: float, time: Vector, speed: Vector) -> float:
+    """Highest speed in the records between two times; -infinity without any."""
+    first, last = np.searchsorted(time, (begin, end))
+    return float(np.max(speed[first:last], initial=-np.inf))
+
+
+def _film_end(record: InterfaceRecord, end: int) -> int:
+    """First step after ``end`` that no longer feels the film that follows the contact."""
+    i = end
+    while i < len(record.time):
+        gapless = record.time[i] - record.time[i - 1] < 1.5 * record.step[i - 1]
+        if not gapless or record.contact_force[i] > 0.0 or record.film_force[i] >= 0.0:
+            break
+        i += 1
+    return i
 
 
 def _film_start(record: InterfaceRecord, first: int) -> int:

@@ -145,7 +145,7 @@ def watch(W: Any, n: int, of: int, row: int) -> float:
 
 
 @njit(cache=True)
-def _modal_force(W: Any, n: int, F: Vector, port0: int, port1: int) -> None:
+def _modal_force(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     for i in range(n):
         W[10 * _N + i] = 0.0
     for p in range(port0, port1):
@@ -153,7 +153,7 @@ def _modal_force(W: Any, n: int, F: Vector, port0: int, port1: int) -> None:
 
 
 @njit(cache=True)
-def advance(W: Any, n: int, F: Vector, port0: int, port1: int, y: Vector) -> None:
+def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
     """Advance one block.
 
     Parameters
@@ -193,7 +193,7 @@ def advance(W: Any, n: int, F: Vector, port0: int, port1: int, y: Vector) -> Non
 
 
 @njit(cache=True, fastmath=FAST)
-def apply_forces(W: Any, n: int, F: Vector, port0: int, port1: int) -> None:
+def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     """Bring the forces of the last step into the state: ``q += B1 f``, ``v += B2 f``."""
     _modal_force(W, n, F, port0, port1)
     for i in range(n):

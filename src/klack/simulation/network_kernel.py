@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at
-from klack.network.step_function import pointer
+from klack.network.step_function import first, pointer, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.modal_step import ROW, advance, apply_forces, watch
@@ -228,29 +228,28 @@ def _table(time: Vector, value: Vector, first: int, last: int, t: float) -> floa
 
 
 @njit(cache=True)
-def _solve(A: Matrix, r: Vector, n: int) -> None:
-    """Gauss without pivoting: the matrix is diagonally dominant."""
+def _solve(A: Any, r: Any, n: int) -> None:
+    """Gauss without pivoting, ``A`` row by row: the matrix is diagonally dominant."""
     for k in range(n):
         for i in range(k + 1, n):
-            if A[i, k] != 0.0:
-                c = A[i, k] / A[k, k]
+            if A[i * n + k] != 0.0:
+                c = A[i * n + k] / A[k * n + k]
                 for j in range(k + 1, n):
-                    A[i, j] -= c * A[k, j]
+                    A[i * n + j] -= c * A[k * n + j]
                 r[i] -= c * r[k]
     for k in range(n - 1, -1, -1):
         for j in range(k + 1, n):
-            r[k] -= A[k, j] * r[j]
-        r[k] /= A[k, k]
+            r[k] -= A[k * n + j] * r[j]
+        r[k] /= A[k * n + k]
 
 
 @njit(cache=True)
-def _move(
-    y1: Vector, free: Vector, G: Cube, level: int, F: Vector, B_first: Index, B_last: Index
-) -> None:
-    for p in range(free.size - 1):
+def _move(y1: Any, free: Any, G: Any, F: Any, body_first: Any, body_last: Any, ports: int) -> None:
+    """Displacements at the end of a step; ``G`` of its level, row by row."""
+    for p in range(ports):
         total = free[p]
-        for j in range(B_first[p], B_last[p]):
-            total += G[level, p, j] * F[j]
+        for j in range(body_first[p], body_last[p]):
+            total += G[p * ports + j] * F[j]
         y1[p] = total
 
 
@@ -288,116 +287,141 @@ def run_network(
     bodies moves: the static start.
     """
     at_ports, at_interfaces, at_nodes = scratch.ports, scratch.interfaces, scratch.nodes
-    at_branches, at_ends, A, sums = scratch.branches, scratch.ends, scratch.matrix, scratch.sums
-    # taken out of their tuples once: each access inside the loop would count references
-    body_G = bodies.G
-    body_before = bodies.before
+    at_branches, at_ends = scratch.branches, scratch.ends
+    A, sums = first(scratch.matrix), first(scratch.sums)
+    # pointers, because every access to an array checks for a negative index and loads a stride
+    body_G = first(bodies.G)
+    body_before = first(bodies.before)
     body_coarse = bodies.coarse
     body_fine = bodies.fine
-    body_first = bodies.first
-    body_force = bodies.force
-    body_last = bodies.last
+    body_first = first(bodies.first)
+    body_force = first(bodies.force)
+    body_last = first(bodies.last)
     body_modes = bodies.modes
-    body_port0 = bodies.port0
-    body_port1 = bodies.port1
+    body_port0 = first(bodies.port0)
+    body_port1 = first(bodies.port1)
     body_start = bodies.start
-    body_work = bodies.work
-    body_y = bodies.y
-    element_book0 = elements.book0
-    element_books = elements.books
-    element_function = elements.function
-    element_input0 = elements.input0
-    element_inputs = elements.inputs
-    element_output0 = elements.output0
-    element_outputs = elements.outputs
-    element_parameter0 = elements.parameter0
-    element_parameters = elements.parameters
-    element_port0 = elements.port0
-    element_ports = elements.ports
-    element_state = elements.state
-    element_state0 = elements.state0
-    element_states = elements.states
-    branch_a = branches.a
-    branch_b = branches.b
-    branch_book0 = branches.book0
-    branch_books = branches.books
-    branch_function = branches.function
-    branch_input0 = branches.input0
-    branch_inputs = branches.inputs
-    branch_loss = branches.loss
-    branch_output0 = branches.output0
-    branch_outputs = branches.outputs
-    branch_parameter0 = branches.parameter0
-    branch_parameters = branches.parameters
-    branch_port0 = branches.port0
-    branch_ports = branches.ports
-    branch_state = branches.state
-    branch_state0 = branches.state0
-    branch_states = branches.states
-    branch_supply = branches.supply
+    body_work = first(bodies.work)
+    body_y = first(bodies.y)
+    element_book0 = first(elements.book0)
+    element_books = first(elements.books)
+    element_function = first(elements.function)
+    element_input0 = first(elements.input0)
+    element_inputs = first(elements.inputs)
+    element_output0 = first(elements.output0)
+    element_outputs = first(elements.outputs)
+    element_parameter0 = first(elements.parameter0)
+    element_parameters = first(elements.parameters)
+    element_port0 = first(elements.port0)
+    element_ports = first(elements.ports)
+    element_state = first(elements.state)
+    element_state0 = first(elements.state0)
+    element_states = first(elements.states)
+    branch_a = first(branches.a)
+    branch_b = first(branches.b)
+    branch_book0 = first(branches.book0)
+    branch_books = first(branches.books)
+    branch_function = first(branches.function)
+    branch_input0 = first(branches.input0)
+    branch_inputs = first(branches.inputs)
+    branch_loss = first(branches.loss)
+    branch_output0 = first(branches.output0)
+    branch_outputs = first(branches.outputs)
+    branch_parameter0 = first(branches.parameter0)
+    branch_parameters = first(branches.parameters)
+    branch_port0 = first(branches.port0)
+    branch_ports = first(branches.ports)
+    branch_state = first(branches.state)
+    branch_state0 = first(branches.state0)
+    branch_states = first(branches.states)
+    branch_supply = first(branches.supply)
     node_ambient = nodes.ambient
-    node_before = nodes.before
+    node_before = first(nodes.before)
     node_density = nodes.density
-    node_end_node = nodes.end_node
+    node_end_node = first(nodes.end_node)
     node_fluid = nodes.fluid
-    node_g = nodes.g
-    node_gamma = nodes.gamma
-    node_held = nodes.held
-    node_hint = nodes.hint
-    node_mass = nodes.mass
-    node_numeric = nodes.numeric
-    node_p = nodes.p
+    node_g = first(nodes.g)
+    node_gamma = first(nodes.gamma)
+    node_held = first(nodes.held)
+    node_hint = first(nodes.hint)
+    node_mass = first(nodes.mass)
+    node_numeric = first(nodes.numeric)
+    node_p = first(nodes.p)
     node_pressure = nodes.pressure
-    node_supply = nodes.supply
-    node_table0 = nodes.table0
+    node_supply = first(nodes.supply)
+    node_table0 = first(nodes.table0)
     node_time = nodes.time
-    node_volume = nodes.volume
+    node_volume = first(nodes.volume)
     node_volumes = nodes.volumes
-    node_wall_area = nodes.wall_area
-    node_wall_node = nodes.wall_node
-    node_wall_port = nodes.wall_port
-    interface_alpha = interfaces.alpha
-    interface_before = interfaces.before
-    interface_chi = interfaces.chi
-    interface_contact_loss = interfaces.contact_loss
-    interface_cubic = interfaces.cubic
-    interface_cut_off = interfaces.cut_off
-    interface_e = interfaces.e
-    interface_film_loss = interfaces.film_loss
-    interface_force = interfaces.force
-    interface_gap = interfaces.gap
-    interface_gap0 = interfaces.gap0
-    interface_hint = interfaces.hint
-    interface_kind = interfaces.kind
+    node_wall_area = first(nodes.wall_area)
+    node_wall_node = first(nodes.wall_node)
+    node_wall_port = first(nodes.wall_port)
+    interface_alpha = first(interfaces.alpha)
+    interface_before = first(interfaces.before)
+    interface_chi = first(interfaces.chi)
+    interface_contact_loss = first(interfaces.contact_loss)
+    interface_cubic = first(interfaces.cubic)
+    interface_cut_off = first(interfaces.cut_off)
+    interface_e = first(interfaces.e)
+    interface_film_loss = first(interfaces.film_loss)
+    interface_force = first(interfaces.force)
+    interface_gap = first(interfaces.gap)
+    interface_gap0 = first(interfaces.gap0)
+    interface_hint = first(interfaces.hint)
+    interface_kind = first(interfaces.kind)
     interface_law = interfaces.law
-    interface_law0 = interfaces.law0
-    interface_linear = interfaces.linear
-    interface_lower = interfaces.lower
-    interface_rate = interfaces.rate
-    interface_series = interfaces.series
-    interface_since = interfaces.since
-    interface_suction = interfaces.suction
-    interface_upper = interfaces.upper
-    record_filled = recording.filled
+    interface_law0 = first(interfaces.law0)
+    interface_linear = first(interfaces.linear)
+    interface_lower = first(interfaces.lower)
+    interface_rate = first(interfaces.rate)
+    interface_series = first(interfaces.series)
+    interface_since = first(interfaces.since)
+    interface_suction = first(interfaces.suction)
+    interface_upper = first(interfaces.upper)
+    record_filled = first(recording.filled)
     record_fine = recording.fine
     record_means = recording.means
     record_peaks = recording.peaks
-    ports = body_y.size - 1
-    count_interfaces = interface_upper.size
-    volumes, count_nodes = node_volumes, node_p.size
-    ends = node_end_node.size
-    y0, y1, used, free = at_ports[0], at_ports[1], at_ports[2], at_ports[3]
-    F, smooth, pending, before = at_ports[4], at_ports[5], at_ports[6], at_ports[7]
-    f_contact, f_film, g1 = at_interfaces[0], at_interfaces[1], at_interfaces[2]
-    e1, lost_contact, lost_film = at_interfaces[3], at_interfaces[4], at_interfaces[5]
-    fi, peaks = at_interfaces[6], at_interfaces[7]
-    rho, slope, g, p = at_nodes[0], at_nodes[1], at_nodes[2], at_nodes[3]
-    p_used, V, V_used = at_nodes[4], at_nodes[5], at_nodes[6]
-    r, inflow = at_nodes[7], at_nodes[8]
-    mdot, slope_a, slope_b = at_branches[0], at_branches[1], at_branches[2]
+    ports = bodies.y.size - 1
+    count_interfaces = interfaces.upper.size
+    volumes, count_nodes = node_volumes, nodes.p.size
+    ends = nodes.end_node.size
+    y0, y1, used, free = (
+        first(at_ports[0]),
+        first(at_ports[1]),
+        first(at_ports[2]),
+        first(at_ports[3]),
+    )
+    F, smooth, pending, before = (
+        first(at_ports[4]),
+        first(at_ports[5]),
+        first(at_ports[6]),
+        first(at_ports[7]),
+    )
+    f_contact, f_film, g1 = (
+        first(at_interfaces[0]),
+        first(at_interfaces[1]),
+        first(at_interfaces[2]),
+    )
+    e1, lost_contact, lost_film = (
+        first(at_interfaces[3]),
+        first(at_interfaces[4]),
+        first(at_interfaces[5]),
+    )
+    fi, peaks = first(at_interfaces[6]), first(at_interfaces[7])
+    rho, slope, g, p = (
+        first(at_nodes[0]),
+        first(at_nodes[1]),
+        first(at_nodes[2]),
+        first(at_nodes[3]),
+    )
+    p_used, V, V_used = first(at_nodes[4]), first(at_nodes[5]), first(at_nodes[6])
+    r, inflow = first(at_nodes[7]), first(at_nodes[8])
+    mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
-    pending[:] = 0.0
+    gammas = nodes.gamma.shape[1]
     for k in range(ports + 1):
+        pending[k] = 0.0
         F[k], before[k], y0[k] = body_force[k], body_before[k], body_y[k]
     for k in range(count_interfaces):
         fi[k] = interface_force[k]
@@ -405,10 +429,11 @@ def run_network(
     for k in range(count_nodes):
         p[k] = node_p[k]
     Z_end[:] = 1.0
-    sums[:] = 0.0
-    count_branches = branch_function.size
-    count_elements = element_function.size
-    element_forces = element_ports.size
+    for k in range(scratch.sums.size):
+        sums[k] = 0.0
+    count_branches = branches.function.size
+    count_elements = elements.function.size
+    element_forces = elements.ports.size
     step, last_level = clock[0], clock[1]
     in_record = 0
     record = record0
@@ -473,7 +498,9 @@ def run_network(
             # 2. sweeps
             last_change = np.inf
             for sweep in range(_MOST_SWEEPS):
-                _move(y1, free, body_G, level, F, body_first, body_last)
+                _move(
+                    y1, free, shift(body_G, level * ports * ports), F, body_first, body_last, ports
+                )
                 for i in range(ports):
                     used[i] = y1[i]
                     smooth[i] = 0.0
@@ -488,10 +515,10 @@ def run_network(
                         element_inputs[i0 + 2 + 2 * (j - q0)] = y0[port]
                         element_inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
                     status = table[element_function[k]](
-                        pointer(element_parameters, element_parameter0[k]),
-                        pointer(element_state, element_state0[k]),
-                        pointer(element_inputs, i0),
-                        pointer(element_outputs, o0),
+                        shift(element_parameters, element_parameter0[k]),
+                        shift(element_state, element_state0[k]),
+                        shift(element_inputs, i0),
+                        shift(element_outputs, o0),
                     )
                     if status != 0:
                         report[0], report[1], report[2] = k, status, t
@@ -503,7 +530,7 @@ def run_network(
                     for i in range(volumes):
                         V_used[i] = node_volume[i]
                         p_used[i] = p[i]
-                    for w in range(node_wall_node.size):
+                    for w in range(nodes.wall_node.size):
                         i = node_wall_node[w]
                         if i < volumes:
                             V_used[i] += node_wall_area[w] * used[node_wall_port[w]]
@@ -515,11 +542,13 @@ def run_network(
                                 node_fluid, p[i], node_hint[i]
                             )
                         for i in range(volumes):
-                            V[i] = V_used[i] + node_gamma[level, i] * (p[i] - p_used[i])
+                            V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
                             r[i] = node_mass[i] - V[i] * rho[i]
                             for j in range(volumes):
-                                A[i, j] = 0.0
-                            A[i, i] = V[i] * slope[i] + rho[i] * node_gamma[level, i]
+                                A[i * volumes + j] = 0.0
+                            A[i * volumes + i] = (
+                                V[i] * slope[i] + rho[i] * node_gamma[level * gammas + i]
+                            )
                         for k in range(count_branches):
                             i0, o0 = branch_input0[k], branch_output0[k]
                             q0, q1 = branch_port0[k], branch_port0[k + 1]
@@ -535,10 +564,10 @@ def run_network(
                                 branch_inputs[i0 + 6 + 2 * (j - q0)] = y0[port]
                                 branch_inputs[i0 + 7 + 2 * (j - q0)] = used[port]
                             status = table[branch_function[k]](
-                                pointer(branch_parameters, branch_parameter0[k]),
-                                pointer(branch_state, branch_state0[k]),
-                                pointer(branch_inputs, i0),
-                                pointer(branch_outputs, o0),
+                                shift(branch_parameters, branch_parameter0[k]),
+                                shift(branch_state, branch_state0[k]),
+                                shift(branch_inputs, i0),
+                                shift(branch_outputs, o0),
                             )
                             if status != 0:
                                 report[0], report[1], report[2] = k, status, t
@@ -548,21 +577,23 @@ def run_network(
                             slope_b[k] = branch_outputs[o0 + 2]
                             if a < volumes:
                                 r[a] -= H * mdot[k]
-                                A[a, a] += H * slope_a[k]
+                                A[a * volumes + a] += H * slope_a[k]
                                 if b < volumes:
-                                    A[a, b] += H * slope_b[k]
-                                    A[b, a] -= H * slope_a[k]
+                                    A[a * volumes + b] += H * slope_b[k]
+                                    A[b * volumes + a] -= H * slope_a[k]
                             if b < volumes:
                                 r[b] += H * mdot[k]
-                                A[b, b] -= H * slope_b[k]
+                                A[b * volumes + b] -= H * slope_b[k]
                         for e in range(ends):
                             i = node_end_node[e]
                             q_end[e] = (node_density * g[i] - c_end[e]) / Z_end[e]
                             if i < volumes:
                                 r[i] -= H * node_density * q_end[e]
-                                A[i, i] += H * node_density * (node_density / rho[i]) / Z_end[e]
+                                A[i * volumes + i] += (
+                                    H * node_density * (node_density / rho[i]) / Z_end[e]
+                                )
                         if volumes == 1:
-                            r[0] /= A[0, 0]
+                            r[0] /= A[0]
                         else:
                             _solve(A, r, volumes)
                         worst = 0.0
@@ -587,8 +618,8 @@ def run_network(
                             if b < volumes:
                                 mdot[k] += slope_b[k] * r[b]
                         for i in range(volumes):
-                            V[i] = V_used[i] + node_gamma[level, i] * (p[i] - p_used[i])
-                    for w in range(node_wall_node.size):
+                            V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
+                    for w in range(nodes.wall_node.size):
                         smooth[node_wall_port[w]] += node_wall_area[w] * (
                             p[node_wall_node[w]] - node_ambient
                         )
@@ -604,16 +635,18 @@ def run_network(
                 for c in range(count_interfaces):
                     F[interface_upper[c]] += fi[c]
                     F[interface_lower[c]] -= fi[c]
-                _move(y1, free, body_G, level, F, body_first, body_last)
+                _move(
+                    y1, free, shift(body_G, level * ports * ports), F, body_first, body_last, ports
+                )
                 for c in range(count_interfaces):
                     u, low = interface_upper[c], interface_lower[c]
                     Gc = 0.0
                     if u < ports:
-                        Gc += body_G[level, u, u]
+                        Gc += body_G[(level * ports + u) * ports + u]
                     if low < ports:
-                        Gc += body_G[level, low, low]
+                        Gc += body_G[(level * ports + low) * ports + low]
                     if body_first[u] == body_first[low] and u < ports and low < ports:
-                        Gc -= 2.0 * body_G[level, u, low]
+                        Gc -= 2.0 * body_G[(level * ports + u) * ports + low]
                     gap = interface_gap0[c] + y1[u] - y1[low]
                     gap_free = gap - Gc * fi[c]
                     g0 = interface_gap[c]
@@ -657,10 +690,10 @@ def run_network(
                     if change != 0.0:
                         if u < ports:
                             for i in range(body_first[u], body_last[u]):
-                                y1[i] += body_G[level, i, u] * change
+                                y1[i] += body_G[(level * ports + i) * ports + u] * change
                         if low < ports:
                             for i in range(body_first[low], body_last[low]):
-                                y1[i] -= body_G[level, i, low] * change
+                                y1[i] -= body_G[(level * ports + i) * ports + low] * change
                 moved = 0.0
                 for i in range(ports):
                     moved = max(moved, abs(y1[i] - used[i]))
@@ -832,7 +865,7 @@ def run_network(
         in_record += 1
         record_time += M * h
         if in_record == per_record:
-            for j in range(sums.size):
+            for j in range(scratch.sums.size):
                 record_means[record, j] = sums[j] / record_time
                 sums[j] = 0.0
             for c in range(count_interfaces):
@@ -844,11 +877,11 @@ def run_network(
                 body_fine,
                 body_start,
                 body_modes,
-                y0,
-                node_p,
-                element_state,
-                branch_state,
-                interface_gap,
+                at_ports[0],
+                nodes.p,
+                elements.state,
+                branches.state,
+                interfaces.gap,
             )
             record += 1
             in_record = 0

@@ -61,7 +61,8 @@ class ImpactEvent:
     time : float [s]
         First touch.
     approach_speed : float [m/s]
-        Relative speed of the centres of mass at first touch.
+        Closing speed of the centres of mass when the stop begins to be felt: at first touch, or the
+        highest one since its film began to press.
     peak_force : float [N]
         Of contact and film together.
     peak_time : float [s]
@@ -70,9 +71,10 @@ class ImpactEvent:
     separation_time : float [s]
         End of the last contact; nan if it stays closed to the end of the run.
     impulse : float [N s]
-        Of contact and film.
+        Of contact and film, while it presses before and pulls after the contact.
     restitution : float [-]
-        ``-v_after / v_before`` of the centres of mass; nan without separation.
+        Opening speed over approach speed of the centres of mass; nan without separation.  With a
+        film the opening speed is the highest one while it pulls.
     energy_loss : float [J]
         Kinetic energy of the centre of mass before less after; nan without separation.
     """

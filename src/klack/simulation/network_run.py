@@ -239,6 +239,12 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
     for name in ("force", "before", "y"):
         getattr(real, name)[:] = getattr(bodies, name)
     real.before[:] = real.force
+    nodes = network.nodes
+    for w in range(len(nodes.wall_node)):
+        i = nodes.wall_node[w]
+        if i < nodes.volumes:
+            nodes.held[i] += nodes.wall_area[w] * real.y[nodes.wall_port[w]]
+    nodes.mass[:] *= nodes.held / nodes.volume
     interfaces.rate[:] = 0.0
     interfaces.since[interfaces.gap + interfaces.e < 0.0] = -1.0
 
