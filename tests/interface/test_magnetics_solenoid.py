@@ -5,15 +5,17 @@ from math import pi
 import numpy as np
 import pytest
 
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import DriveProgram, Driver, DriveState
+from klack.magnetics.force_map_solenoid import ForceMapSolenoid
 from klack.magnetics.iron import VACUUM_PERMEABILITY as MU0
 from klack.magnetics.iron_choice import IronChoice
 from klack.magnetics.iron_library import iron_curve
 from klack.magnetics.reluctance import IronReluctance, LinearReluctance
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.static import static_state
+from klack.magnetics.winding import warm_resistance
 from klack.network.rows import GROUND, Ambient, Rows
 from klack.network.step_function import evaluate
 
@@ -89,21 +91,16 @@ def test_residual_flux_passes_the_closed_gap():
 
 
 def test_copper_gets_warm():
-    cold, warm = Solenoid(**INJECTOR), Solenoid(**INJECTOR, winding_temperature=393.15)
-
-    assert cold.warm_resistance() == 0.5
-    assert warm.warm_resistance() == pytest.approx(0.5 * (1 + 0.00393 * 100), rel=1e-12)
+    assert warm_resistance(0.5, 293.15) == 0.5
+    assert warm_resistance(0.5, 393.15) == pytest.approx(0.5 * (1 + 0.00393 * 100), rel=1e-12)
 
 
-@pytest.mark.parametrize(("closes", "sign"), [("upward", 1.0), ("downward", -1.0)])
-def test_voltage_runs_to_the_static_fluxes(closes, sign):
-    core = {"conductivity": 1.6e6, "length": 2e-2, "radius": 2e-3, "permeability": 400, "terms": 2}
-    solenoid = Solenoid(**INJECTOR, closes=closes, eddy=[core])
+def settle(solenoid):
+    """Let 4 V act on the coil for 8 ms; its element and the last output."""
     rows = Rows(Ambient())
     rows.component = "coil"
     rows.handles = {"armature": 0, "base": GROUND}
     rows.partners = {"terminals": (Steady(),)}
-
     solenoid.add_rows(rows)
     element = rows.elements[0]
     state = element.state
@@ -113,11 +110,65 @@ def test_voltage_runs_to_the_static_fluxes(closes, sign):
         status, out = evaluate(element.step, element.parameters, state, inputs, size)
         assert status == 0
         state = out[2 : 2 + state.size]
+    return element, out
+
+
+@pytest.mark.parametrize(("closes", "sign"), [("upward", 1.0), ("downward", -1.0)])
+def test_voltage_runs_to_the_static_fluxes(closes, sign):
+    core = {"conductivity": 1.6e6, "length": 2e-2, "radius": 2e-3, "permeability": 400, "terms": 2}
+    solenoid = Solenoid(**INJECTOR, closes=closes, eddy=[core])
+
+    element, out = settle(solenoid)
 
     static = static_state(solenoid.circuit(), current=8.0, gap=100e-6)
     assert element.ports == (0, GROUND)
     assert out[0] == pytest.approx(sign * abs(static.force), rel=1e-4)  # 8 ms of 0.7 ms
     assert out[1] == -out[0]
+
+
+def map_of(solenoid, force_factor=1.0):
+    """The same solenoid as a table of 25 currents and 11 gaps."""
+    circuit = solenoid.circuit()
+    current, gap = np.linspace(0.0, 12.0, 25), np.linspace(0.0, 120e-6, 11)
+    states = [[static_state(circuit, current=i, gap=x) for x in gap] for i in current]
+    return ForceMapSolenoid(
+        resistance=0.5,
+        gap=100e-6,
+        current=current.tolist(),
+        gaps=gap.tolist(),
+        linkage=[[state.linkage for state in row] for row in states],
+        force=[[force_factor * state.force for state in row] for row in states],
+    )
+
+
+def test_map_of_a_solenoid_pulls_like_the_solenoid():
+    solenoid = Solenoid(**INJECTOR)
+
+    _, from_circuit = settle(solenoid)
+    _, from_map = settle(map_of(solenoid))
+
+    assert from_map[0] == pytest.approx(from_circuit[0], rel=5e-3)  # 11 gaps
+
+
+def test_map_with_a_wrong_force_warns():
+    with pytest.warns(AccuracyWarning, match="the linkage asks for"):
+        map_of(Solenoid(**INJECTOR), force_factor=1.5)
+
+
+@pytest.mark.parametrize(
+    ("linkage", "words"),
+    [
+        ([[0.0, 0.0, 0.0]], "a linkage for each of 2 currents"),
+        ([[0.0, 0.0], [1.0, 1.0]], "a linkage for each of 2 currents"),
+        ([[0.0, 0.0, 0.0], [1.0, -1.0, 1.0]], "not increasing"),
+    ],
+    ids=["rows", "columns", "falling"],
+)
+def test_map_says_what_is_wrong_with_its_table(linkage, words):
+    with pytest.raises(InputError, match=words):
+        ForceMapSolenoid(
+            resistance=0.5, gap=1e-4, current=[0, 1], gaps=[0, 1e-4, 2e-4], linkage=linkage
+        )
 
 
 @pytest.mark.parametrize(

@@ -14,17 +14,14 @@ from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
 from klack.magnetics.static import static_state
 from klack.magnetics.tabulation import hermite_grid
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import Rows
 from klack.units import Flux, Length, Permeance, Ratio, Resistance, Temperature
 
-__all__ = ["COPPER_COEFFICIENT", "Solenoid"]
+__all__ = ["Solenoid"]
 
-COPPER_COEFFICIENT = 3.93e-3
-"""Relative rise of the resistance of copper [1/K] from 20 degC (IEC 60028)."""
-
-_REFERENCE_TEMPERATURE = 293.15
 _MAIN, _LEAKAGE = 0, 1
 _TABLE_TOLERANCE = 1e-8
 
@@ -66,7 +63,7 @@ class Solenoid(Component):
     turns: Number = Field(gt=0, description="Turns of the coil.")
     resistance: Resistance = Field(gt=0, description="Of coil and harness, at 20 degC.")
     winding_temperature: Temperature = Field(
-        default=_REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
     gap: Length = Field(gt=0, description="Working gap at the start, without the residual gap.")
     closes: Literal["upward", "downward"] = Field(
@@ -95,11 +92,6 @@ class Solenoid(Component):
     residual_flux: Flux = Field(
         default=0.0, ge=0, description="Main flux that remains without current, gap closed."
     )
-
-    def warm_resistance(self) -> float:
-        """Resistance [ohm] at the temperature of the winding."""
-        rise = self.winding_temperature - _REFERENCE_TEMPERATURE
-        return self.resistance * (1.0 + COPPER_COEFFICIENT * rise)
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
@@ -138,7 +130,7 @@ class Solenoid(Component):
         flux_rows(
             rows,
             circuit,
-            resistance=self.warm_resistance(),
+            resistance=warm_resistance(self.resistance, self.winding_temperature),
             driver=driver_of(rows, "terminals"),
             gap=self.gap,
             closing=self.closes == "upward",

@@ -37,6 +37,7 @@ COMPONENTS = (
     ("line", "klack.hydraulics.line.Line"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
+    ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
     ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
     ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
