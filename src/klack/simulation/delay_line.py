@@ -328,9 +328,9 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
                     state.incoming[s, wave] = x + f * (before - x)
                     lost += f * (1.0 - f) * (x - before) ** 2
                 else:
-                    # sums about the first sample; not a function of its own, since numba then
+                    # sums about one of the samples; not a function of its own, since numba then
                     # counts references to every array in each call, ten times the work itself
-                    first = state.samples[oldest]
+                    first = state.samples[oldest + 1]
                     total, spread, jumps = 0.0, 0.0, 0.0
                     for i in range(oldest, oldest + m):
                         x = state.samples[i + 1]
