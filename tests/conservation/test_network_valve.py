@@ -73,8 +73,7 @@ def test_the_needle_opens_and_closes(wet):
 
 
 def test_books_of_the_run_balance(wet):
-    # displacements settle to 1e-16 m in a step: some 60 N times that, over 16 000 steps
-    assert wet.books.relative_residual < 1e-8
+    assert wet.books.relative_residual < 1e-9  # of all steps; what the forces did not settle
     assert wet.books.supplies["magnet work"] > 1e-3
     for name, loss in wet.books.losses.items():
         assert loss >= -1e-12 * wet.books.throughput, name
