@@ -134,7 +134,7 @@ def _table(permeance: Callable[[Vector], tuple[Vector, Vector]]) -> GapReluctanc
         P, dP = permeance(x)
         return 1.0 / P, -dP / P**2
 
-    grid = hermite_grid(reluctance, 0.05e-3, 6e-3, tolerance=1e-8)
+    grid = hermite_grid(reluctance, 0.05e-3, 6e-3, tolerance=1e-7)
     return GapReluctance.of(reluctance, grid)
 
 

@@ -139,7 +139,7 @@ class GapReluctance:
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return the magnetomotive force [A] at a flux [Wb] and a working gap [m]."""
-        return self.reluctance_at(gap) * np.asarray(flux, dtype=float)
+        return np.asarray(self.reluctance_at(gap) * np.asarray(flux, dtype=float))
 
     def slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return d(mmf)/d(flux) [A/Wb]."""
@@ -147,11 +147,11 @@ class GapReluctance:
 
     def energy(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return the stored energy [J]."""
-        return 0.5 * self.reluctance_at(gap) * np.asarray(flux, dtype=float) ** 2
+        return np.asarray(0.5 * self.reluctance_at(gap) * np.asarray(flux, dtype=float) ** 2)
 
     def energy_slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return dW/dx at constant flux [N]: minus the force along the gap."""
-        return 0.5 * self.reluctance_slope_at(gap) * np.asarray(flux, dtype=float) ** 2
+        return np.asarray(0.5 * self.reluctance_slope_at(gap) * np.asarray(flux, dtype=float) ** 2)
 
     def table(self) -> Vector:
         """Return ``[n]`` and six numbers per interval; see the module text."""
@@ -201,7 +201,7 @@ class IronReluctance:
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return the magnetomotive force [A] at a flux [Wb]; the gap [m] does not matter."""
         phi = np.asarray(flux, dtype=float)
-        return np.sign(phi) * _value(self.rows, np.abs(phi))
+        return np.asarray(np.sign(phi) * _value(self.rows, np.abs(phi)))
 
     def slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Return d(mmf)/d(flux) [A/Wb]."""
