@@ -224,6 +224,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         force=np.zeros(ports + 1),
         before=np.zeros(ports + 1),
         y=np.zeros(ports + 1),
+        seen=np.zeros(ports + 1),
         work=np.zeros(ports + 1),
     )
     return bodies, np.array(blocks, dtype=np.int64)

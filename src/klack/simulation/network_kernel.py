@@ -5,7 +5,8 @@ One step of length ``h`` (or ``M h`` while nothing touches):
 1. Every mode moves exactly, without the forces of this step.
 2. Sweeps: all elements, then all pressures (Newton), then all interfaces find their mean forces
    from the port displacements at both ends of the step; the forces move the ports by ``G F``;
-   again, until no port moves by more than :data:`SETTLED`.
+   again, until no port moves by more than :data:`SETTLED`.  Elements and fluid live on the
+   displacements that they saw last, so what is left of that change costs energy in second order.
 3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
    the modes.
 
@@ -19,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import first, pointer, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
@@ -49,12 +50,12 @@ Cube = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
-SETTLED = 1e-15  # [m] change of a port displacement at which the forces of a step have settled
-_SETTLED_BY_ROUND_OFF = 1e-12  # [m] accepted when sweeps no longer improve
+SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
 _MOST_SWEEPS = 200
 _MOST_NEWTON = 80
 _PRESSURE_LEFT = 1e-7  # last Newton step over the pressure
 _LEAST_PRESSURE = 1.0  # [Pa]
+_LARGE_STEP = 1e-3  # of the pressure
 _FILM_SMALL = 0.02  # [N] film force that a coarse step may meet
 _REST_TIME = 50e-6  # [s] closed for so long: at rest
 _SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
@@ -76,6 +77,7 @@ class Bodies(NamedTuple):
     force: Vector  # (ports + 1,) forces of the last step
     before: Vector  # (ports + 1,) forces of the step before
     y: Vector  # (ports + 1,) displacements
+    seen: Vector  # (ports + 1,) the same as elements and fluid saw them
     work: Vector  # (ports + 1,) work done by the forces at each port
 
 
@@ -172,9 +174,9 @@ def scratch_memory(
 ) -> Scratch:
     """Memory for a network of these sizes."""
     return Scratch(
-        ports=np.zeros((8, ports + 1)),
+        ports=np.zeros((9, ports + 1)),
         interfaces=np.zeros((8, interfaces)),
-        nodes=np.zeros((9, nodes)),
+        nodes=np.zeros((10, nodes)),
         branches=np.zeros((3, branches)),
         ends=np.zeros((3, ends)),
         matrix=np.zeros((nodes, nodes)),
@@ -303,6 +305,7 @@ def run_network(
     body_start = bodies.start
     body_work = first(bodies.work)
     body_y = first(bodies.y)
+    body_seen = first(bodies.seen)
     element_book0 = first(elements.book0)
     element_books = first(elements.books)
     element_function = first(elements.function)
@@ -392,6 +395,7 @@ def run_network(
         first(at_ports[2]),
         first(at_ports[3]),
     )
+    seen = first(at_ports[8])
     F, smooth, pending, before = (
         first(at_ports[4]),
         first(at_ports[5]),
@@ -416,18 +420,20 @@ def run_network(
         first(at_nodes[3]),
     )
     p_used, V, V_used = first(at_nodes[4]), first(at_nodes[5]), first(at_nodes[6])
-    r, inflow = first(at_nodes[7]), first(at_nodes[8])
+    r, inflow, known = first(at_nodes[7]), first(at_nodes[8]), first(at_nodes[9])
     mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
     gammas = nodes.gamma.shape[1]
     for k in range(ports + 1):
         pending[k] = 0.0
         F[k], before[k], y0[k] = body_force[k], body_before[k], body_y[k]
+        seen[k] = body_seen[k]
     for k in range(count_interfaces):
         fi[k] = interface_force[k]
         peaks[k] = 0.0
     for k in range(count_nodes):
         p[k] = node_p[k]
+        known[k] = -1.0
     Z_end[:] = 1.0
     for k in range(scratch.sums.size):
         sums[k] = 0.0
@@ -496,7 +502,6 @@ def run_network(
             if ends > 0 and not settle:
                 lines_incoming(lines, line_state, m, c_end, Z_end)
             # 2. sweeps
-            last_change = np.inf
             for sweep in range(_MOST_SWEEPS):
                 _move(
                     y1, free, shift(body_G, level * ports * ports), F, body_first, body_last, ports
@@ -512,7 +517,7 @@ def run_network(
                     element_inputs[i0 + 1] = H
                     for j in range(q0, q1):
                         port = element_ports[j]
-                        element_inputs[i0 + 2 + 2 * (j - q0)] = y0[port]
+                        element_inputs[i0 + 2 + 2 * (j - q0)] = seen[port]
                         element_inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
                     status = table[element_function[k]](
                         shift(element_parameters, element_parameter0[k]),
@@ -538,9 +543,11 @@ def run_network(
                         if settle:
                             break
                         for i in range(count_nodes):
-                            rho[i], slope[i], g[i], node_hint[i] = fluid_at(
-                                node_fluid, p[i], node_hint[i]
-                            )
+                            if i < volumes or p[i] != known[i]:
+                                rho[i], slope[i], g[i], node_hint[i] = fluid_at(
+                                    node_fluid, p[i], node_hint[i]
+                                )
+                                known[i] = p[i]
                         for i in range(volumes):
                             V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
                             r[i] = node_mass[i] - V[i] * rho[i]
@@ -561,7 +568,7 @@ def run_network(
                             branch_inputs[i0 + 5] = rho[b]
                             for j in range(q0, q1):
                                 port = branch_ports[j]
-                                branch_inputs[i0 + 6 + 2 * (j - q0)] = y0[port]
+                                branch_inputs[i0 + 6 + 2 * (j - q0)] = seen[port]
                                 branch_inputs[i0 + 7 + 2 * (j - q0)] = used[port]
                             status = table[branch_function[k]](
                                 shift(branch_parameters, branch_parameter0[k]),
@@ -598,7 +605,12 @@ def run_network(
                             _solve(A, r, volumes)
                         worst = 0.0
                         for i in range(volumes):
-                            r[i] = max(r[i], 0.1 * _LEAST_PRESSURE - 0.9 * p[i])
+                            if abs(r[i]) > _LARGE_STEP * p[i]:
+                                # boiling: the density takes the step, the pressure follows it
+                                new, node_hint[i] = pressure_at(
+                                    node_fluid, rho[i] + slope[i] * r[i], node_hint[i]
+                                )
+                                r[i] = new - p[i]
                             worst = max(worst, abs(r[i]) / max(p[i], node_ambient))
                             p[i] += r[i]
                         if worst < _PRESSURE_LEFT:
@@ -699,9 +711,6 @@ def run_network(
                     moved = max(moved, abs(y1[i] - used[i]))
                 if moved <= SETTLED:
                     break
-                if moved >= last_change and moved < _SETTLED_BY_ROUND_OFF:
-                    break
-                last_change = moved
                 if sweep == _MOST_SWEEPS - 1:
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
@@ -744,9 +753,8 @@ def run_network(
                 if count_nodes > 0:
                     for i in range(count_nodes):
                         inflow[i] = 0.0
-                        rho[i], slope[i], g[i], node_hint[i] = fluid_at(
-                            node_fluid, p[i], node_hint[i]
-                        )
+                    for i in range(volumes):
+                        g[i] += r[i] / rho[i]  # r is the last Newton step, 1e-7 of the pressure
                     for k in range(count_branches):
                         a, b = branch_a[k], branch_b[k]
                         inflow[a] -= H * mdot[k]
@@ -757,7 +765,7 @@ def run_network(
                         power = (g[a] - g[b]) * mdot[k] * H
                         for j in range(q0, q1):
                             port = branch_ports[j]
-                            power -= branch_outputs[o0 + j - q0] * (used[port] - y0[port])
+                            power -= branch_outputs[o0 + j - q0] * (used[port] - seen[port])
                         o0 += q1 - q0
                         for j in range(branch_states[k]):
                             branch_state[branch_state0[k] + j] = branch_outputs[o0 + j]
@@ -835,6 +843,7 @@ def run_network(
             for i in range(ports):
                 body_work[i] += F[i] * (y1[i] - y0[i])
                 y0[i] = y1[i]
+                seen[i] = used[i]
                 pending[i] = F[i]
                 body_force[i] = F[i]
             last_level = level
@@ -887,7 +896,7 @@ def run_network(
             in_record = 0
             record_time = 0.0
     for i in range(ports):
-        body_before[i], body_y[i] = before[i], y0[i]
+        body_before[i], body_y[i], body_seen[i] = before[i], y0[i], seen[i]
     clock[0], clock[1] = step, last_level
     clock[2] += fine_steps
     clock[3] += coarse_steps

@@ -239,6 +239,7 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
     for name in ("force", "before", "y"):
         getattr(real, name)[:] = getattr(bodies, name)
     real.before[:] = real.force
+    real.seen[:] = real.y
     nodes = network.nodes
     for w in range(len(nodes.wall_node)):
         i = nodes.wall_node[w]
@@ -501,7 +502,7 @@ def _energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
 
 
 _SAVED = {
-    "bodies": ("fine", "force", "before", "y"),
+    "bodies": ("fine", "force", "before", "y", "seen"),
     "elements": ("state",),
     "branches": ("state",),
     "nodes": ("mass", "held", "p", "before", "g", "hint"),
