@@ -303,8 +303,8 @@ def circuit_loss_and_force(
 
 
 @njit(cache=True, error_model="numpy")
-def _solve(A: Any, g: Any, n: int) -> bool:
-    """Replace ``g`` by ``A^-1 g`` (symmetric, positive definite, lower half given)."""
+def _factorise(A: Any, n: int) -> bool:
+    """Replace the lower half of ``A`` by its Cholesky factor; False if it is not positive."""
     for j in range(n):
         d = A[j * n + j]
         for m in range(j):
@@ -318,6 +318,12 @@ def _solve(A: Any, g: Any, n: int) -> bool:
             for m in range(j):
                 v -= A[i * n + m] * A[j * n + m]
             A[i * n + j] = v / d
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(A: Any, g: Any, n: int) -> None:
+    """Replace ``g`` by the solution with the factor ``A``."""
     for i in range(n):
         v = g[i]
         for m in range(i):
@@ -329,7 +335,6 @@ def _solve(A: Any, g: Any, n: int) -> bool:
         for m in range(i + 1, n):
             v -= A[m * n + i] * g[m]
         g[i] = v / A[i * n + i]
-    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -342,32 +347,26 @@ def circuit_step(
     reluctance: Any,
     per_time: float,
     voltage: float,
-    per_ohm: float,
+    resistance: float,
     conducts: bool,
-) -> bool:
-    """Find the change of the loop fluxes (in: a guess); False if the iteration does not settle.
+) -> tuple[bool, float]:
+    """Find the change of the loop fluxes (in: a guess) and the mean current [A].
 
-    ``reluctance`` are the means of the tubes, ``per_time = 1/h``, ``per_ohm = 1/R``.  Without
-    ``conducts`` the coil is open: no current, whatever the voltage.
+    ``reluctance`` are the means of the tubes and ``per_time = 1/h``.  Without ``conducts`` the coil
+    is open: no current, whatever the voltage.  The current is eliminated last, so that a small
+    resistance does no harm.  False if the iteration does not settle.
     """
-    if par[at] == 2.0:
-        return _two_loops(
-            par, at, hints, phi, change, reluctance, per_time, voltage, per_ohm, conducts
-        )
-    A, g = stack(36), stack(6)
+    A, g, z = stack(36), stack(6), stack(6)
     loops, tubes = int(par[at]), int(par[at + 1])
     turns = at + _HEADER
     most = int(par[at + 2])
+    current = 0.0
     for _ in range(most):
-        current = stiff = 0.0
-        if conducts:
-            current = (voltage - linked(par, at, change) * per_time) * per_ohm
-            stiff = per_time * per_ohm
         for i in range(loops):
-            ni = par[turns + i]
-            g[i] = ni * current
+            g[i] = 0.0
+            z[i] = par[turns + i]
             for j in range(i + 1):
-                A[i * loops + j] = ni * par[turns + j] * stiff
+                A[i * loops + j] = 0.0
         for k in range(tubes):
             p = _tube(par, at, k)
             b0 = circuit_flux(par, at, k, phi)
@@ -387,72 +386,18 @@ def circuit_step(
                     g[i] -= c * mmf
                     for j in range(i + 1):
                         A[i * loops + j] += c * par[row + j] * slope
-        if not _solve(A, g, loops):
-            return False
-        for i in range(loops):
-            change[i] += g[i]
+        if not _factorise(A, loops):
+            return False, 0.0
+        _solve(A, g, loops)
+        if conducts:
+            _solve(A, z, loops)
+            induced = (linked(par, at, change) + linked(par, at, g)) * per_time
+            current = (voltage - induced) / (resistance + linked(par, at, z) * per_time)
         largest = 0.0
         for i in range(loops):
-            largest = max(largest, abs(g[i]))
+            move = g[i] + z[i] * current
+            change[i] += move
+            largest = max(largest, abs(move))
         if most == 1 or largest <= par[at + 5]:
-            return True
-    return False
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _two_loops(
-    par: Any,
-    at: int,
-    hints: Any,
-    phi: Any,
-    change: Any,
-    reluctance: Any,
-    per_time: float,
-    voltage: float,
-    per_ohm: float,
-    conducts: bool,
-) -> bool:
-    """Do the same for two loops (main and leakage), the usual case, in registers."""
-    tubes = int(par[at + 1])
-    most = int(par[at + 2])
-    n0, n1 = par[at + _HEADER], par[at + _HEADER + 1]
-    f0, f1, d0, d1 = phi[0], phi[1], change[0], change[1]
-    if not conducts:
-        per_ohm = 0.0
-    stiff = per_time * per_ohm
-    for _ in range(most):
-        current = (voltage - (n0 * d0 + n1 * d1) * per_time) * per_ohm
-        g0, g1 = n0 * current, n1 * current
-        a00, a10, a11 = n0 * n0 * stiff, n0 * n1 * stiff, n1 * n1 * stiff
-        p = at + _HEADER + 2
-        for k in range(tubes):
-            c0, c1 = par[p + _SIZE], par[p + _SIZE + 1]
-            b0, db = c0 * f0 + c1 * f1, c0 * d0 + c1 * d1
-            eddy = par[p] * per_time
-            half = 0.5 * reluctance[k]
-            mmf = eddy * db + half * (2.0 * b0 + db) - par[p + 2]
-            slope = eddy + half
-            if par[p + 4] != 0.0:
-                table, hint = at + int(par[p + 4]), int(hints[2 * k + 1])
-                iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
-                mmf += iron
-                slope += iron_slope
-            g0 -= c0 * mmf
-            g1 -= c1 * mmf
-            a00 += c0 * c0 * slope
-            a10 += c0 * c1 * slope
-            a11 += c1 * c1 * slope
-            p += _SIZE + 2
-        ratio = a10 / a00
-        pivot = a11 - ratio * a10
-        g1 = (g1 - ratio * g0) / pivot
-        g0 = g0 / a00 - ratio * g1
-        d0 += g0
-        d1 += g1
-        if not (a00 > 0.0 and pivot > 0.0):
-            return False
-        settled = most == 1 or max(abs(g0), abs(g1)) <= par[at + 5]
-        if settled:
-            change[0], change[1] = d0, d1
-            return True
-    return False
+            return True, current
+    return False, 0.0

@@ -116,13 +116,13 @@ def _advance(
     per_time: float,
     voltage: float,
     conducts: bool,
-) -> bool:
-    """Find the change of the fluxes over a piece."""
+) -> tuple[bool, float]:
+    """Find the change of the fluxes over a piece, and its mean current."""
     if par[at + _MAP] != 0.0:
         return map_step(
-            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[7], conducts
+            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[1], conducts
         )
-    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[7], conducts)
+    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[1], conducts)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -147,10 +147,11 @@ def _locate(
     before: float,
     after: float,
     target: float,
-) -> float:
-    """Length of the piece at whose end the current is ``target``; negative if that fails.
+) -> tuple[float, float]:
+    """Length of the piece at whose end the current is ``target``, and its mean current.
 
-    ``change`` comes with the change over ``length`` and leaves with that of the located piece.
+    The length is negative if that fails.  ``change`` comes with the change over ``length`` and
+    leaves with that of the located piece.
     """
     middle, end, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
     loops = int(par[at])
@@ -166,11 +167,12 @@ def _locate(
             change[j] *= guess / size
         size = guess
         _gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
-        if not _advance(par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True):
-            return -1.0
+        found, mean = _advance(par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True)
+        if not found:
+            return -1.0, 0.0
         f = _current(par, at, hints, phi, change, end) - target
         if abs(f) <= accepted or high - low <= _LOCATED * length:
-            return size
+            return size, mean
         if f * f_high > 0.0:
             high, f_high = size, f
             if side == 1:
@@ -181,7 +183,7 @@ def _locate(
             if side == -1:
                 f_high *= 0.5
             side = -1
-    return -1.0
+    return -1.0, 0.0
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -259,6 +261,9 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             if events > _MOST_EVENTS:
                 return 2
             continue
+        if is_open and par[block + 1] == 0.0:
+            is_open = False  # nothing holds the current back
+            last = 0.0
         piece, per_time = h - done, per_step
         due = next_time(par, block, now + close, entered, cycle) - now
         whole = due >= piece - close
@@ -273,13 +278,19 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         for j in range(loops):
             change[j] = piece * (rate[j] + bend[j] * ahead)
         _gaps(par, at, hints, xa, xb, middle, final, slope)
-        if not _advance(par, at, hints, phi, change, middle, final, per_time, voltage, not is_open):
+        found, mean = _advance(
+            par, at, hints, phi, change, middle, final, per_time, voltage, not is_open
+        )
+        if not found:
             return 1
         through = linked(par, at, change)
         if is_open and not blocked and voltage > through * per_time + _DIODE:
             is_open = False
             last = 0.0
-            if not _advance(par, at, hints, phi, change, middle, final, per_time, voltage, True):
+            found, mean = _advance(
+                par, at, hints, phi, change, middle, final, per_time, voltage, True
+            )
+            if not found:
                 return 1
             through = linked(par, at, change)
         end = 0.0
@@ -295,7 +306,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                     if events > _MOST_EVENTS:
                         return 2
                     continue
-                piece = _locate(
+                piece, mean = _locate(
                     par, at, hints, phi, change, xa, speed, piece, voltage, current, end, target
                 )
                 if piece <= 0.0:
@@ -306,9 +317,9 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 end = target
                 _gaps(par, at, hints, xa, xb, middle, final, slope)
                 through = linked(par, at, change)
-            mean = (voltage - through * per_time) * par[7]
-            supply += voltage * mean * piece
-            ohmic += par[1] * mean * mean * piece
+            heat = par[1] * mean * mean * piece
+            ohmic += heat
+            supply += heat + mean * through  # u i h, with the very fluxes that are stored
             pulse += voltage * piece
         else:
             pulse += through
@@ -377,12 +388,12 @@ def flux_numbers(
     program = driver.numbers()
     size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1])
     head = [0.0, resistance, gap, -1.0 if closing else 1.0]
-    head += [_HEADER, _HEADER + numbers.size, size, 1.0 / resistance]
+    head += [_HEADER, _HEADER + numbers.size, size, 0.0]
     return np.concatenate((head, numbers, program))
 
 
 def flux_state(parameters: NDArray[np.float64], fluxes: ArrayLike = ()) -> NDArray[np.float64]:
-    """State at rest: no current, the driver in its first state, given loop fluxes [Wb] or none."""
+    """State at the start: the driver in its first state, the coil open, loop fluxes [Wb] if any."""
     state = np.zeros(int(parameters[6]))
     state[3] = 1.0
     phi = np.array(fluxes, dtype=float).ravel()

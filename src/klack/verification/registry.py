@@ -22,6 +22,7 @@ GROUPS = (
     "lines",
     "films",
     "magnetics",
+    "drivers",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
 

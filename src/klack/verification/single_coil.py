@@ -1,0 +1,147 @@
+"""A coil with a driver and an armature on a prescribed course: the smallest world it needs."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import ConvergenceError
+from klack.magnetics.circuit import MagneticCircuit
+from klack.magnetics.driver import DriveProgram
+from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.flux_step import FAILURES, flux_numbers, flux_state, magnet_step
+from klack.network.step_function import pointer
+
+__all__ = ["CoilRun", "run_coil"]
+
+Vector = NDArray[np.float64]
+_FRONT = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CoilRun:
+    """A run of one coil.
+
+    Parameters
+    ----------
+    time : array, shape (n + 1,) [s]
+        Ends of the steps, from 0.
+    current, flux : array, shape (n + 1,) [A], [Wb]
+        At those ends; flux of the main branch (linkage of a map).
+    voltage, force : array, shape (n,) [V], [N]
+        Means over the steps; the force on the armature along +z.
+    state : array, shape (n + 1,)
+        Number of the driver's state.
+    fluxes : array, shape (n + 1, loops) [Wb]
+    electric, ohmic, eddy, work : float [J]
+        Supply, losses, and work done on the armature.
+    stored : array, shape (2,) [J]
+        Magnetic energy before and after.
+    """
+
+    time: Vector
+    current: Vector
+    flux: Vector
+    voltage: Vector
+    force: Vector
+    state: Vector
+    fluxes: Vector
+    electric: float
+    ohmic: float
+    eddy: float
+    work: float
+    stored: Vector
+
+    @property
+    def residual(self) -> float:
+        """Energy that does not balance, over the largest of the amounts [-]."""
+        parts = [self.electric, -self.ohmic, -self.eddy, -self.work, self.stored[0]]
+        parts.append(-self.stored[1])
+        return abs(sum(parts)) / max(abs(part) for part in parts)
+
+    def switches(self) -> Vector:
+        """Ends of the steps in which the driver changed its state [s]."""
+        return self.time[1:][np.diff(self.state) != 0]
+
+
+@njit(cache=True)
+def _march(
+    table: Any, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
+) -> int:
+    size, steps = state.size - 1, y.size - 1
+    inp, out = np.zeros(6), np.zeros(2 + state.size + 4)
+    for k in range(-1, steps):
+        inp[0], inp[1] = max(k, 0) * h, h if k >= 0 else 0.0
+        inp[2], inp[3] = y[max(k, 0)], y[k + 1]
+        status = table[0](pointer(par, 0), pointer(state, 0), pointer(inp, 0), pointer(out, 0))
+        if status != 0:
+            return int(status)
+        for j in range(size):
+            state[j] = out[2 + j]
+        log[k + 1, 0] = out[0]
+        log[k + 1, 1:] = state[:size]
+        if k >= 0:
+            sums[0] += out[2 + size]
+            sums[1] += out[3 + size]
+            sums[2] += out[4 + size]
+            sums[3] += out[0] * (inp[3] - inp[2])
+        else:
+            sums[4] = out[5 + size]
+        sums[5] = out[5 + size]
+    return 0
+
+
+def run_coil(
+    plant: MagneticCircuit | FluxMap,
+    driver: DriveProgram,
+    *,
+    resistance: float,
+    gap: float,
+    step: float,
+    lift: ArrayLike,
+    fluxes: ArrayLike = (),
+) -> CoilRun:
+    """Run a coil while its armature follows a course.
+
+    Parameters
+    ----------
+    plant : MagneticCircuit or FluxMap
+    driver : DriveProgram
+    resistance : float [ohm]
+    gap : float [m]
+        At lift zero; the lift closes it.
+    step : float [s]
+    lift : array, shape (n + 1,) [m]
+        At the ends of the steps; straight between.
+    fluxes : array [Wb]
+        Loop fluxes at the start.
+
+    Raises
+    ------
+    ConvergenceError
+        If a step fails.
+    """
+    y = np.array(lift, dtype=float)
+    par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
+    start = flux_state(par, fluxes)
+    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(6)
+    status = _march((magnet_step,), par, np.append(start, 0.0), y, step, log, sums)
+    if status != 0:
+        raise ConvergenceError(f"coil: {FAILURES[status]}.")
+    loops = (start.size - _FRONT) // 3 if isinstance(plant, FluxMap) else plant.loops.shape[1]
+    return CoilRun(
+        time=step * np.arange(y.size),
+        current=log[:, 5],
+        flux=log[:, 7],
+        voltage=log[1:, 6],
+        force=log[1:, 0],
+        state=log[:, 1],
+        fluxes=log[:, 1 + _FRONT : 1 + _FRONT + loops],
+        electric=sums[0],
+        ohmic=sums[1],
+        eddy=sums[2],
+        work=sums[3],
+        stored=sums[4:],
+    )
