@@ -36,6 +36,7 @@ from klack.simulation.contact_step import law_potential, mean_force, solve_linea
 __all__ = ["NO_LAW", "film_force", "interface_store", "solve_interface"]
 
 Vector = NDArray[np.float64]
+Step = tuple[float, float, float, float, int, float, float]
 
 NO_LAW = -1
 """``kind`` of an interface without a contact: only a film."""
@@ -48,7 +49,7 @@ _NEWTON_LIMIT = 100
 _SERIES = 0.05  # below it the logarithm is a short series
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def film_force(
     cubic: float, linear: float, cut_off: float, h: float, z0: float, z1: float
 ) -> float:
@@ -58,18 +59,30 @@ def film_force(
     """
     x0, x1 = max(z0, 0.0) + cut_off, max(z1, 0.0) + cut_off
     closed = max(z0, 0.0) - max(z1, 0.0)
-    total = x0 + x1
-    product = x0 * x1
-    damping = 0.5 * cubic * total / (product * product)
+    return _film_mean(cubic, linear, x0, x1, 1.0 / x0, 1.0 / x1, closed) / h
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _film_mean(
+    cubic: float,
+    linear: float,
+    x0: float,
+    x1: float,
+    inverse0: float,
+    inverse1: float,
+    closed: float,
+) -> float:
+    """``Pi(x1) - Pi(x0)`` with ``closed = x0 - x1``."""
+    total, inverses = x0 + x1, inverse0 * inverse1
+    damping = 0.5 * cubic * total * inverses * inverses
     if linear != 0.0:
         r = closed / total
-        if abs(r) < _SERIES:
-            r2 = r * r
-            log_mean = 2.0 + r2 * (2 / 3 + r2 * (2 / 5 + r2 * (2 / 7 + r2 * (2 / 9 + r2 * 2 / 11))))
-            damping += linear * log_mean / total
-        else:
-            damping += linear * log(x0 / x1) / closed
-    return closed / h * damping
+        if abs(r) > _SERIES:
+            return closed * damping + linear * log(x0 * inverse1)
+        r2 = r * r
+        log_mean = 2.0 + r2 * (2 / 3 + r2 * (2 / 5 + r2 * (2 / 7 + r2 * (2 / 9 + r2 * 2 / 11))))
+        return closed * damping + linear * r * log_mean
+    return closed * damping
 
 
 @njit(cache=True, error_model="numpy")
@@ -112,7 +125,7 @@ def solve_interface(
     e0: float,
     guess: float,
     hint: int,
-) -> tuple[float, float, float, float, int, float, float]:
+) -> Step:
     """Forces of an interface over one step, and where it ends.
 
     A pure function: it may be called again for the same step with another ``g_free``.
@@ -153,55 +166,60 @@ def solve_interface(
         there is none, to the contact.
     """
     z0 = g0 + e0
-    filmed = cubic > 0.0 or linear > 0.0
+    if cubic == 0.0 and linear == 0.0:
+        if kind == NO_LAW or (z0 >= 0.0 and g_free >= 0.0 and g_free >= e0):
+            relaxed = 0.5 * e0 * e0 / series if e0 != 0.0 else 0.0
+            return 0.0, 0.0, g_free, 0.0, hint, relaxed, 0.0
+        return _bare(kind, law_data, law_start, chi_over_h, G, series, z0, g_free, e0, guess, hint)
     theta = 0.5
-    S, base = G, g_free
-    if series > 0.0:
-        if filmed and z0 > 0.0:
-            theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
-        S = G + series / theta
-        base = g_free - (1.0 - theta) / theta * e0
-    if filmed:
-        contact, film, hint = _both(
-            kind,
-            law_data,
-            law_start,
-            chi_over_h,
-            cubic,
-            linear,
-            cut_off,
-            suction,
-            h,
-            S,
-            z0,
-            base,
-            guess,
-            hint,
-        )
-    else:
-        film = 0.0
-        contact, hint = _contact_alone(
-            kind, law_data, law_start, chi_over_h, S, z0, base, guess, hint
-        )
-        if contact == 0.0 and e0 != 0.0:  # released
-            theta = 1.0
-            contact, hint = _contact_alone(
-                kind, law_data, law_start, chi_over_h, G + series, z0, g_free, 0.0, hint
-            )
-    force = contact + film
-    g1 = g_free + G * force
-    e1, relaxed = 0.0, 0.0
-    if series > 0.0:
-        e1 = (series * force - (1.0 - theta) * e0) / theta
-        relaxed = (theta - 0.5) * (e1 - e0) * (e1 - e0) / series
-    contact_loss, film_loss = 0.0, 0.0
-    if chi_over_h != 0.0:
-        contact_loss = _damping_loss(kind, law_data, law_start, contact, z0, g1 + e1, hint)
-    if filmed:
-        film_loss = film * (z0 - (g1 + e1)) + relaxed
-    else:
-        contact_loss += relaxed
-    return contact, film, g1, e1, hint, contact_loss, film_loss
+    if series > 0.0 and z0 > 0.0:
+        theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
+    if z0 >= 0.0:
+        S, base = _line(G, series, theta, g_free, e0)
+        film, found = _film_alone(cubic, linear, cut_off, suction, h, S, z0, base, guess)
+        if found:
+            g1 = g_free + G * film
+            e1, relaxed = _compressed(series, theta, film, e0)
+            return 0.0, film, g1, e1, hint, 0.0, film * (z0 - (g1 + e1)) + relaxed
+    return _both(
+        kind,
+        law_data,
+        law_start,
+        chi_over_h,
+        cubic,
+        linear,
+        cut_off,
+        suction,
+        h,
+        G,
+        series,
+        theta,
+        z0,
+        g_free,
+        e0,
+        guess,
+        hint,
+    )
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _line(G: float, series: float, theta: float, g_free: float, e0: float) -> tuple[float, float]:
+    """``S`` and ``base`` of the gap between the faces, ``z1 = base + S F``."""
+    if theta == 0.5:
+        return G + 2.0 * series, g_free - e0
+    inverse = 1.0 / theta
+    return G + series * inverse, g_free - (inverse - 1.0) * e0
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _compressed(series: float, theta: float, force: float, e0: float) -> tuple[float, float]:
+    """Compression at the end of the step, and what it lost by relaxing."""
+    if series == 0.0:
+        return 0.0, 0.0
+    if theta == 0.5:
+        return 2.0 * series * force - e0, 0.0
+    e1 = (series * force - (1.0 - theta) * e0) / theta
+    return e1, (theta - 0.5) * (e1 - e0) * (e1 - e0) / series
 
 
 @njit(cache=True, inline="always", error_model="numpy")
@@ -215,15 +233,44 @@ def _relaxing(
     reach: float,
 ) -> float:
     """``theta`` of a step that starts open in a film; 1/2 where the step closes the gap."""
-    x0 = z0 + cut_off
-    damping = (cubic / (x0 * x0) + linear) / x0
+    inverse = 1.0 / (z0 + cut_off)
+    damping = (cubic * inverse * inverse + linear) * inverse
     most = 0.5 - series * damping / h
     if most <= 0.0:
         return 0.5
-    return 0.5 + most * min(max(2.0 * reach / z0, 0.0), 1.0)
+    if reach >= 0.5 * z0:
+        return 0.5 + most
+    return 0.5 + most * max(2.0 * reach / z0, 0.0)
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
+def _bare(
+    kind: int,
+    p: Vector,
+    start: int,
+    chi_over_h: float,
+    G: float,
+    series: float,
+    z0: float,
+    g_free: float,
+    e0: float,
+    guess: float,
+    hint: int,
+) -> Step:
+    """:func:`solve_interface` without a film."""
+    theta, S, base = 0.5, G + 2.0 * series, g_free - e0
+    contact, hint = _contact_alone(kind, p, start, chi_over_h, S, z0, base, guess, hint)
+    if contact == 0.0 and e0 != 0.0:  # released
+        theta, S, base = 1.0, G + series, g_free
+        contact, hint = _contact_alone(kind, p, start, chi_over_h, S, z0, base, 0.0, hint)
+    lost = 0.0
+    if chi_over_h != 0.0:
+        lost = _damping_loss(kind, p, start, contact, z0, base + S * contact, hint)
+    e1, relaxed = _compressed(series, theta, contact, e0)
+    return contact, 0.0, g_free + G * contact, e1, hint, lost + relaxed, 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def _contact_alone(
     kind: int,
     p: Vector,
@@ -235,12 +282,59 @@ def _contact_alone(
     guess: float,
     hint: int,
 ) -> tuple[float, int]:
-    if kind == NO_LAW or (z0 >= 0.0 and base >= 0.0):
+    if z0 >= 0.0 and base >= 0.0:
         return 0.0, hint
     if kind == _LINEAR and chi_over_h == 0.0:
         return solve_linear(p[start], S, -z0, -base), hint
     force, hint, _ = solve_step(kind, p, start, chi_over_h, S, -z0, -base, guess, hint)
     return force, hint
+
+
+@njit(cache=True, error_model="numpy")
+def _film_alone(
+    cubic: float,
+    linear: float,
+    cut_off: float,
+    suction: float,
+    h: float,
+    S: float,
+    z0: float,
+    base: float,
+    guess: float,
+) -> tuple[float, bool]:
+    """Film force of a step that starts open, and whether it also ends open.
+
+    ``excess`` is concave over ``z > 0``: Newton's method overshoots at most once, to smaller ``z``.
+    """
+    rate = 1.0 / h
+    x0 = z0 + cut_off
+    inverse0 = 1.0 / x0
+    z = max(base + S * guess, 0.0)
+    film = 0.0
+    for _ in range(_NEWTON_LIMIT):
+        x = z + cut_off
+        inverse = 1.0 / x
+        film = rate * _film_mean(cubic, linear, x0, x, inverse0, inverse, z0 - z)
+        pulled = film <= -suction
+        if pulled:
+            film = -suction
+        excess = z - base - S * film
+        slope, curvature = 0.0, 0.0
+        if not pulled:
+            damper = cubic * inverse * inverse
+            slope = (damper + linear) * inverse * rate
+            curvature = (3.0 * damper + linear) * inverse * inverse * rate
+        step = excess / (1.0 + S * slope)
+        if abs(excess) < _ROUND_OFF or (
+            curvature * step * step < _FORCE_LEFT and step < z and not (pulled and step > 0.0)
+        ):
+            film += slope * step
+            if pulled or film >= -suction:
+                return film, True
+        if z == 0.0 and excess > 0.0:
+            return 0.0, False
+        z = max(z - step, 0.0)
+    return film, False
 
 
 @njit(cache=True, error_model="numpy")
@@ -254,18 +348,25 @@ def _both(
     cut_off: float,
     suction: float,
     h: float,
-    S: float,
+    G: float,
+    series: float,
+    theta: float,
     z0: float,
-    base: float,
+    g_free: float,
+    e0: float,
     guess: float,
     hint: int,
-) -> tuple[float, float, int]:
-    """Contact and film force: root ``z`` of ``excess = z - base - S (F_c + F_f) = 0``.
+) -> Step:
+    """:func:`solve_interface` with film and contact.
 
-    ``excess`` rises with a slope of 1 or more, so the root lies within ``|excess|`` of any ``z``.
-    A Newton step that would cross ``z = 0``, where the film ends with a kink, stops there: beyond
-    it ``excess`` is concave over ``z``, and Newton's method cannot fail from that end.
+    ``excess = z - base - S (F_c + F_f)`` rises with a slope of 1 or more, so its root lies within
+    ``|excess|`` of any ``z``.  A Newton step that would cross ``z = 0``, where the film ends with a
+    kink, stops there: beyond it ``excess`` is concave, and Newton's method cannot fail.
     """
+    S, base = _line(G, series, theta, g_free, e0)
+    open0, rate = max(z0, 0.0), 1.0 / h
+    x0 = open0 + cut_off
+    inverse0 = 1.0 / x0
     z = base + S * guess
     low, high = -np.inf, np.inf
     contact, film = 0.0, 0.0
@@ -273,17 +374,19 @@ def _both(
         contact, stiffness, curvature = 0.0, 0.0, 0.0
         if (z0 < 0.0 or z < 0.0) and kind != NO_LAW:
             contact, stiffness, curvature, hint = _contact(kind, p, start, chi_over_h, z0, z, hint)
-        film = film_force(cubic, linear, cut_off, h, z0, z)
+        open1 = max(z, 0.0)
+        x = open1 + cut_off
+        inverse = 1.0 / x
+        film = rate * _film_mean(cubic, linear, x0, x, inverse0, inverse, open0 - open1)
         pulled = film <= -suction
         if pulled:
             film = -suction
         excess = z - base - S * (contact + film)
         film_slope = 0.0
         if not pulled and (z > 0.0 or (z == 0.0 and excess < 0.0)):
-            x = z + cut_off
-            damper = cubic / (x * x)
-            film_slope = (damper + linear) / (x * h)
-            curvature += (3.0 * damper + linear) / (x * x * h)
+            damper = cubic * inverse * inverse
+            film_slope = (damper + linear) * inverse * rate
+            curvature += (3.0 * damper + linear) * inverse * inverse * rate
         step = excess / (1.0 + S * (stiffness + film_slope))
         after = z - step
         kinked = z == 0.0 or (z > 0.0) != (after > 0.0) or (pulled and step > 0.0)
@@ -291,7 +394,8 @@ def _both(
         if abs(excess) < _ROUND_OFF or (not kinked and curvature * step * step < _FORCE_LEFT):
             contact = max(contact + stiffness * step, 0.0)
             if pulled or film + film_slope * step >= -suction:
-                return contact, film + film_slope * step, hint
+                film += film_slope * step
+                break
         if excess > 0.0:
             low, high = max(low, z - excess), z
         else:
@@ -301,10 +405,15 @@ def _both(
         if not low <= after <= high:
             after = 0.5 * (low + high)
         z = after
-    return contact, film, hint
+    lost = 0.0
+    if chi_over_h != 0.0:
+        lost = _damping_loss(kind, p, start, contact, z0, base + S * (contact + film), hint)
+    g1 = g_free + G * (contact + film)
+    e1, relaxed = _compressed(series, theta, contact + film, e0)
+    return contact, film, g1, e1, hint, lost, film * (z0 - (g1 + e1)) + relaxed
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _contact(
     kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z: float, hint: int
 ) -> tuple[float, float, float, int]:
