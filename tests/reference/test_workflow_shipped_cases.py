@@ -28,8 +28,9 @@ def study_of(name: str, *levels: str) -> ImpactStudy:
     return run_impact(case.model_copy(update={"run": run}), levels=levels)
 
 
-def test_all_shipped_cases_are_tested_here():
+def test_all_shipped_cases_are_tested():
     assert set(shipped_cases()) == {
+        "demo-stroke",  # in test_workflow_stroke.py
         "demo-valve",
         "demo-valve-axisymmetric",
         "needle-from-inp",

@@ -13,6 +13,7 @@ from klack.case.valve import ValveCase, Variant
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.statics import check_resolution
 from klack.errors import InputError
+from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
 from klack.network.port import Role
@@ -203,12 +204,8 @@ def _gap(network: Network, name: str) -> float:
 
 def _switch_off(network: Network) -> float:
     """When the drivers' command ends [s]; nan if no driver says."""
-    ends = [
-        getattr(part, "switch_off", None)
-        for part in network.components.values()
-        if any(port.role is Role.VOLTAGE for port in part.port_kinds().values())
-    ]
-    return max((float(end) for end in ends if end is not None), default=float("nan"))
+    ends = [part.end for part in network.components.values() if isinstance(part, TimedDriver)]
+    return max((end for end in ends if end is not None), default=float("nan"))
 
 
 def _channels(
