@@ -23,7 +23,8 @@ def impact_events(
 ) -> tuple[ImpactEvent, ...]:
     """Find the impacts on all interfaces, in order of time.
 
-    Contacts that follow each other within the longest period of the two bodies are one impact.  A
+    Contacts that follow each other within the longest period of the two bodies are one impact, and
+    so are contacts between which the centres of mass do not move apart.  A
     contact that is closed at the start is none.  A film acts before the first touch and after the
     last one: the speeds are the highest ones while it presses, and while it pulls.
     """
@@ -81,7 +82,7 @@ def _of_interface(
     open_ended = ends == len(closed)
     if open_ended[-1]:
         stop[-1] = np.nan
-    clusters = _clusters(begin, stop, _cluster_time(bodies))
+    clusters = _clusters(begin, stop, _cluster_time(bodies), time, gap_rate)
     mass = _effective_mass(bodies)
     total = record.contact_force + record.film_force
     events = []
@@ -93,6 +94,8 @@ def _of_interface(
         felt = record.time[window.start]
         let_go = record.time[window.stop - 1] + record.step[window.stop - 1]
         before = -max(_fastest(felt, t0, time, -gap_rate), -_at(t0, time, gap_rate, earlier=True))
+        if not before < 0.0:
+            continue  # trembles while the stop is left: nothing was hit
         after = np.nan
         if np.isfinite(t1):
             leaving = _at(t1, time, gap_rate, earlier=False)
@@ -115,7 +118,7 @@ def _of_interface(
                 contact_time=float(record.step[closed_steps].sum()),
                 separation_time=float(t1),
                 impulse=float(force @ steps),
-                restitution=-after / before if before != 0.0 else np.nan,
+                restitution=-after / before,
                 energy_loss=0.5 * mass * (before**2 - after**2),
             )
         )
@@ -137,10 +140,14 @@ def _at(t: float, time: Vector, rate: Vector, *, earlier: bool) -> float:
     return float(rate[i] + (rate[i] - rate[j]) / (time[i] - time[j]) * (t - time[i]))
 
 
-def _clusters(begin: Vector, stop: Vector, within: float) -> list[tuple[int, int]]:
+def _clusters(
+    begin: Vector, stop: Vector, within: float, time: Vector, gap_rate: Vector
+) -> list[tuple[int, int]]:
+    """First and last contact of each impact; it lasts until the centres of mass move apart."""
     groups = [[0, 0]]
     for i in range(1, len(begin)):
-        if begin[i] - stop[i - 1] < within:
+        near = begin[i] - stop[i - 1] < within
+        if near or _fastest(stop[i - 1], begin[i], time, gap_rate) <= 0.0:
             groups[-1][1] = i
         else:
             groups.append([i, i])
@@ -150,7 +157,7 @@ def _clusters(begin: Vector, stop: Vector, within: float) -> list[tuple[int, int
 def _fastest(begin: float, end: float, time: Vector, speed: Vector) -> float:
     """Highest speed in the records between two times; -infinity without any."""
     first, last = np.searchsorted(time, (begin, end))
-    return float(np.max(speed[first:last], initial=-np.inf))
+    return float(np.max(speed[int(first) : int(last)], initial=-np.inf))
 
 
 def _film_end(record: InterfaceRecord, end: int) -> int:

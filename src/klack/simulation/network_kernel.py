@@ -53,7 +53,7 @@ STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0,
 SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
 _MOST_SWEEPS = 200
 _MOST_NEWTON = 80
-_PRESSURE_LEFT = 1e-7  # last Newton step over the pressure
+_PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
 _FILM_SMALL = 0.02  # [N] film force that a coarse step may meet
@@ -754,7 +754,8 @@ def run_network(
                     for i in range(count_nodes):
                         inflow[i] = 0.0
                     for i in range(volumes):
-                        g[i] += r[i] / rho[i]  # r is the last Newton step, 1e-7 of the pressure
+                        # r is the last Newton step: g to second order in it
+                        g[i] += r[i] / rho[i] * (1.0 - 0.5 * r[i] * slope[i] / rho[i])
                     for k in range(count_branches):
                         a, b = branch_a[k], branch_b[k]
                         inflow[a] -= H * mdot[k]
