@@ -54,8 +54,8 @@ def test_network_without_lines_has_empty_arrays():
 @pytest.mark.parametrize(
     ("given", "parts", "terms"),
     [
-        ({}, 4, 10),
-        ({"friction": "steady"}, 4, 0),
+        ({}, 2, 10),
+        ({"friction": "steady"}, 2, 0),
         ({"friction": "none"}, 1, 0),
         ({"friction": "none", "segments": 3}, 3, 0),
     ],

@@ -96,8 +96,12 @@ class Lines(NamedTuple):
         Mean ``dp / (q - i)`` of one whole lump over a fine step (0) and a coarse step (1).
     decay : array, shape (2, k) [-]
         Share of ``q - i`` left after a fine step (0) and a coarse step (1).
+    heat : array, shape (2, k) [Pa s^2/m^3]
+        Loss of one whole lump in a step over ``(q - i)^2``.
     inductance : array, shape (k,) [Pa s^2/m^3]
         Of one whole lump, ``gain / rate``.
+    lump : array, shape (2, n) [Pa s/m^3]
+        ``dp / q`` of one whole lump without memory: its resistance and all its terms.
     """
 
     step: float
@@ -114,7 +118,9 @@ class Lines(NamedTuple):
     first_memory: Integers
     impedance_of_term: Matrix
     decay: Matrix
+    heat: Matrix
     inductance: Vector
+    lump: Matrix
 
 
 class LineState(NamedTuple):
@@ -183,12 +189,18 @@ def compile_lines(
     gain = _concatenate([row.unsteady_gain / row.segments for row in rows])
     rate = _concatenate([row.unsteady_rate for row in rows])
     durations = rate * np.array([[step], [coarse * step]])
+    impedance_of_term = gain * -np.expm1(-durations) / durations
+    resistance = np.array([row.resistance / row.segments for row in rows], dtype=float)
+    line_of_term = np.repeat(np.arange(len(rows)), terms)
+    lump = np.tile(resistance, (2, 1))
+    for level in range(2):
+        np.add.at(lump[level], line_of_term, impedance_of_term[level])
     lines = Lines(
         step=float(step),
         coarse=int(coarse),
         node=np.array([node for row in rows for node in (row.a, row.b)], dtype=np.int64),
         impedance=np.array([row.impedance for row in rows], dtype=float),
-        resistance=np.array([row.resistance / row.segments for row in rows], dtype=float),
+        resistance=resistance,
         vapour=np.array([row.vapour_pressure - ambient_pressure for row in rows], dtype=float),
         first_segment=_offsets(segments),
         depth=depth,
@@ -196,9 +208,11 @@ def compile_lines(
         start=np.ascontiguousarray(start[:-1].reshape(-1, 2)),
         first_term=_offsets(terms),
         first_memory=_offsets(memories)[:-1],
-        impedance_of_term=gain * -np.expm1(-durations) / durations,
+        impedance_of_term=impedance_of_term,
         decay=np.exp(-durations),
+        heat=0.5 * gain / rate * -np.expm1(-2.0 * durations),
         inductance=gain / rate,
+        lump=lump,
     )
     state = LineState(
         samples=np.zeros(start[-1]),
@@ -277,27 +291,25 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _lump(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> tuple[float, float]:
-    """Unsteady friction of a lump as ``offset + slope q``."""
-    offset, slope = 0.0, 0.0
+def _memory(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> float:
+    """Part of the pressure drop of a lump that its memory takes back [Pa]."""
+    drop = 0.0
     for k in range(k0, k1):
-        offset -= z[k] * memory[first + k - k0]
-        slope += z[k]
-    return offset, slope
+        drop += z[k] * memory[first + k - k0]
+    return drop
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _rub(
-    memory: Vector, first: int, decay: Vector, inductance: Vector, k0: int, k1: int, q: float
+    memory: Vector, first: int, decay: Vector, heat: Vector, k0: int, k1: int, q: float
 ) -> float:
     """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]."""
-    heat = 0.0
+    total = 0.0
     for k in range(k0, k1):
-        E = decay[k]
         d = q - memory[first + k - k0]
-        memory[first + k - k0] = q - E * d
-        heat += 0.5 * inductance[k] * (1.0 - E * E) * d * d
-    return heat
+        memory[first + k - k0] = q - decay[k] * d
+        total += heat[k] * d * d
+    return total
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
@@ -315,7 +327,8 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
     c, Z : array, shape (2 n,)
         Written.
     """
-    z = lines.impedance_of_term[0 if m == 1 else 1]
+    level = 0 if m == 1 else 1
+    z = lines.impedance_of_term[level]
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
         lost = 0.0
@@ -347,15 +360,11 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
         a, b = 2 * line, 2 * line + 1
         c[a], c[b] = state.incoming[s0, 1], state.incoming[s1 - 1, 0]
-        Z[a] = Z[b] = impedance + 0.5 * lines.resistance[line]
+        Z[a] = Z[b] = impedance + 0.5 * lines.lump[level, line]
         if k1 > k0:
             first = lines.first_memory[line]
-            offset, slope = _lump(state.memory, first, z, k0, k1)
-            c[a] += 0.5 * offset
-            Z[a] += 0.5 * slope
-            offset, slope = _lump(state.memory, first + (s1 - s0) * (k1 - k0), z, k0, k1)
-            c[b] += 0.5 * offset
-            Z[b] += 0.5 * slope
+            c[a] -= 0.5 * _memory(state.memory, first, z, k0, k1)
+            c[b] -= 0.5 * _memory(state.memory, first + (s1 - s0) * (k1 - k0), z, k0, k1)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
@@ -373,7 +382,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
     """
     level = 0 if m == 1 else 1
     duration = m * lines.step
-    decay = lines.decay[level]
+    decay, heating = lines.decay[level], lines.heat[level]
     z = lines.impedance_of_term[level]
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
@@ -383,9 +392,9 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         q_a, q_b = q[2 * line], q[2 * line + 1]
         heat = 0.5 * duration * R * (q_a * q_a + q_b * q_b)
         if terms > 0:
-            heat += 0.5 * _rub(state.memory, at, decay, lines.inductance, k0, k1, q_a)
+            heat += 0.5 * _rub(state.memory, at, decay, heating, k0, k1, q_a)
             last = at + terms * (s1 - s0)
-            heat += 0.5 * _rub(state.memory, last, decay, lines.inductance, k0, k1, q_b)
+            heat += 0.5 * _rub(state.memory, last, decay, heating, k0, k1, q_b)
         out = state.incoming[s0, 1] + 2.0 * Z * q_a
         collapse = 0.0
         for s in range(s0, s1):
@@ -399,10 +408,10 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
                 # a lump with a cavity in its middle: Q + dQ flows in from the left, Q - dQ out
                 left, right = state.incoming[s, 0], state.incoming[s + 1, 1]
                 at += terms
-                offset, slope = _lump(state.memory, at, z, k0, k1)
-                Q = (left - right - offset) / (2.0 * Z + R + slope)
+                Q = left - right + _memory(state.memory, at, z, k0, k1)
+                Q /= 2.0 * Z + lines.lump[level, line]
                 if terms > 0:
-                    heat += _rub(state.memory, at, decay, lines.inductance, k0, k1, Q)
+                    heat += _rub(state.memory, at, decay, heating, k0, k1, Q)
                 heat += duration * R * Q * Q
                 free = 0.5 * (left + right)
                 V0, dQ = state.cavity[s], 0.0
