@@ -12,6 +12,7 @@ __all__ = ["impact_events"]
 
 Vector = NDArray[np.float64]
 
+_FILM_PAUSE = 2e-6  # [s] a film is not recorded while its force passes through zero
 _SHORTEST_CLUSTER = 5e-6  # [s] contacts closer than this are one impact, also of rigid bodies
 
 
@@ -26,7 +27,8 @@ def impact_events(
     Contacts that follow each other within the longest period of the two bodies are one impact, and
     so are contacts between which the centres of mass do not move apart.  A
     contact that is closed at the start is none.  A film acts before the first touch and after the
-    last one: the speeds are the highest ones while it presses, and while it pulls.
+    last one: the speeds are the highest ones while it presses, and within two of these periods
+    while it pulls.
     """
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     events: list[ImpactEvent] = []
@@ -99,7 +101,8 @@ def _of_interface(
         after = np.nan
         if np.isfinite(t1):
             leaving = _at(t1, time, gap_rate, earlier=False)
-            after = max(_fastest(t1, let_go, time, gap_rate), leaving)
+            soon = min(let_go, t1 + 2.0 * _cluster_time(bodies))
+            after = max(_fastest(t1, soon, time, gap_rate), leaving)
         force, steps = total[window], record.step[window]
         peak = int(np.argmax(force))
         closed_steps = np.concatenate(
@@ -164,8 +167,8 @@ def _film_end(record: InterfaceRecord, end: int) -> int:
     """First step after ``end`` that no longer feels the film that follows the contact."""
     i = end
     while i < len(record.time):
-        gapless = record.time[i] - record.time[i - 1] < 1.5 * record.step[i - 1]
-        if not gapless or record.contact_force[i] > 0.0 or record.film_force[i] >= 0.0:
+        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE
+        if not gapless or record.contact_force[i] > 0.0:
             break
         i += 1
     return i
@@ -175,7 +178,7 @@ def _film_start(record: InterfaceRecord, first: int) -> int:
     """First step of the film force that leads into the contact at ``first``."""
     i = first
     while i > 0:
-        gapless = record.time[i] - record.time[i - 1] < 1.5 * record.step[i - 1]
+        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE
         if not gapless or record.contact_force[i - 1] > 0.0 or record.film_force[i - 1] <= 0.0:
             break
         i -= 1

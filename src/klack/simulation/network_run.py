@@ -50,7 +50,7 @@ State = Mapping[str, NDArray[np.generic]]
 
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
-_CHUNK = 250_000  # fine steps between two looks at the clock and the keyboard: 50 ms; a call costs 0.7 ms
+_CHUNK = 250_000  # fine steps between two looks at the keyboard, 50 ms; a call costs 0.7 ms
 _MOST_FINE = 1_000_000  # recorded fine steps per interface
 _MOST_VALUES = 400_000_000
 
@@ -135,7 +135,7 @@ def simulate_network(
         )
         progress((first + count) / records)
     wall_time = perf_counter() - begin
-    time: Vector = (first_step + per_record * coarse * np.arange(records + 1)) * float(step)
+    time = step * np.arange(records + 1, dtype=float) * (per_record * coarse) + first_step * step
     channels = recorder.channels()
     interfaces = recorder.interfaces()
     return NetworkResult(
