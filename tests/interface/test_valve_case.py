@@ -1,12 +1,14 @@
 """Cases of a whole valve: truth = the numbers written in the file, and where a mistake was put."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from klack.case import read_case
-from klack.case.valve import ValveCase
+from klack.case.bodies import CaseBody
+from klack.case.valve import BodyPort, CaseStop, StrokeRun, ValveBody, ValveCase
 from klack.case.valve_reader import (
     load_any_case,
     load_valve_case,
@@ -15,6 +17,8 @@ from klack.case.valve_reader import (
 )
 from klack.case.valve_roles import find_roles
 from klack.errors import InputError
+from klack.input.section import Section
+from klack.network.catalogue import component_classes
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
 IMPACT = FILE.with_name("drawn.yaml")
@@ -216,3 +220,28 @@ def test_variants_are_checked():
     assert case.require_variants(("dry-lumped", "wet", "wet")) == ("wet", "dry-lumped")
     with pytest.raises(InputError, match="did you mean 'dry'"):
         case.require_variants(("dyr",))
+
+
+PAGE = (FILE.parents[3] / "docs" / "reference" / "valve-case.md").read_text(encoding="utf-8")
+
+
+def test_example_of_the_reference_page_is_a_case():
+    example = re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    assert example is not None
+
+    roles = find_roles(read_valve_case(example[1], Path("example.yaml")))
+
+    assert (roles.seat, roles.opening_stop) == ("seat", "stop")
+
+
+@pytest.mark.parametrize("section", [ValveCase, ValveBody, BodyPort, CaseStop, StrokeRun])
+def test_reference_page_has_every_key(section: type[Section]):
+    for key in section.model_fields:
+        assert f"`{key}`" in PAGE or key in CaseBody.model_fields or f"`{key}:" in PAGE, key
+
+
+def test_reference_page_has_every_component_with_its_ports():
+    for found in component_classes():
+        row = next(line for line in PAGE.splitlines() if f"`{found.type}`" in line and "|" in line)
+        for port in found.ports:
+            assert port in row
