@@ -12,6 +12,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+from klack import verification
 from klack.cli import demo as demo_module
 from klack.cli.main import main
 from klack.cli.output import staged_folder, write_json
@@ -21,7 +22,7 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.verification import GROUPS, Check, compare, run_checks
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
-COMMANDS = ["demo", "impact", "reduce", "report", "schema", "verify"]
+COMMANDS = ["demo", "impact", "reduce", "report", "schema", "stroke", "verify"]
 
 
 @pytest.fixture(autouse=True)
@@ -291,11 +292,19 @@ def test_groups_run_once_each_in_a_fixed_order(monkeypatch):
     for group in GROUPS:
         play_group(monkeypatch, group, lambda group=group: ran.append(group) or [check(2.0)])
 
-    assert len(run_checks()) == len(GROUPS) == 7
+    assert len(run_checks()) == len(GROUPS)
     assert tuple(ran) == GROUPS
     ran.clear()
     run_checks([GROUPS[3], GROUPS[1], GROUPS[3]])
     assert ran == [GROUPS[1], GROUPS[3]]
+
+
+def test_every_module_with_checks_is_a_group():
+    folder = Path(verification.__file__).parent
+    found = {path.stem for path in folder.glob("*.py") if "\ndef checks(" in path.read_text()}
+
+    assert found == set(GROUPS)
+    assert len(set(GROUPS)) == len(GROUPS)
 
 
 # ------------------------------------------------------------------ files and progress

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 from klack.cli.progress import show_progress
+from klack.cli.reports import REPORTS, remove_reports, write_reports
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ def run_case(
                 except Exception as error:  # a mistake in a picture may not cost the calculation
                     failure = error
             if failure or not report:
-                _remove_reports(stage)
-                _remove_reports(folder)  # they would show an earlier result
+                remove_reports(stage)
+                remove_reports(folder)  # they would show an earlier result
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")
@@ -84,24 +85,6 @@ def run_case(
     return folder
 
 
-_REPORTS = ("report.html", "report.pdf")
-
-
-def write_reports(study: "ImpactStudy", folder: Path) -> None:
-    """Write the report of a study as HTML and as PDF."""
-    from klack.report.html import write_report
-    from klack.report.pdf import write_pdf
-
-    page, print_ = (folder / name for name in _REPORTS)
-    write_report(study, page)
-    write_pdf(study, print_)
-
-
-def _remove_reports(folder: Path) -> None:
-    for name in _REPORTS:
-        (folder / name).unlink(missing_ok=True)
-
-
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
     from klack.workflow.summary import SUMMARY_COLUMNS, summary_rows
 
@@ -109,5 +92,5 @@ def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr:
     stream = sys.stderr if to_stderr else sys.stdout
     for warning in study.warnings:
         print(f"Note: {warning}", file=stream)
-    made = ["result.zarr", *(_REPORTS if report else ())]
+    made = ["result.zarr", *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -23,7 +23,7 @@ from typing import Any
 from cyclopts import App, CycloptsError
 
 from klack import __version__
-from klack.cli import demo, impact, reduce, report, schema, verify
+from klack.cli import demo, impact, reduce, report, schema, stroke, verify
 from klack.errors import AccuracyWarning, ConvergenceError, KlackError
 
 __all__ = ["app", "main"]
@@ -40,6 +40,7 @@ app = App(
 )
 app.command(demo.demo)
 app.command(impact.impact)
+app.command(stroke.stroke)
 app.command(reduce.reduce)
 app.command(report.report)
 app.command(verify.verify)

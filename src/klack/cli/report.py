@@ -1,18 +1,24 @@
-"""``klack report``: the report of a stored result."""
+"""``klack report``: the report of a stored result, of an impact or of a stroke."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from klack.cli.options import Quiet
 from klack.cli.output import require_folder, staged_folder
 
+if TYPE_CHECKING:
+    from klack.report.study_content import Study
+
 __all__ = ["report"]
 
 
 def report(
-    result: Annotated[Path, Parameter(name="RESULT", help="Folder that klack impact wrote.")],
+    result: Annotated[
+        Path,
+        Parameter(name="RESULT", help="Folder that klack impact or klack stroke wrote."),
+    ],
     /,
     *,
     out: Annotated[
@@ -21,14 +27,24 @@ def report(
     quiet: Quiet = False,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
-    from klack.cli.impact import write_reports
-    from klack.workflow.store import load_study
+    from klack.cli.reports import REPORTS, write_reports
 
     folder = out if out is not None else result
-    study = load_study(result)
+    study = _load(result)
     require_folder(folder)
     with staged_folder(folder) as stage:
         write_reports(study, stage)
     if not quiet:
-        print(f"Report in {folder}: report.html, report.pdf")
+        print(f"Report in {folder}: {', '.join(REPORTS)}")
     return 0
+
+
+def _load(result: Path) -> "Study":
+    """Read whichever kind of study the store holds."""
+    from klack.workflow.record_store import stored_format
+    from klack.workflow.store import load_study
+    from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
+
+    return (
+        load_stroke(result) if stored_format(result) == STROKE_FORMAT.name else load_study(result)
+    )

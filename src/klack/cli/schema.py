@@ -1,7 +1,7 @@
 """``klack schema``: every key of a case file."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -12,6 +12,14 @@ __all__ = ["schema"]
 
 def schema(
     *,
+    kind: Annotated[
+        Literal["impact", "stroke"],
+        Parameter(
+            name="--kind",
+            help="impact: two bodies that hit each other (klack impact, klack reduce); stroke: a "
+            "whole valve with all components of its network (klack stroke).",
+        ),
+    ] = "impact",
     json: Annotated[
         Path,
         Parameter(
@@ -22,8 +30,18 @@ def schema(
     ] = Path("-"),
 ) -> int:
     """Print the JSON schema of case files, for editors that check while one types."""
+    require_json_target(json)
+    write_json(json, _schema_of(kind))
+    return 0
+
+
+def _schema_of(kind: str) -> dict[str, Any]:
+    # the components of a network take a while to import
+    if kind == "stroke":
+        from klack.case.valve_reader import valve_case_schema
+
+        return valve_case_schema()
+
     from klack.case import case_schema
 
-    require_json_target(json)
-    write_json(json, case_schema())
-    return 0
+    return case_schema()

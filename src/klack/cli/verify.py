@@ -8,6 +8,7 @@ from klack.cli.options import Json, Quiet
 from klack.cli.output import require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.tables import print_table
+from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:
     from klack.verification import Check
@@ -25,15 +26,14 @@ def verify(
             name="--group",
             consume_multiple=True,
             negative="",
-            help="elasticity, contact, reduction, integrator, impact, transient, spectra. "
-            "[default: all]",
+            help=f"{', '.join(GROUPS)}. [default: all]",
         ),
     ] = None,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
     """Compare klack with exact and published results; exit code 1 if a check fails."""
-    from klack.verification import GROUPS, iterate_checks
+    from klack.verification import iterate_checks
 
     require_json_target(json)
     wanted = tuple(group) if group else GROUPS

@@ -94,7 +94,8 @@ class Curve:
     """One line: x and y in the units of the axes; nan breaks the line.
 
     ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1) or ``points``.
-    A curve without ``label`` has no entry in the legend.
+    A curve without ``label`` has no entry in the legend and no number under the pointer; one that
+    is not ``listed`` has the number alone.
     """
 
     x: NDArray[np.float64]
@@ -104,6 +105,7 @@ class Curve:
     colour: Colour = "black"
     width: float = 1.8
     drawn: Literal["line", "steps", "points"] = "line"
+    listed: bool = True
 
     def __post_init__(self) -> None:
         if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:

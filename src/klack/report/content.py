@@ -4,7 +4,7 @@ Everything here is plain text; each renderer escapes it in its own way, because 
 the text of the case come from the user.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -16,7 +16,16 @@ from klack.report.section_figure import SectionFigure, section_figure
 from klack.report.wording import answer, count, listed, quantity, share, signed, signed_share
 from klack.workflow.study import BodySummary, ImpactStudy, LevelResult
 
-__all__ = ["Content", "Section", "Table", "report_content"]
+__all__ = [
+    "Content",
+    "Section",
+    "Table",
+    "body_table",
+    "date_text",
+    "report_content",
+    "size_verdict",
+    "stage_table",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,11 +100,15 @@ def report_content(study: ImpactStudy) -> Content:
         Section(title="Energy", charts=named("energy", "modes"), tables=(_energy_table(study),))
     )
     sections.append(Section(title="Motion", charts=named("motion")))
-    sections.append(Section(title="Computing time", tables=(_stage_table(study),)))
+    sections.append(
+        Section(title="Computing time", tables=(stage_table(study.stage_times, study.wall_time),))
+    )
     libraries = [f"{name} {version}" for name, version in study.versions.items()]
     return Content(
         title=study.title or study.case,
-        subtitle=f"Dry impact · case {study.case} · {_date(study.created)} · klack {study.version}",
+        subtitle=(
+            f"Dry impact · case {study.case} · {date_text(study.created)} · klack {study.version}"
+        ),
         description=study.description,
         answer=answer(study),
         numbers=_number_table(study),
@@ -108,7 +121,7 @@ def report_content(study: ImpactStudy) -> Content:
     )
 
 
-def _date(created: str) -> str:
+def date_text(created: str) -> str:
     """``2025-01-31T12:00:00+00:00`` as ``2025-01-31 12:00 UTC``; other text as it came."""
     try:
         moment = datetime.fromisoformat(created)
@@ -207,10 +220,6 @@ def _comparison_rows(study: ImpactStudy, names: list[str]) -> list[tuple[str, ..
 
 def _computed(study: ImpactStudy) -> Section:
     contact, law = study.contact, study.law
-    bodies = Table(
-        columns=("", *(body.name for body in study.bodies)),
-        rows=tuple((title, *(text(body) for body in study.bodies)) for title, text in _BODY_ROWS),
-    )
     facts = [
         ("surfaces", contact.surfaces),
         ("closing speed", f"{study.speed:.4g} m/s"),
@@ -219,17 +228,26 @@ def _computed(study: ImpactStudy) -> Section:
         ("half width at peak force", quantity(contact.half_width, "m", 3)),
         (
             "element size over half width",
-            f"{contact.size_ratio:.2f} ({_size_verdict(contact.size_ratio)})",
+            f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
         ),
         ("local law", law.kind),
     ]
     return Section(
         title="What was computed from what",
-        tables=(bodies, Table(columns=("contact", ""), rows=tuple(facts))),
+        tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
     )
 
 
-def _size_verdict(ratio: float) -> str:
+def body_table(bodies: Sequence[BodySummary]) -> Table:
+    """Model, material, mass, mesh and modes: one column per body."""
+    return Table(
+        columns=("", *(body.name for body in bodies)),
+        rows=tuple((title, *(text(body) for body in bodies)) for title, text in _BODY_ROWS),
+    )
+
+
+def size_verdict(ratio: float) -> str:
+    """Judge the element size across the contact over its half width."""
     if not np.isfinite(ratio):
         return "not known"
     return "good" if ratio <= 1 else "coarse" if ratio <= 1.5 else "too coarse"
@@ -283,9 +301,10 @@ def _energy_table(study: ImpactStudy) -> Table:
     return Table(columns=("", *(result.label for result in results)), rows=tuple(rows))
 
 
-def _stage_table(study: ImpactStudy) -> Table:
-    rows = [(name, quantity(value, "s", 3)) for name, value in study.stage_times.items()]
-    rows.append(("whole study", quantity(study.wall_time, "s", 3)))
+def stage_table(stage_times: Mapping[str, float], wall_time: float) -> Table:
+    """Wall time of every stage of a study, and of the whole."""
+    rows = [(name, quantity(value, "s", 3)) for name, value in stage_times.items()]
+    rows.append(("whole study", quantity(wall_time, "s", 3)))
     return Table(columns=("stage", "time"), rows=tuple(rows))
 
 

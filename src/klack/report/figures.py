@@ -31,6 +31,7 @@ from klack.report.wording import quantity, sentence
 from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = [
+    "PART_LOOKS",
     "approach_chart",
     "charts",
     "energy_bars",
@@ -63,7 +64,7 @@ _MORE_LOOKS: tuple[Look, ...] = (
 )
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 _TIME = AxisSpec(label="time since first touch", unit="µs")
-_PART_LOOKS: tuple[tuple[Colour, str], ...] = (
+PART_LOOKS: tuple[tuple[Colour, str], ...] = (
     ("blue", ""),
     ("sky", "/"),
     ("red", ""),
@@ -447,7 +448,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
             for result, start in zip(results, initial, strict=True)
         )
         if max(map(abs, values)) > 0.05:
-            colour, hatch = _PART_LOOKS[len(parts) % len(_PART_LOOKS)]
+            colour, hatch = PART_LOOKS[len(parts) % len(PART_LOOKS)]
             parts.append(BarPart(label=name, values=values, colour=colour, hatch=hatch))
     return BarChart(
         name="energy",

@@ -11,17 +11,17 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from klack.report.chart import BarChart, Chart
-from klack.report.content import Content, report_content
+from klack.report.content import Content
 from klack.report.interactive import plotly_bars, plotly_chart
 from klack.report.output import write_whole
-from klack.workflow.study import ImpactStudy
+from klack.report.study_content import Study, study_content
 
 __all__ = ["render_html", "write_report"]
 
 
-def write_report(study: ImpactStudy, path: Path) -> None:
+def write_report(study: Study, path: Path) -> None:
     """Write the report of a study as one HTML file that opens in any browser, also offline."""
-    write_whole(path, render_html(report_content(study)).encode())
+    write_whole(path, render_html(study_content(study)).encode())
 
 
 def render_html(content: Content) -> str:

@@ -134,7 +134,7 @@ def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) 
         "yaxis": f"y{_suffix(panel)}",
         "name": escape(curve.label),
         "legendgroup": escape(curve.label),
-        "showlegend": bool(curve.label) and curve.label not in named,
+        "showlegend": curve.listed and bool(curve.label) and curve.label not in named,
         "hovertemplate": f"%{{y:.4g}} {escape(y_unit)}",
         "xhoverformat": ".4g",
     }

@@ -14,17 +14,17 @@ import matplotlib
 import typst
 
 from klack.report.chart import BarChart, Chart
-from klack.report.content import Content, Section, report_content
+from klack.report.content import Content, Section
 from klack.report.output import write_whole
 from klack.report.printed import svg_bars, svg_chart
-from klack.workflow.study import ImpactStudy
+from klack.report.study_content import Study, study_content
 
 __all__ = ["render_pdf", "write_pdf"]
 
 
-def write_pdf(study: ImpactStudy, path: Path) -> None:
+def write_pdf(study: Study, path: Path) -> None:
     """Write the report of a study as a PDF file (A4)."""
-    write_whole(path, render_pdf(report_content(study)))
+    write_whole(path, render_pdf(study_content(study)))
 
 
 def render_pdf(content: Content) -> bytes:

@@ -115,7 +115,10 @@ def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
 
 
 def _draw_curve(axes: Any, curve: Curve) -> None:
-    colour, label = COLOURS[curve.colour], plain(curve.label) or "_nolegend_"
+    colour, label = (
+        COLOURS[curve.colour],
+        plain(curve.label if curve.listed else "") or "_nolegend_",
+    )
     if curve.drawn == "points":
         size = 2.0 * curve.width
         axes.plot(curve.x, curve.y, "o", color=colour, markersize=size, label=label)

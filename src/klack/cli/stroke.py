@@ -1,0 +1,159 @@
+"""``klack stroke``: one actuation of a whole valve, in one or several variants."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
+from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.cli.progress import show_progress
+from klack.cli.reports import REPORTS, remove_reports, write_reports
+from klack.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from klack.case.valve import ValveCase
+    from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+
+__all__ = ["stroke"]
+
+_MOST = 20  # impacts of a variant on the terminal
+
+_Text = str | None
+_Variants = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--variant",
+        consume_multiple=True,
+        negative="",
+        help="wet, dry, wet-lumped, dry-lumped; several (a,b,c) are laid over each other. "
+        "[default: as in the case]",
+    ),
+]
+_Duration = Annotated[
+    _Text, Parameter(name="--duration", help='Time to compute, "5 ms". [default: as in the case]')
+]
+_Step = Annotated[
+    _Text, Parameter(name="--step", help='Fine time step, "20 ns". [default: as in the case]')
+]
+
+
+def stroke(
+    case: CaseArgument,
+    /,
+    *,
+    variant: _Variants = None,
+    duration: _Duration = None,
+    step: _Step = None,
+    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    out: Out = None,
+    json: Json = None,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> int:
+    """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
+    from klack.case.shipped import find_case
+
+    require_json_target(json)
+    require_threads(threads)
+    checked = _checked_case(find_case(case), duration, step)
+    # both "--variant a,b" and "--variant a --variant b"
+    wanted = tuple(name for item in variant or () for name in item.split(",") if name)
+    wanted = checked.require_variants(wanted or checked.run.variants)
+    folder = out if out is not None else Path("klack-results") / checked.name
+    require_folder(folder)
+
+    from klack.workflow.stroke import run_stroke
+    from klack.workflow.stroke_store import save_stroke
+    from klack.workflow.stroke_summary import stroke_to_json
+
+    with show_progress(quiet) as progress:
+        study = run_stroke(checked, variants=wanted, progress=progress, threads=threads)
+        failure: Exception | None = None
+        with staged_folder(folder) as stage:
+            progress("result", 0.0)
+            save_stroke(study, stage)
+            if report:
+                progress("report", 0.0)
+                try:
+                    write_reports(study, stage)
+                except Exception as error:  # a mistake in a picture may not cost the calculation
+                    failure = error
+            if failure or not report:
+                remove_reports(stage)
+                remove_reports(folder)  # they would show an earlier result
+    if not quiet:
+        made = report and failure is None
+        _print_study(study, folder, made, to_stderr=str(json) == "-")
+    if json is not None:
+        write_json(json, stroke_to_json(study))
+    if failure:
+        raise failure
+    return 0
+
+
+def _checked_case(path: Path, duration: str | None, step: str | None) -> "ValveCase":
+    """Read the case; duration and step of the command line take the place of its own."""
+    from klack.case.valve_reader import load_valve_case
+
+    case = load_valve_case(path)
+    changes = {
+        key: _time(f"--{key}", text)
+        for key, text in (("duration", duration), ("step", step))
+        if text is not None
+    }
+    if not changes:
+        return case
+
+    from pydantic import ValidationError
+
+    from klack.case.valve import StrokeRun
+    from klack.errors import InputError
+
+    try:
+        run = StrokeRun(**(dict(case.run) | changes))
+    except ValidationError as error:
+        problem = error.errors()[0].get("ctx", {}).get("error")
+        if not isinstance(problem, InputError):
+            raise
+        options = " and ".join(f"--{key}" for key in changes)
+        raise InputError(
+            options, got=problem.got, expected=problem.expected, hint=problem.hint
+        ) from None
+    return case.model_copy(update={"run": run})
+
+
+def _time(option: str, text: str) -> float:
+    from klack.errors import require_positive
+    from klack.units import TIME, parse_quantity
+
+    value = parse_quantity(text, TIME, option)
+    require_positive(option, value, "s")
+    return value
+
+
+def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
+    from klack.workflow.stroke_summary import VARIANT_COLUMNS, variant_rows
+
+    print_table(study.title, VARIANT_COLUMNS, variant_rows(study), to_stderr=to_stderr)
+    for variant in study.variants.values():
+        _print_impacts(variant, to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for warning in study.warnings:
+        print(f"Note: {warning}", file=stream)
+    made = ["result.zarr", *(REPORTS if report else ())]
+    print(f"Results in {folder}: {', '.join(made)}", file=stream)
+
+
+def _print_impacts(variant: "StrokeVariant", *, to_stderr: bool) -> None:
+    from klack.workflow.stroke_summary import IMPACT_COLUMNS, impact_rows
+
+    total = len(variant.result.events)
+    title = f"{variant.name}: {variant.label}"
+    if not total:
+        print(f"{title}\n  no impacts", file=sys.stderr if to_stderr else sys.stdout)
+        return
+    if total > _MOST:
+        title += f" (the first {_MOST} of {total} impacts; all of them with --json)"
+    print_table(title, IMPACT_COLUMNS, impact_rows(variant, _MOST), to_stderr=to_stderr)

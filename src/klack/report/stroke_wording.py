@@ -1,0 +1,86 @@
+"""What happened in a stroke, in one paragraph of plain words."""
+
+from math import isfinite
+
+import numpy as np
+
+from klack.report.wording import quantity, share
+from klack.simulation.network_result import ImpactEvent
+from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.stroke_summary import first_impact, real_time_factor
+
+__all__ = ["largest", "stroke_answer"]
+
+
+def stroke_answer(study: StrokeStudy) -> str:
+    """Opening, closing and the impacts of the reference, and how the other variants differ."""
+    variant = study.reference
+    words = [f"{_opening(study, variant)} {_closing(study, variant)}"]
+    words.append(
+        f"These numbers come from the variant '{variant.name}' ({variant.label}), "
+        f"{quantity(float(variant.result.time[-1] - variant.result.time[0]), 's', 3)} computed in "
+        f"{quantity(variant.result.wall_time, 's', 2)}: {real_time_factor(variant):.3g} times the "
+        "real time."
+    )
+    words += [_compared(variant, other) for other in list(study.variants.values())[1:]]
+    return " ".join(word for word in words if word)
+
+
+def largest(variant: StrokeVariant, channels: tuple[str, ...]) -> float:
+    """Largest magnitude of some channels over the run; nan if there are none."""
+    found = [data for name in channels if (data := variant.channel(name)) is not None]
+    return max((float(np.abs(data.values).max(initial=0.0)) for data in found), default=np.nan)
+
+
+def _opening(study: StrokeStudy, variant: StrokeVariant) -> str:
+    stop = study.channels.opening_stop
+    event = first_impact(variant, stop) if stop else None
+    if event is None or not isfinite(variant.opening_time):
+        lift = variant.channel(study.channels.lift)
+        way = float(lift.values.max()) if lift is not None else float("nan")
+        end = " and does not reach the opening stop." if stop else "."
+        return f"The {study.needle} lifts by {quantity(way, 'm', 3)}{end}"
+    return (
+        f"The {study.needle} reaches the opening stop after "
+        f"{quantity(variant.opening_time, 's', 4)} {_hit(event)}."
+    )
+
+
+def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
+    seat = study.channels.seat
+    if not isfinite(variant.closing_time):
+        return "It has not closed at the end of the run." if seat else ""
+    event = first_impact(variant, seat)
+    text = f"It is back on its seat at {quantity(variant.closing_time, 's', 4)}"
+    if isfinite(study.switch_off) and variant.closing_time > study.switch_off:
+        after = quantity(variant.closing_time - study.switch_off, "s", 3)
+        text += f", {after} after the end of the drive"
+    if event is None:
+        return f"{text}."
+    bounces = len(variant.impacts(seat)) - 1
+    more = f", and bounces {bounces} times" if bounces > 1 else ""
+    return f"{text}, {_hit(event)}{more}."
+
+
+def _hit(event: ImpactEvent) -> str:
+    text = (
+        f"with {event.approach_speed:.3g} m/s and a peak force of "
+        f"{quantity(event.peak_force, 'N', 3)}"
+    )
+    if isfinite(event.restitution):
+        text += f" (restitution {event.restitution:.3g})"
+    return text
+
+
+def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
+    """How much later or earlier another variant opens and closes."""
+    parts = []
+    for word, one, two in (
+        ("opens", reference.opening_time, other.opening_time),
+        ("closes", reference.closing_time, other.closing_time),
+    ):
+        if isfinite(one) and isfinite(two):
+            side = "later" if two >= one else "earlier"
+            apart = abs(two - one)
+            parts.append(f"{word} {quantity(apart, 's', 3)} {side} ({share(apart / one, 1)})")
+    return f"Variant '{other.name}' {' and '.join(parts)}." if parts else ""

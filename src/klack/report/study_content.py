@@ -1,0 +1,17 @@
+"""The content of a report of any kind of study."""
+
+from klack.report.content import Content, report_content
+from klack.report.stroke_content import stroke_content
+from klack.workflow.stroke_study import StrokeStudy
+from klack.workflow.study import ImpactStudy
+
+__all__ = ["Study", "study_content"]
+
+Study = ImpactStudy | StrokeStudy
+
+
+def study_content(study: Study) -> Content:
+    """Put a study into words, tables and figures."""
+    if isinstance(study, StrokeStudy):
+        return stroke_content(study)
+    return report_content(study)
