@@ -30,19 +30,20 @@ success; any other number stops the run, and the component says in words what it
 """
 
 import ctypes
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from numba import njit, types
-from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 __all__ = [
     "STEP",
     "StepFunction",
+    "address_of",
+    "call",
     "evaluate",
     "first",
     "pointer",
@@ -62,9 +63,6 @@ PythonStep = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     int | None,
 ]
-
-# the solver keeps its functions in a table, which numba still calls an experiment
-warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 
 def step_function(function: Callable[..., int]) -> StepFunction:
@@ -109,12 +107,35 @@ def shift(typingctx: Any, start: Any, offset: Any) -> Any:
     return signature, codegen
 
 
+@intrinsic
+def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any) -> Any:
+    """Call the step function at an address of :func:`address_of`, in compiled code."""
+    signature = types.int64(address, par, state, inp, out)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pointer_type = context.get_value_type(_POINTER)
+        prototype = ir.FunctionType(context.get_value_type(types.int64), [pointer_type] * 4)
+        function = builder.inttoptr(args[0], prototype.as_pointer())
+        return builder.call(function, args[1:])
+
+    return signature, codegen
+
+
+def address_of(step: StepFunction) -> int:
+    """Address of the C entry of a step function; valid as long as the function is kept."""
+    if isinstance(step, _PythonStep):
+        return step.address
+    result = step.get_compile_result(STEP)
+    name = result.fndesc.llvm_cfunc_wrapper_name
+    return int(result.library.get_pointer_to_function(name))
+
+
 Vector = NDArray[np.float64]
 
 
 @njit(cache=True)
-def _call(table: Any, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
-    return int(table[0](pointer(par, 0), pointer(state, 0), pointer(inp, 0), pointer(out, 0)))
+def _call(address: int, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
+    return int(call(address, first(par), first(state), first(inp), first(out)))
 
 
 def evaluate(
@@ -123,11 +144,11 @@ def evaluate(
     """Call a step function once from Python: its status and ``out``; for tests and pictures."""
     arrays = [np.array([*values, 0.0], dtype=float) for values in (parameters, state, inputs)]
     out = np.zeros(outputs)
-    return _call((step,), *arrays, out), out
+    return _call(address_of(step), *arrays, out), out
 
 
-class _PythonStep(types.WrapperAddressProtocol):
-    """A Python function behind a C address, so that it can stand in the solver's table."""
+class _PythonStep:
+    """A Python function behind a C address, so that the solver can call it."""
 
     def __init__(self, function: PythonStep, sizes: tuple[int, int, int, int]) -> None:
         self.errors: list[BaseException] = []
@@ -149,14 +170,12 @@ class _PythonStep(types.WrapperAddressProtocol):
 
         self._callback = prototype(call)
 
-    def __wrapper_address__(self) -> int:
+    @property
+    def address(self) -> int:
+        """Where the compiled loop calls it."""
         address = ctypes.cast(self._callback, ctypes.c_void_p).value
         assert address is not None
         return address
-
-    def signature(self) -> Any:
-        """Tell numba the signature."""
-        return STEP
 
 
 def python_step(

@@ -3,16 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
-from klack.network.step_function import STEP, StepFunction
+from klack.network.step_function import address_of
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
 from klack.simulation.interface_step import NO_LAW
@@ -48,7 +46,6 @@ __all__ = [
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_TABLE = 16  # functions in the table of the loop; it grows in steps, each compiled once
 _KINDS = {"store": STORE, "supply": SUPPLY, "loss": LOSS}
 
 
@@ -66,7 +63,6 @@ class CompiledNetwork:
 
     Parameters
     ----------
-    table : tuple of functions
     bodies, elements, branches, nodes, lines, line_state, interfaces
         See :mod:`klack.simulation.network_kernel`.
     books : array [J]
@@ -81,7 +77,6 @@ class CompiledNetwork:
     """
 
     rows: Rows
-    table: tuple[StepFunction, ...]
     bodies: Bodies
     elements: StepRows
     branches: StepRows
@@ -110,12 +105,11 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         )
     port_of, names = _number_ports(rows.bodies)
     bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
-    functions: list[StepFunction] = []
     books = _Books()
-    elements = _step_rows(rows.elements, functions, books, port_of, {})
+    elements = _step_rows(rows.elements, books, port_of, {})
     node_order = _order_nodes(rows)
     node_of = {handle: i for i, handle in enumerate(node_order)}
-    branches = _step_rows(rows.branches, functions, books, port_of, node_of)
+    branches = _step_rows(rows.branches, books, port_of, node_of)
     lines, line_state = compile_lines(
         rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
     )
@@ -125,7 +119,6 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         start_lines(lines, line_state, nodes.density * nodes.g[ends])
     return CompiledNetwork(
         rows=rows,
-        table=_table(functions),
         bodies=bodies,
         elements=elements,
         branches=branches,
@@ -232,7 +225,6 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
 
 def _step_rows(
     rows: Sequence[ElementRow | BranchRow],
-    functions: list[StepFunction],
     books: _Books,
     port_of: Mapping[int, int],
     node_of: Mapping[int, int],
@@ -253,9 +245,7 @@ def _step_rows(
         if isinstance(row, BranchRow):
             head = 3
             numbers["a"][k], numbers["b"][k] = node_of[row.a], node_of[row.b]
-        if not any(row.step is known for known in functions):
-            functions.append(row.step)
-        numbers["function"][k] = next(i for i, f in enumerate(functions) if f is row.step)
+        numbers["function"][k] = address_of(row.step)
         numbers["states"][k] = len(row.state)
         numbers["books"][k] = len(row.books)
         parameters.append(row.parameters)
@@ -300,16 +290,6 @@ def _step_rows(
         supply=numbers["supply"],
         loss=numbers["loss"],
     )
-
-
-@njit(STEP, cache=True)
-def _nothing(par: Any, state: Any, inp: Any, out: Any) -> int:
-    return 0
-
-
-def _table(functions: Sequence[StepFunction]) -> tuple[StepFunction, ...]:
-    size = _TABLE * max(1, ceil(len(functions) / _TABLE))
-    return (*functions, *(_nothing for _ in range(size - len(functions))))
 
 
 def _order_nodes(rows: Rows) -> tuple[int, ...]:

@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
-from klack.network.step_function import first, pointer, shift
+from klack.network.step_function import call, first, pointer, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.modal_step import ROW, advance, apply_forces, watch
@@ -84,7 +84,7 @@ class Bodies(NamedTuple):
 class StepRows(NamedTuple):
     """Elements or branches: where the numbers of each row lie."""
 
-    function: Index
+    function: Index  # addresses
     parameters: Vector
     parameter0: Index
     state: Vector
@@ -266,7 +266,6 @@ def run_network(
     h: float,
     allow_coarse: bool,
     settle: bool,
-    table: Any,
     bodies: Bodies,
     elements: StepRows,
     branches: StepRows,
@@ -519,7 +518,8 @@ def run_network(
                         port = element_ports[j]
                         element_inputs[i0 + 2 + 2 * (j - q0)] = seen[port]
                         element_inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
-                    status = table[element_function[k]](
+                    status = call(
+                        element_function[k],
                         shift(element_parameters, element_parameter0[k]),
                         shift(element_state, element_state0[k]),
                         shift(element_inputs, i0),
@@ -570,7 +570,8 @@ def run_network(
                                 port = branch_ports[j]
                                 branch_inputs[i0 + 6 + 2 * (j - q0)] = seen[port]
                                 branch_inputs[i0 + 7 + 2 * (j - q0)] = used[port]
-                            status = table[branch_function[k]](
+                            status = call(
+                                branch_function[k],
                                 shift(branch_parameters, branch_parameter0[k]),
                                 shift(branch_state, branch_state0[k]),
                                 shift(branch_inputs, i0),
@@ -906,7 +907,6 @@ def run_network(
 
 @njit(cache=True)
 def read_stores(
-    table: Any,
     rows: StepRows,
     head: int,
     y: Vector,
@@ -929,7 +929,8 @@ def read_stores(
         for j in range(q0, q1):
             for end in range(2):
                 rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
-        status = table[rows.function[k]](
+        status = call(
+            rows.function[k],
             pointer(rows.parameters, rows.parameter0[k]),
             pointer(rows.state, rows.state0[k]),
             pointer(rows.inputs, i0),

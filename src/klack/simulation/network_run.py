@@ -172,7 +172,6 @@ def _advance(
         step,
         coarse > 1,
         False,
-        network.table,
         network.bodies,
         network.elements,
         network.branches,
@@ -215,7 +214,6 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
         _SETTLE_STEP,
         False,
         True,
-        network.table,
         bodies,
         network.elements,
         network.branches,
@@ -418,7 +416,6 @@ def _read_stores(network: CompiledNetwork) -> None:
     rho = np.full(len(nodes.p), nodes.density)
     for rows, head in ((network.elements, 0), (network.branches, 3)):
         failed = read_stores(
-            network.table,
             rows,
             head,
             network.bodies.y,
