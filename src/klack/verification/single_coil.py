@@ -132,7 +132,7 @@ def run_coil(
         raise ConvergenceError(f"coil: {FAILURES[status]}.")
     loops = (start.size - _FRONT) // 3 if isinstance(plant, FluxMap) else plant.loops.shape[1]
     return CoilRun(
-        time=step * np.arange(y.size),
+        time=np.asarray(step * np.arange(y.size), dtype=float),
         current=log[:, 5],
         flux=log[:, 7],
         voltage=log[1:, 6],

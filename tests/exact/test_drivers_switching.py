@@ -1,0 +1,214 @@
+"""Without resistance every current is a chain of straight lines, whatever the driver does."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from klack.errors import ConvergenceError
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.driver import DriveProgram, DriveState, Switch, When
+from klack.magnetics.flux_step import flux_numbers, flux_state, magnet_step
+from klack.magnetics.peak_hold import PeakHold
+from klack.magnetics.pwm import PulseWidth
+from klack.magnetics.reluctance import LinearReluctance
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.network.step_function import evaluate
+from klack.verification.drivers import linear_coil
+from klack.verification.single_coil import run_coil
+
+SHORT = 1e-14  # [ohm]
+TURNS, MAIN, LEAK = 60.0, 2e7, 2e8
+INDUCTANCE = TURNS**2 * (1 / MAIN + 1 / LEAK)  # [H] of linear_coil()
+
+
+def run(driver, *, steps, step, resistance=SHORT, eddy=0.0):
+    return run_coil(
+        linear_coil(eddy),
+        driver.program() if hasattr(driver, "program") else driver,
+        resistance=resistance,
+        gap=1e-4,
+        step=step,
+        lift=np.zeros(steps + 1),
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    voltage=st.floats(5.0, 60.0),
+    freewheel=st.floats(0.5, 20.0),
+    lower=st.floats(0.5, 5.0),
+    band=st.floats(0.05, 1.0),
+    step=st.floats(0.1e-6, 2e-6),
+)
+def test_two_point_control_is_a_saw(voltage, freewheel, lower, band, step):
+    upper = lower + band
+    first, up, down = (x * INDUCTANCE for x in (upper / voltage, band / voltage, band / freewheel))
+    if up + down < 0.2 * step:
+        return  # more than the guard against chatter allows
+
+    r = run(
+        TwoPoint(voltage=voltage, upper=upper, lower=lower, freewheel=freewheel),
+        steps=400,
+        step=step,
+    )
+
+    phase = (r.time - first) % (up + down)
+    saw = np.where(phase < down, upper - freewheel * phase / INDUCTANCE, 0.0)
+    saw = np.where(phase >= down, lower + voltage * (phase - down) / INDUCTANCE, saw)
+    saw = np.where(r.time < first, voltage * r.time / INDUCTANCE, saw)
+    # instants are located to 1e-12 of the current; thousands of switchings add up
+    np.testing.assert_allclose(r.current, saw, atol=1e-8 * upper)
+
+
+def test_peak_hold_goes_through_its_states_at_the_exact_instants():
+    L = INDUCTANCE
+    driver = PeakHold(
+        boost_voltage=65.0,
+        peak_current=10.0,
+        supply_voltage=14.0,
+        hold_current=3.0,
+        hold_band=1.0,
+        peak_until=60e-6,
+        start=7e-6,
+        end=400e-6,
+        freewheel=12.0,
+        decay=50.0,
+        fall="decay",
+    )
+    r = run(driver, steps=500, step=1e-6)
+
+    top = 7e-6 + L * 10.0 / 65.0
+    assert r.current[r.time < 7e-6].max() == 0.0
+    at = np.interp(top - 1e-6, r.time, r.current)
+    assert at == pytest.approx(10.0 - 65.0 * 1e-6 / L, rel=1e-9)
+    # peak held above 9 A; then 50 V against it, down to 3.5 A; then freewheeling
+    peak = r.current[int(top / 1e-6) + 1 : 61]
+    assert 9.0 <= peak.min() < peak.max() <= 10.0
+    begin = float(r.current[60])
+    down = 60e-6 + (begin - 3.5) * L / 50.0
+    k = int(np.flatnonzero(r.time > down)[0])
+    assert r.current[k] == pytest.approx(3.5 - 12.0 * (r.time[k] - down) / L, rel=1e-9)
+    hold = r.current[k:401]
+    assert hold.min() >= 2.5 * (1 - 1e-12)
+    assert r.current[-1] == 0.0
+    assert set(r.state) == set(range(8))
+
+
+def test_repetition_does_not_drift():
+    # 300 cycles of 10.01 us at steps of 1 us: the last pulse is where the clock says
+    r = run(
+        VoltageStep(voltage=12.0, end=3e-6, repeat_every=10.01e-6, decay=12.0),
+        steps=3003,
+        step=1e-6,
+    )
+
+    top = 12.0 * 3e-6 / INDUCTANCE
+    begin = 299 * 10.01e-6
+    k = np.flatnonzero((r.time > begin) & (r.time < begin + 3e-6))
+    assert r.current[k] == pytest.approx(12.0 * (r.time[k] - begin) / INDUCTANCE, abs=1e-9 * top)
+
+
+def test_pulse_width_has_one_pair_of_switchings_per_period():
+    r = run(
+        PulseWidth(voltage=12.0, period=50e-6, duty=0.25, freewheel=0.5, start=5e-6, end=2e-3),
+        steps=23000,
+        step=0.1e-6,
+        resistance=1.0,
+    )
+
+    assert len(r.switches()) == 1 + 2 * 40 - 1 + 1  # start, 40 periods less the last, end
+    settled = (r.time > 1.5e-3) & (r.time < 2e-3)
+    # mean current = mean voltage / R
+    assert r.current[settled].mean() == pytest.approx(0.25 * 12.0 - 0.75 * 0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("step", [0.3e-6, 1.1e-6, 7e-6])
+def test_voltage_table_gives_its_integral(step):
+    table = VoltageTable(
+        time=(1e-6, 2.5e-6, 2.5e-6, 6.2e-6, 9e-6), voltage=(0.0, 20.0, -8.0, 3.0, 0.0)
+    )
+    r = run(table, steps=int(12e-6 / step) + 1, step=step)
+
+    area = 0.5 * 1.5 * 20.0 + 0.5 * 3.7 * (-8.0 + 3.0) + 0.5 * 2.8 * 3.0
+    assert r.current[-1] == pytest.approx(area * 1e-6 / INDUCTANCE, rel=1e-12)
+
+
+def test_diode_lets_no_current_turn_negative_and_opens_the_coil():
+    r = run(VoltageStep(voltage=12.0, end=100e-6, decay=40.0), steps=3000, step=0.1e-6, eddy=1250.0)
+
+    assert r.current.min() == 0.0
+    off = np.flatnonzero((r.time > 150e-6) & (r.current == 0.0))
+    assert off.size > 1000
+    # open: the terminals see what the falling main flux induces, not the driver
+    induced = TURNS * np.diff(r.flux)[off[1:-1]] / 0.1e-6
+    np.testing.assert_allclose(r.voltage[off[1:-1]], induced, rtol=1e-6)
+    assert np.all(r.voltage[off[1:-1]] > -40.0)
+
+
+def test_open_coil_is_connected_again_when_it_induces_less_than_the_driver_offers():
+    # a large shorted turn drives the coil below -3 V after the fast decay; then a diode of 0.5 V
+    states = (
+        DriveState("on", 12.0, (Switch(When.TIME, 100e-6, "fast"),)),
+        DriveState("fast", -60.0, (Switch(When.TIME, 125e-6, "slow"),)),
+        DriveState("slow", -0.5),
+    )
+    r = run(DriveProgram(states), steps=2000, step=0.1e-6, eddy=1250.0, resistance=0.5)
+
+    blocked = (r.time > 115e-6) & (r.time < 125e-6)
+    later = r.time > 130e-6
+    assert r.current[blocked].max() == 0.0
+    assert r.voltage[1150] < -0.5
+    assert r.current[later].max() > 0.1
+
+
+def test_shorted_turn_alone_relaxes_with_its_time_constant():
+    r = run(
+        VoltageStep(voltage=12.0, end=50e-6, decay=80.0),
+        steps=4000,
+        step=50e-9,
+        eddy=500.0,
+        resistance=0.5,
+    )
+    a, b = 1500, 3900
+
+    assert np.all(r.current[a:] == 0.0)
+    rate = np.log(r.flux[a] / r.flux[b]) / (r.time[b] - r.time[a])
+    assert rate == pytest.approx(MAIN / 500.0, rel=1e-6)  # (h rate)^2/12 = 3e-7
+
+
+def test_chatter_is_refused_with_words():
+    with pytest.raises(ConvergenceError, match="switches more than 30 times in one step"):
+        run(TwoPoint(voltage=60.0, upper=2.001, lower=2.0, freewheel=60.0), steps=100, step=5e-6)
+
+
+def test_six_loops_give_the_same_as_two():
+    """A main path split into parallel tubes that are one tube together."""
+    branches = [
+        MagneticBranch(name=f"m{k}", law=LinearReluctance(5 * MAIN), turns=TURNS) for k in range(5)
+    ]
+    leak = MagneticBranch(name="leak", law=LinearReluctance(LEAK), turns=TURNS)
+    split = MagneticCircuit(branches=(*branches, leak), loops=np.eye(6), main="leak")
+    driver = TwoPoint(voltage=12.0, upper=3.0, lower=2.0, freewheel=6.0).program()
+
+    runs = [
+        run_coil(c, driver, resistance=0.7, gap=1e-4, step=1e-6, lift=np.zeros(300))
+        for c in (split, linear_coil())
+    ]
+
+    np.testing.assert_allclose(runs[0].current, runs[1].current, rtol=1e-11, atol=1e-12)
+
+
+def test_nothing_is_divided_by_a_step_of_zero_length():
+    par = flux_numbers(
+        linear_coil(), resistance=1.0, driver=VoltageStep(voltage=5.0).program(), gap=1e-4
+    )
+    state = flux_state(par, [3e-6, 2e-6])
+
+    status, out = evaluate(magnet_step, par, state, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 2 + 18 + 4)
+
+    assert status == 0
+    assert np.all(np.isfinite(out))
+    assert out[2 + state.size + 3] == pytest.approx(0.5 * (MAIN * 9e-12 + LEAK * 4e-12), rel=1e-14)
