@@ -1,7 +1,9 @@
 """Reports on screen and paper; the truth is the study that they were made from."""
 
+import gzip
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -9,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from plotly.offline import get_plotlyjs
 
 from klack.errors import InputError
 from klack.report.chart import AxisSpec, BarChart, Chart, Curve, Mark, Panel
@@ -37,7 +40,7 @@ def page(content: Content) -> str:
 
 def own_part(page: str) -> str:
     """Page without the plotly library."""
-    start = page.index("<script>/**")
+    start = page.index('<script type="application/gzip"')
     return page[:start] + page[page.index("</script>", start) :]
 
 
@@ -102,6 +105,14 @@ def test_every_chart_on_the_page_is_one_that_plotly_accepts(page: str, content: 
     for text in found:
         figure = go.Figure(json.loads(text))  # refuses unknown names and values
         assert len(figure.data) > 0
+
+
+def test_the_page_carries_the_whole_library_packed(page: str) -> None:
+    packed = re.search(r'<script type="application/gzip"[^>]*>([^<]*)</script>', page)
+
+    assert packed is not None
+    assert gzip.decompress(b64decode(packed.group(1))).decode() == get_plotlyjs()
+    assert len(page) < 5e6
 
 
 def test_writing_leaves_one_complete_file(lonely_study: ImpactStudy, tmp_path: Path) -> None:

@@ -53,6 +53,15 @@ _ZERO = Mark(value=0.0, axis="y")
 _SMALL = 0.01
 """Share of a bar below which a part goes to "everything else"."""
 _MOST_PARTS = 7
+_KINDS = {
+    "flow": "throttling",
+    "film": "squeeze films",
+    "damping": "damping of bodies and springs",
+    "contact": "contacts",
+    "friction": "friction in lines",
+    "(stored)": "stored in bodies, springs and fluid",
+}
+"""Last word of an entry of the ledger: what the bars call its kind."""
 
 
 # --------------------------------------------------------------------------- whole stroke
@@ -450,8 +459,12 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
         everything = _flows(books)
         circuit = {key for key in everything if key.startswith(coils)}
         work = sum(everything[key] for key in circuit)
-        rest = {key: value for key, value in everything.items() if key not in circuit}
-        return {"work of the magnet": work, **rest}
+        grouped = {"work of the magnet": work}
+        for key, value in everything.items():
+            if key not in circuit:
+                kind = _KINDS.get(key.rsplit(" ", 1)[-1], key)
+                grouped[kind] = grouped.get(kind, 0.0) + value
+        return grouped
 
     return _bars(
         study,
@@ -460,7 +473,8 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
         flows=flows,
         note=(
             "Without the circuit: the work of the magnet is what its supply brought in, less "
-            "ohmic and eddy losses and the change of the field's energy."
+            "ohmic and eddy losses and the change of the field's energy. Entries of one kind are "
+            "added up; the table holds each."
         ),
     )
 
@@ -491,7 +505,7 @@ def _bars(
 ) -> BarChart:
     rows, entries = [], []
     for variant in study.variants.values():
-        found = flows(variant.result.books)
+        found = flows(variant.result.books)  # above zero: came from there
         rows += [f"{variant.name}: from", f"{variant.name}: to"]
         entries.append({key: value for key, value in found.items() if value > 0.0})
         entries.append({key: -value for key, value in found.items() if value < 0.0})
