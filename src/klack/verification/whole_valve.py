@@ -1,7 +1,6 @@
 """A whole valve with rods for bodies: every domain at once, and no mesh to wait for."""
 
 from math import pi
-from typing import Any
 
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.film import ConeFilm, RingFilm
@@ -17,6 +16,7 @@ from klack.magnetics.solenoid import Solenoid
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.simulation.bodies import rod_body
@@ -112,7 +112,7 @@ def _rod(
 
 
 def _stops() -> dict[str, Component]:
-    law: dict[str, Any] = {"kind": "linear", "stiffness": 5e8}
+    law = LinearStopLaw(kind="linear", stiffness=5e8)
     land = ConeFilm(
         shape="cone",
         mean_radius=0.5 * _SEALING,
