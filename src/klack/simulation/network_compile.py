@@ -40,6 +40,7 @@ __all__ = [
     "body_energy",
     "compile_bodies",
     "compile_network",
+    "interface_compliance",
     "modal_state",
 ]
 
@@ -126,7 +127,7 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         lines=lines,
         line_state=line_state,
         line_books=np.zeros((max(len(rows.lines), 1), 3)),
-        interfaces=_interfaces(rows, port_of),
+        interfaces=_interfaces(rows, port_of, bodies),
         books=np.zeros(len(books.kinds)),
         book_kind=np.array(books.kinds, dtype=np.int64),
         book_names=tuple(books.names),
@@ -350,7 +351,7 @@ def _nodes(
     )
 
 
-def _interfaces(rows: Rows, port_of: Mapping[int, int]) -> Interfaces:
+def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Interfaces:
     count = len(rows.interfaces)
     kind = np.full(count, NO_LAW, np.int64)
     law0, alpha = np.zeros(count, np.int64), np.zeros(count)
@@ -366,9 +367,13 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int]) -> Interfaces:
         if row.film is not None:
             film[:, c] = row.film.cubic, row.film.linear, row.film.cut_off, row.film.suction
     gap = np.array([row.gap for row in rows.interfaces], dtype=float)
+    upper = np.array([port_of[row.upper] for row in rows.interfaces], dtype=np.int64)
+    lower = np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64)
     return Interfaces(
-        upper=np.array([port_of[row.upper] for row in rows.interfaces], dtype=np.int64),
-        lower=np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64),
+        upper=upper,
+        lower=lower,
+        G=interface_compliance(bodies, upper, lower),
+        dry=np.array([row.film is None for row in rows.interfaces], dtype=np.int64),
         gap0=gap,
         kind=kind,
         law=np.append(np.concatenate(law), 0.0),
@@ -384,12 +389,21 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int]) -> Interfaces:
         gap=gap.copy(),
         rate=np.zeros(count),
         force=np.zeros(count),
-        before=np.zeros(count),
         chi=np.zeros(count),
         since=np.full(count, np.inf),
         contact_loss=np.zeros(count),
         film_loss=np.zeros(count),
     )
+
+
+def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
+    """Opening of each gap per unit force during a fine and during a coarse step, flat (2 n,)."""
+    ports = bodies.y.size - 1
+    jump = np.zeros((len(upper), ports + 1))
+    jump[np.arange(len(upper)), upper] += 1.0
+    jump[np.arange(len(lower)), lower] -= 1.0
+    jump = jump[:, :ports]
+    return np.einsum("ci,lij,cj->lc", jump, bodies.G, jump).ravel()
 
 
 def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:

@@ -51,6 +51,7 @@ Index = NDArray[np.int64]
 
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
 SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
+SETTLED_COARSE = 1e-14  # [m] the same for a coarse step, whose forces change more
 _MOST_SWEEPS = 200
 _MOST_NEWTON = 80
 _PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
@@ -135,6 +136,8 @@ class Interfaces(NamedTuple):
 
     upper: Index
     lower: Index
+    G: Vector  # (2 n,) opening of the gap per unit force during a step, fine and coarse
+    dry: Index  # 1 without a film: no force while open
     gap0: Vector
     kind: Index
     law: Vector
@@ -150,7 +153,6 @@ class Interfaces(NamedTuple):
     gap: Vector
     rate: Vector
     force: Vector
-    before: Vector
     chi: Vector
     since: Vector  # closed since; infinity while open
     contact_loss: Vector
@@ -359,7 +361,6 @@ def run_network(
     node_wall_node = first(nodes.wall_node)
     node_wall_port = first(nodes.wall_port)
     interface_alpha = first(interfaces.alpha)
-    interface_before = first(interfaces.before)
     interface_chi = first(interfaces.chi)
     interface_contact_loss = first(interfaces.contact_loss)
     interface_cubic = first(interfaces.cubic)
@@ -368,6 +369,8 @@ def run_network(
     interface_film_loss = first(interfaces.film_loss)
     interface_force = first(interfaces.force)
     interface_gap = first(interfaces.gap)
+    interface_G = first(interfaces.G)
+    interface_dry = first(interfaces.dry)
     interface_gap0 = first(interfaces.gap0)
     interface_hint = first(interfaces.hint)
     interface_kind = first(interfaces.kind)
@@ -440,6 +443,7 @@ def run_network(
     count_elements = elements.function.size
     element_forces = elements.ports.size
     step, last_level = clock[0], clock[1]
+    inverse_h = 1.0 / h
     in_record = 0
     record = record0
     record_time = 0.0
@@ -474,6 +478,7 @@ def run_network(
             m = M if level == 1 else 1
             H = m * h
             t = step * h
+            inverse_H = inverse_h if level == 0 else inverse_h / M
             # 1. modes
             for i in range(ports):
                 free[i] = 0.0
@@ -653,54 +658,45 @@ def run_network(
                 )
                 for c in range(count_interfaces):
                     u, low = interface_upper[c], interface_lower[c]
-                    Gc = 0.0
-                    if u < ports:
-                        Gc += body_G[(level * ports + u) * ports + u]
-                    if low < ports:
-                        Gc += body_G[(level * ports + low) * ports + low]
-                    if body_first[u] == body_first[low] and u < ports and low < ports:
-                        Gc -= 2.0 * body_G[(level * ports + u) * ports + low]
-                    gap = interface_gap0[c] + y1[u] - y1[low]
-                    gap_free = gap - Gc * fi[c]
+                    Gc = interface_G[level * count_interfaces + c]
                     g0 = interface_gap[c]
-                    if (
-                        interface_alpha[c] > 0.0
-                        and interface_chi[c] == 0.0
-                        and gap_free < 0.0
-                        and sweep == 0
-                    ):
-                        interface_chi[c] = interface_alpha[c] * H / max(g0 - gap_free, 1e-30)
-                    (
-                        f_contact[c],
-                        f_film[c],
-                        g1[c],
-                        e1[c],
-                        interface_hint[c],
-                        lost_contact[c],
-                        lost_film[c],
-                    ) = solve_interface(
-                        interface_kind[c],
-                        interface_law,
-                        interface_law0[c],
-                        interface_chi[c] / H,
-                        interface_cubic[c],
-                        interface_linear[c],
-                        interface_cut_off[c],
-                        interface_suction[c],
-                        H,
-                        Gc,
-                        interface_series[c],
-                        g0,
-                        gap_free,
-                        interface_e[c],
-                        fi[c],
-                        interface_hint[c],
-                    )
+                    gap_free = interface_gap0[c] + y1[u] - y1[low] - Gc * fi[c]
+                    if interface_dry[c] and g0 >= 0.0 and gap_free >= 0.0 and interface_e[c] == 0.0:
+                        f_contact[c] = f_film[c] = e1[c] = lost_contact[c] = lost_film[c] = 0.0
+                    else:
+                        if interface_alpha[c] > 0.0 and interface_chi[c] == 0.0 and gap_free < 0.0:
+                            interface_chi[c] = interface_alpha[c] * H / max(g0 - gap_free, 1e-30)
+                        (
+                            f_contact[c],
+                            f_film[c],
+                            g1[c],
+                            e1[c],
+                            interface_hint[c],
+                            lost_contact[c],
+                            lost_film[c],
+                        ) = solve_interface(
+                            interface_kind[c],
+                            interface_law,
+                            interface_law0[c],
+                            interface_chi[c] * inverse_H,
+                            interface_cubic[c],
+                            interface_linear[c],
+                            interface_cut_off[c],
+                            interface_suction[c],
+                            H,
+                            Gc,
+                            interface_series[c],
+                            g0,
+                            gap_free,
+                            interface_e[c],
+                            fi[c],
+                            interface_hint[c],
+                        )
                     change = f_contact[c] + f_film[c] - fi[c]
-                    fi[c] += change
-                    F[u] += change
-                    F[low] -= change
                     if change != 0.0:
+                        fi[c] += change
+                        F[u] += change
+                        F[low] -= change
                         if u < ports:
                             for i in range(body_first[u], body_last[u]):
                                 y1[i] += body_G[(level * ports + i) * ports + u] * change
@@ -710,7 +706,7 @@ def run_network(
                 moved = 0.0
                 for i in range(ports):
                     moved = max(moved, abs(y1[i] - used[i]))
-                if moved <= SETTLED:
+                if moved <= (SETTLED if level == 0 else SETTLED_COARSE):
                     break
                 if sweep == _MOST_SWEEPS - 1:
                     report[0], report[2] = moved, t
@@ -809,39 +805,38 @@ def run_network(
                         node_p[i] = p[i]
                         node_g[i] = g[i]
             for c in range(count_interfaces):
-                u, low = interface_upper[c], interface_lower[c]
-                gap = interface_gap0[c] + y1[u] - y1[low]
-                interface_rate[c] = (gap - interface_gap[c]) / H
+                gap = interface_gap0[c] + y1[interface_upper[c]] - y1[interface_lower[c]]
+                interface_rate[c] = (gap - interface_gap[c]) * inverse_H
                 interface_gap[c] = gap
-                interface_e[c] = e1[c]
-                interface_before[c] = interface_force[c]
-                interface_force[c] = fi[c]
-                if settle:
-                    continue
-                interface_contact_loss[c] += lost_contact[c]
-                interface_film_loss[c] += lost_film[c]
                 was_closed = interface_since[c] < np.inf
-                if f_contact[c] > 0.0:
-                    if interface_since[c] == np.inf:
-                        interface_since[c] = t
-                else:
-                    interface_since[c] = np.inf
+                if settle or f_contact[c] != 0.0 or f_film[c] != 0.0 or was_closed:
+                    interface_e[c] = e1[c]
+                    interface_force[c] = fi[c]
+                    if settle:
+                        continue
+                    interface_contact_loss[c] += lost_contact[c]
+                    interface_film_loss[c] += lost_film[c]
+                    if f_contact[c] > 0.0:
+                        if not was_closed:
+                            interface_since[c] = t
+                    else:
+                        interface_since[c] = np.inf
+                    column = element_forces + count_branches + 2 * c
+                    sums[column] += H * f_contact[c]
+                    sums[column + 1] += H * f_film[c]
+                    peaks[c] = max(peaks[c], fi[c])
+                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_SMALL
+                    if level == 0 and (felt or was_closed):
+                        place = record_filled[c]
+                        if place < record_fine.shape[1]:
+                            record_fine[c, place, 0] = t
+                            record_fine[c, place, 1] = H
+                            record_fine[c, place, 2] = f_contact[c]
+                            record_fine[c, place, 3] = f_film[c]
+                            record_fine[c, place, 4] = gap
+                        record_filled[c] = place + 1
                 if gap > _SEPARATED:
                     interface_chi[c] = 0.0
-                column = element_forces + count_branches + 2 * c
-                sums[column] += H * f_contact[c]
-                sums[column + 1] += H * f_film[c]
-                peaks[c] = max(peaks[c], fi[c])
-                felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_SMALL
-                if level == 0 and (felt or was_closed):
-                    place = record_filled[c]
-                    if place < record_fine.shape[1]:
-                        record_fine[c, place, 0] = t
-                        record_fine[c, place, 1] = H
-                        record_fine[c, place, 2] = f_contact[c]
-                        record_fine[c, place, 3] = f_film[c]
-                        record_fine[c, place, 4] = gap
-                    record_filled[c] = place + 1
             for i in range(ports):
                 body_work[i] += F[i] * (y1[i] - y0[i])
                 y0[i] = y1[i]

@@ -19,6 +19,7 @@ from klack.simulation.network_compile import (
     body_energy,
     compile_bodies,
     compile_network,
+    interface_compliance,
     modal_state,
 )
 from klack.simulation.network_kernel import (
@@ -204,6 +205,8 @@ def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
 def _settle(network: CompiledNetwork, recording: Recording) -> None:
     """Find the static start: large steps, all velocities taken out after each."""
     bodies, _ = compile_bodies(network.rows.bodies, (_SETTLE_STEP, _SETTLE_STEP))
+    own = interface_compliance(bodies, network.interfaces.upper, network.interfaces.lower)
+    interfaces = network.interfaces._replace(G=own)
     report, clock = np.zeros(3), np.array([0, -1, 0, 0], dtype=np.int64)
     status = run_network(
         _SETTLE_STEPS,
@@ -221,7 +224,7 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
         network.lines,
         network.line_state,
         network.line_books,
-        network.interfaces,
+        interfaces,
         recording,
         _scratch(network, recording),
         network.books,
@@ -230,7 +233,7 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
     )
     if status != STATUS_DONE:
         raise _failure(network, status, report)
-    real, interfaces = network.bodies, network.interfaces
+    real = network.bodies
     for k in range(len(real.modes)):
         begin = real.start[k]
         real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
@@ -505,7 +508,7 @@ _SAVED = {
     "branches": ("state",),
     "nodes": ("mass", "held", "p", "before", "g", "hint"),
     "line_state": ("samples", "head", "memory", "cavity"),
-    "interfaces": ("hint", "e", "gap", "rate", "force", "before", "chi", "since"),
+    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "since"),
 }
 
 
