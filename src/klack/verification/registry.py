@@ -23,6 +23,7 @@ GROUPS = (
     "films",
     "magnetics",
     "drivers",
+    "network",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
 

@@ -1,0 +1,504 @@
+"""The time loop of a network: books, momentum, repetition, step sizes, and laws seen through it."""
+
+from collections.abc import Mapping, Sequence
+from math import exp, pi, sqrt
+from typing import ClassVar
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.laws import LinearLaw
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.flow_source import FlowSource, FlowStep
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.line import Line
+from klack.hydraulics.pressure_source import PressureSource
+from klack.magnetics.iron import VACUUM_PERMEABILITY
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.solenoid_parts import PoleGap
+from klack.magnetics.voltage_step import VoltageStep
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.checks import LooseBodyWarning
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.port import ELEMENT, Port
+from klack.network.rows import Ambient, FilmRow, Rows
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.units import Compliance, Length
+from klack.verification.check import Check, compare
+from klack.verification.film_reference import film_by_ode
+from klack.verification.one_dimension import one_contact, steel_rod
+from klack.verification.whole_valve import peak_and_hold, whole_valve
+
+__all__ = ["checks"]
+
+Vector = NDArray[np.float64]
+
+GROUP = "network"
+IDENTITY = "energy identity of every step: work, stores, losses of all domains"
+STEP = 20e-9
+RECORD = 1.28e-6
+NEVER = 1e9  # [N] suction that is never reached
+
+
+def checks() -> list[Check]:
+    """A whole valve, then one law after the other in the smallest network that shows it."""
+    valve = whole_valve(damping=0.0, driver=peak_and_hold(end=0.6e-3))
+    wet, dry = (_run(network, 1.6e-3, coarse=16) for network in (valve, valve.dry()))
+    return [
+        _ledger("wet", wet),
+        _ledger("dry", dry),
+        _sac(valve, wet),
+        _momentum(dry),
+        *_repeats(valve, wet),
+        *_steps(),
+        _rest(),
+        _reciprocity(),
+        _kernel(),
+        *_half_sine(),
+        *_films(),
+        *_surge(),
+        *_coil(),
+    ]
+
+
+def _check(
+    name: str,
+    expected: float,
+    computed: float,
+    tolerance: float,
+    source: str,
+    *,
+    absolute: bool = False,
+) -> Check:
+    return compare(
+        GROUP,
+        name,
+        expected=expected,
+        computed=computed,
+        tolerance=tolerance,
+        source=source,
+        absolute=absolute,
+    )
+
+
+def _run(
+    network: Network,
+    duration: float,
+    *,
+    coarse: int = 1,
+    step: float = STEP,
+    record: float = RECORD,
+    free: bool = False,
+    state: Mapping[str, NDArray[np.generic]] | None = None,
+) -> NetworkResult:
+    with catch_warnings():  # some bodies fly freely, on purpose
+        simplefilter("ignore", LooseBodyWarning)
+        rows = network.rows()
+    return simulate_network(
+        rows,
+        duration=duration,
+        step=step,
+        coarse=coarse,
+        record=record,
+        start="free" if free else "rest",
+        state=state,
+    )
+
+
+def _values(result: NetworkResult, name: str) -> Vector:
+    return result.channels[name].values
+
+
+def _ledger(name: str, result: NetworkResult) -> Check:
+    return _check(
+        f"valve of 80 undamped modes opens and closes, {name}, energy residual [-]",
+        0.0,
+        result.books.relative_residual,
+        1e-9,
+        IDENTITY,
+    )
+
+
+def _sac(valve: Network, result: NetworkResult) -> Check:
+    assert valve.fluid is not None
+    table = fluid_table(valve.fluid, valve.ambient.pressure)
+    rho = np.array([fluid_at(table, p, 0)[0] for p in _values(result, "sac pressure")])
+    area = pi / 4 * 1.768e-3**2
+    mass = rho * (2e-9 + area * _values(result, "needle.bottom displacement"))
+    flow = _values(result, "restriction flow") - _values(result, "nozzle flow")
+    moved = float(flow[1:].sum()) * (result.time[1] - result.time[0])
+    return _check(
+        "fluid that the sac gained against both flows, of its mass [-]",
+        0.0,
+        float((mass[-1] - mass[0] - moved) / mass[0]),
+        2e-8,
+        "conservation of mass; pressures settle to 1e-7 or better",
+    )
+
+
+def _momentum(result: NetworkResult) -> Check:
+    forces = (
+        _values(result, "spring.end force")
+        + _values(result, "coil.armature force")
+        + _values(result, "seat contact force")
+        - _values(result, "opening contact force")
+    )
+    impulse = float(forces[1:].sum()) * (result.time[1] - result.time[0])
+    velocity = _values(result, "needle velocity")
+    return _check(
+        "momentum of the needle against the impulse of all forces [N s]",
+        3e-3 * float(velocity[-1] - velocity[0]),
+        impulse,
+        1e-10,
+        "Newton's second law; dry, two impacts",
+    )
+
+
+def _repeats(valve: Network, first: NetworkResult) -> list[Check]:
+    again = _run(valve, 1.6e-3, coarse=16)
+    records = 147  # in the first impact
+    head = _run(valve, records * RECORD, coarse=16)
+    tail = _run(valve, first.time[-1] - head.time[-1], coarse=16, state=head.state)
+    return [
+        _check(
+            "the same run twice, numbers that differ",
+            0.0,
+            _different(again, first, 0),
+            0.0,
+            "determinism",
+        ),
+        _check(
+            "run stored in an impact and continued, numbers that differ",
+            0.0,
+            _different(tail, first, records),
+            0.0,
+            "determinism: the state is complete",
+        ),
+    ]
+
+
+def _different(part: NetworkResult, whole: NetworkResult, first: int) -> float:
+    return float(
+        sum(
+            np.count_nonzero(channel.values[1:] != _values(whole, name)[first + 1 :])
+            for name, channel in part.channels.items()
+        )
+    )
+
+
+def _steps() -> list[Check]:
+    valve = whole_valve()
+    fine, usual, coarse = (
+        _run(valve, 0.22e-3, step=step, coarse=m).events[0]
+        for step, m in ((5e-9, 1), (STEP, 1), (STEP, 16))
+    )
+    return [
+        _check(
+            "first impact on the stop, wet, 20 ns: peak force [N]",
+            fine.peak_force,
+            usual.peak_force,
+            1e-3,
+            "convergence: 5 ns",
+        ),
+        _check(
+            "first impact on the stop, wet, 20 ns: time [s]",
+            fine.time,
+            usual.time,
+            5e-8,
+            "convergence: 5 ns",
+            absolute=True,
+        ),
+        _check(
+            "first impact on the stop, wet, coarse steps in flight: peak force [N]",
+            usual.peak_force,
+            coarse.peak_force,
+            1e-3,
+            "convergence: 20 ns all the time",
+        ),
+        _check(
+            "first impact on the stop, wet, coarse steps in flight: time [s]",
+            usual.time,
+            coarse.time,
+            5e-8,
+            "convergence: 20 ns all the time",
+            absolute=True,
+        ),
+    ]
+
+
+def _rest() -> Check:
+    valve = whole_valve(damping=0.0, driver=VoltageStep(voltage=12.0, start=1.0))
+    result = _run(valve, 1e-3, coarse=16)
+    moved = max(
+        float(np.ptp(channel.values))
+        for name, channel in result.channels.items()
+        if name.endswith("displacement")
+    )
+    return _check(
+        "closed valve under spring and pressure, motion within 1 ms [m]",
+        0.0,
+        moved,
+        1e-11,
+        "statics: the start is in equilibrium; its springs are pressed by 70 nm",
+    )
+
+
+def _reciprocity() -> Check:
+    def answer(push: str, watch: str) -> Vector:
+        parts: dict[str, Component] = {
+            "rod": FlexibleBody.of(steel_rod("rod", 0.04, 20)),
+            "pulse": ForceOverTime(time=(0.0, 1e-6, 2e-6), force=(0.0, 10.0, 0.0)),
+        }
+        result = _run(Network(parts, [[f"rod.{push}", "pulse.end"]]), 60e-6, free=True)
+        return _values(result, f"rod.{watch} displacement")
+
+    there, back = answer("bottom", "top"), answer("top", "bottom")
+    return _check(
+        "pulse at one end of a rod, answer at the other, exchanged [-]",
+        0.0,
+        float(np.abs(there - back).max() / np.abs(there).max()),
+        1e-12,
+        "reciprocity (Maxwell, Betti)",
+    )
+
+
+def _kernel() -> Check:
+    a, b, law = steel_rod("a", 0.04, 20), steel_rod("b", 0.1, 40, clamped=True), LinearLaw(1e9)
+    history = simulate_impact(
+        one_contact(a, b, law, gap=1e-6, series=1e-9), speed=1.0, step=STEP, duration=40e-6
+    )
+    parts: dict[str, Component] = {
+        "a": FlexibleBody.of(a, speed=-1.0),
+        "b": FlexibleBody.of(b),
+        "stop": EndStop(
+            gap=1e-6,
+            law=LinearStopLaw(kind="linear", stiffness=1e9),
+            series_compliance=1e-9,
+        ),
+    }
+    connections = [["a.bottom", "stop.upper"], ["b.top", "stop.lower"]]
+    result = _run(Network(parts, connections), 40e-6, free=True)
+    return _check(
+        "two rods, peak force [N]",
+        float(history.force.max()),
+        float(result.interfaces["stop"].contact_force.max()),
+        1e-9,
+        "the impact kernel of klack, written apart: 60 modes, 1e9 N/m before 1e-9 m/N",
+    )
+
+
+def _half_sine() -> list[Check]:
+    mass, k, speed = 2e-3, 1e9, 0.4
+    law = LinearStopLaw(kind="linear", stiffness=k)
+    parts: dict[str, Component] = {
+        "mass": RigidMass(mass=mass, speed=-speed),
+        "stop": EndStop(gap=0.5e-6, law=law),
+    }
+    network = Network(parts, [["mass.body", "stop.upper"], ["stop.lower", "ground"]])
+    event = _run(network, 12e-6, step=1e-9, record=1e-8, free=True).events[0]
+    source = "half sine: F = v sqrt(k m)"
+    return [
+        _check("mass on a spring, peak force [N]", speed * sqrt(k * mass), event.peak_force, 1e-6,
+               source),
+        _check("mass on a spring, restitution [-]", 1.0, event.restitution, 1e-9, source),
+    ]  # fmt: skip
+
+
+class _BareFilm(Component):
+    """A film with given coefficients, perhaps before a compliance."""
+
+    type: ClassVar[str] = "bare-film"
+    ports: ClassVar[Mapping[str, Port]] = {"upper": ELEMENT, "lower": ELEMENT}
+
+    gap: Length
+    cubic: float
+    cut_off: Length
+    series: Compliance = 0.0
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add one interface."""
+        rows.interface(
+            upper=rows.port("upper"),
+            lower=rows.port("lower"),
+            gap=self.gap,
+            law=None,
+            series_compliance=self.series,
+            film=FilmRow(cubic=self.cubic, linear=0.0, cut_off=self.cut_off, suction=NEVER),
+        )
+
+
+def _on_a_film(
+    film: _BareFilm,
+    duration: float,
+    *,
+    mass: float,
+    speed: float = 0.0,
+    press: float = 0.0,
+    step: float = STEP,
+) -> NetworkResult:
+    parts: dict[str, Component] = {
+        "mass": RigidMass(mass=mass, speed=-speed),
+        "load": ConstantForce(force=-press),
+        "film": film,
+    }
+    joined: Sequence[Sequence[str]] = [
+        ["mass.body", "film.upper", "load.end"],
+        ["film.lower", "ground"],
+    ]
+    return _run(Network(parts, joined), duration, step=step, record=step, free=True)
+
+
+def _films() -> list[Check]:
+    B = 9.248221602e-16
+    plate = _on_a_film(_BareFilm(gap=25e-6, cubic=B, cut_off=1e-12), 60e-6, mass=1e-10, press=10.0)
+    gap = _values(plate, "film gap")
+    fall = float(np.diff(np.interp([20e-6**-2, 1e-6**-2], gap**-2, plate.time))[0])
+    slow = _on_a_film(
+        _BareFilm(gap=20e-6, cubic=5e-17, cut_off=0.3e-6), 4e-4, mass=3e-3, speed=0.02, step=1e-6
+    )
+    x0, x1 = 20.3e-6, float(_values(slow, "film gap")[-1]) + 0.3e-6
+    series = _on_a_film(
+        _BareFilm(gap=10e-6, cubic=5e-17, cut_off=1e-8, series=1e-9), 40e-6, mass=3e-3, speed=0.4
+    )
+    peak, state = film_by_ode(
+        rigid_mass_body("needle", 3e-3, port="bottom"),
+        fixed_body("wall", port="top"),
+        FilmRow(cubic=5e-17, linear=0.0, cut_off=1e-8, suction=NEVER),
+        series=1e-9,
+        gap=10e-6,
+        speed=0.4,
+        duration=40e-6,
+        relative=1e-10,
+    )
+    radau = "Radau IIA at 1e-10; ours 20 ns"
+    return [
+        _check(
+            "plate pressed by 10 N falls from 20 to 1 um [s]",
+            0.5 * B / 10.0 * (1e-6**-2 - 20e-6**-2),
+            fall,
+            1e-5,
+            "Stefan 1874: B/(2F)(1/h2^2 - 1/h1^2)",
+        ),
+        _check(
+            "momentum lost in a film, 1 us steps [N s]",
+            0.5 * 5e-17 * (x1**-2 - x0**-2),
+            3e-3 * float(_values(slow, "mass velocity")[-1] + 0.02),
+            1e-8,
+            "B/2 (1/h1^2 - 1/h0^2)",
+        ),
+        _check(
+            "3 g, 0.4 m/s on a film before 1e9 N/m: peak force [N]",
+            peak,
+            float(series.interfaces["film"].film_force.max()),
+            5e-5,
+            radau,
+        ),
+        _check(
+            "the same, speed after 40 us [m/s]",
+            float(state[1] / np.sqrt(3e-3)),
+            float(_values(series, "mass velocity")[-1]),
+            5e-4,
+            radau,
+        ),
+    ]
+
+
+def _surge() -> list[Check]:
+    """A flow that starts at one end of a line whose other end holds its pressure."""
+    pressure, flow, duration = 5e5, 2e-6, 70e-6
+    fluid = library_fluid("n-heptane").at(293.15)
+    line = Line(length=0.06, diameter=2.5e-3, pressure=pressure, friction="none")
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=1e-3),  # every network has one
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "pump": FlowSource(flow=0.0, step=FlowStep(to=flow, at=1e-6, rise=1e-6)),
+        "room": Chamber(volume=1e-12, pressure=pressure),
+        "line": line,
+        "tank": PressureSource(pressure=pressure),
+    }
+    connections = [
+        ["needle.body", "spring.end"],
+        ["pump.b", "room.fluid", "line.a"],
+        ["line.b", "tank.fluid"],
+    ]
+    network = Network(parts, connections, ambient=Ambient(pressure=pressure), fluid=fluid)
+    result = _run(network, duration, record=1e-6)
+    echo = line.echo_time(fluid)
+    assert duration < echo
+    rho, a = float(fluid.density(pressure)), line.wave_speed(fluid)
+    rise = rho * a * flow / (pi / 4 * 2.5e-3**2)
+    late = _run(network, echo + 20e-6, record=1e-6)
+    return [
+        _check(
+            "flow that starts at a line, rise of pressure until the echo [Pa]",
+            rise,
+            float(_values(result, "room pressure")[-1]) - pressure,
+            5e-4,
+            "Joukowsky 1898: rho a v; first order in dp/K",
+        ),
+        _check(
+            "the same, after the echo of the open end [Pa]",
+            -rise,
+            float(_values(late, "room pressure")[-1]) - pressure,
+            5e-4,
+            "the wave comes back with the opposite sign: dp - 2 dp",
+        ),
+        _check(
+            "the same, energy residual [-]",
+            0.0,
+            result.books.relative_residual,
+            1e-9,
+            IDENTITY,
+        ),
+    ]
+
+
+def _coil() -> list[Check]:
+    turns, R, gap, radius, leakage, voltage = 80.0, 1.2, 200e-6, 3e-3, 5e-8, 24.0
+    parts: dict[str, Component] = {
+        "armature": RigidMass(mass=1e4),  # moves by a nanometre
+        "coil": Solenoid(
+            turns=turns,
+            resistance=R,
+            gap=gap,
+            residual_gap=50e-6,
+            poles=(PoleGap(outer_radius=radius, fringing="none"),),
+            leakage=leakage,
+        ),
+        "driver": VoltageStep(voltage=voltage),
+    }
+    connections = [["armature.body", "coil.armature"], ["coil.terminals", "driver.terminals"]]
+    result = _run(Network(parts, connections), 0.5e-3, free=True, record=0.1e-6)
+    permeance = VACUUM_PERMEABILITY * pi * radius**2 / (gap + 50e-6)
+    inductance = turns**2 * (permeance + leakage)
+    current = voltage / R * (1.0 - exp(-R * result.time[-1] / inductance))
+    flux = permeance * turns * current
+    return [
+        _check(
+            "current of a coil switched on, after 0.5 ms [A]",
+            current,
+            float(_values(result, "coil current")[-1]),
+            1e-5,
+            "U/R (1 - exp(-R t/L)); implicit midpoint, order 2",
+        ),
+        _check(
+            "force on the armature then [N]",
+            flux**2 / (2.0 * VACUUM_PERMEABILITY * pi * radius**2),
+            float(_values(result, "coil.armature force")[-1]),
+            5e-4,
+            "Maxwell: phi^2/(2 mu0 A); mean over 0.1 us",
+        ),
+        _check("coil and armature, energy residual [-]", 0.0, result.books.relative_residual, 1e-9,
+               IDENTITY),
+    ]  # fmt: skip
