@@ -37,6 +37,13 @@ _Duration = Annotated[
 _Step = Annotated[
     _Text, Parameter(name="--step", help='Fine time step, "20 ns". [default: as in the case]')
 ]
+_Continue = Annotated[
+    Path | None,
+    Parameter(
+        name="--continue",
+        help="Folder of an earlier result of the same case: go on where it ended.",
+    ),
+]
 
 
 def stroke(
@@ -46,6 +53,7 @@ def stroke(
     variant: _Variants = None,
     duration: _Duration = None,
     step: _Step = None,
+    continued: _Continue = None,
     report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
     out: Out = None,
     json: Json = None,
@@ -65,11 +73,14 @@ def stroke(
     require_folder(folder)
 
     from klack.workflow.stroke import run_stroke
-    from klack.workflow.stroke_store import save_stroke
+    from klack.workflow.stroke_store import load_stroke, save_stroke
     from klack.workflow.stroke_summary import stroke_to_json
 
+    after = load_stroke(continued) if continued is not None else None
     with show_progress(quiet) as progress:
-        study = run_stroke(checked, variants=wanted, progress=progress, threads=threads)
+        study = run_stroke(
+            checked, variants=wanted, after=after, progress=progress, threads=threads
+        )
         failure: Exception | None = None
         with staged_folder(folder) as stage:
             progress("result", 0.0)

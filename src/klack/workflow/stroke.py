@@ -19,7 +19,8 @@ from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.rows import Rows
 from klack.simulation.network_result import NetworkResult
-from klack.simulation.network_run import simulate_network
+from klack.simulation.network_run import State, simulate_network
+from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
@@ -41,6 +42,7 @@ def run_stroke(
     case: ValveCase,
     *,
     variants: Sequence[str] = (),
+    after: StrokeStudy | None = None,
     progress: Progress = silent,
     threads: int | None = None,
 ) -> StrokeStudy:
@@ -51,6 +53,8 @@ def run_stroke(
     case : ValveCase
     variants : sequence of str
         Among :data:`klack.case.valve.VARIANTS`; those of the case by default.
+    after : StrokeStudy, optional
+        Go on where this study of the same case ended: time goes on, for another duration.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -62,11 +66,12 @@ def run_stroke(
     """
     begin = perf_counter()
     wanted = case.require_variants(tuple(variants) or case.run.variants)
+    states = {name: _state(case, after, name) for name in wanted}
     roles = find_roles(case)
     clock = StageClock(progress)
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
-        runs = {name: _run(valve, roles, name, clock) for name in wanted}
+        runs = {name: _run(valve, roles, name, states[name], clock) for name in wanted}
         stops = _stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
     rows = [run.rows for run in runs.values()]
@@ -117,25 +122,53 @@ class _Run:
 
 
 def run_variant(
-    case: ValveCase, rows: Rows, progress: Callable[[float], None] = lambda fraction: None
+    case: ValveCase,
+    rows: Rows,
+    progress: Callable[[float], None] = lambda fraction: None,
+    *,
+    state: State | None = None,
 ) -> NetworkResult:
-    """Run rows for the time and with the steps that the case asks for."""
+    """Run rows for the time and with the steps that the case asks for, from rest or a state."""
     return simulate_network(
         rows,
         duration=case.run.duration,
         step=case.run.step,
         coarse=case.run.coarse,
         record=case.run.record,
+        state=state,
         progress=progress,
     )
 
 
-def _run(valve: Valve, roles: ValveRoles, name: Variant, progress: Progress) -> _Run:
+def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State | None:
+    """State in which a variant of a former study ended; None to start from rest."""
+    if after is None:
+        return None
+    if after.step != case.run.step:  # the clock counts steps
+        raise InputError(
+            "step",
+            got=format_si(case.run.step, "s"),
+            expected=f"{format_si(after.step, 's')}, the step of the result to go on from",
+            hint="keep the step, or run from the start.",
+        )
+    if name not in after.variants:
+        raise InputError(
+            "variant",
+            got=f"'{name}', which the result to go on from does not hold",
+            expected=f"one of: {', '.join(after.variants)}",
+            hint="run that variant from the start first.",
+        )
+    return after.variants[name].result.state
+
+
+def _run(
+    valve: Valve, roles: ValveRoles, name: Variant, state: State | None, progress: Progress
+) -> _Run:
     begin = perf_counter()
     stage = f"run {name}"
     progress(stage, 0.0)
     rows = variant_network(valve, name).rows()
-    result = run_variant(valve.case, rows, lambda fraction: progress(stage, fraction))
+    result = run_variant(valve.case, rows, lambda fraction: progress(stage, fraction), state=state)
     opening, closing = opening_and_closing(result, roles)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     variant = StrokeVariant(
