@@ -1,20 +1,47 @@
-"""Make the pictures of the README from a stored result: ``python docs/pictures.py RESULT``."""
+"""Make the pictures of the documentation: ``python docs/pictures.py RESULT...``.
+
+Of ``klack demo`` come section.svg and force.svg, of ``klack stroke demo-stroke`` stroke.svg.
+"""
 
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+from klack.report.chart import Chart
 from klack.report.figures import force_chart
 from klack.report.printed import svg_chart
 from klack.report.section_figure import section_figure
+from klack.report.stroke_figures import actuation_chart
+from klack.workflow.record_store import stored_format
 from klack.workflow.store import load_study
+from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
+from klack.workflow.stroke_study import StrokeStudy
+from klack.workflow.study import ImpactStudy
 
 IMAGES = Path(__file__).parent / "images"
 
 
-def main(result: Path) -> None:
-    """Write section.svg and force.svg."""
-    study = load_study(result)
+def main(results: list[Path]) -> None:
+    """Write the pictures that belong to each result."""
+    for result in results:
+        if stored_format(result) == STROKE_FORMAT.name:
+            (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(load_stroke(result))))
+        else:
+            _write_impact(load_study(result))
+
+
+def stroke_chart(study: StrokeStudy) -> Chart:
+    """Current, magnetic force and lift of the reference."""
+    whole = actuation_chart(study)
+    kept = [panel for panel in whole.panels if panel.y.label in ("current", "magnet", "lift")]
+    first = kept[0]
+    top = max(float(curve.y.max()) for curve in first.curves)
+    axis = replace(first.y, range=(-0.05 * top, 1.4 * top))  # with room for the words of the marks
+    kept[0] = replace(first, y=axis, marks=whole.panels[0].marks)
+    return replace(whole, panels=tuple(kept))
+
+
+def _write_impact(study: ImpactStudy) -> None:
     # five times the force of all others would flatten them
     study = replace(study, levels={k: v for k, v in study.levels.items() if k != "lumped"})
     (IMAGES / "section.svg").write_bytes(section_figure(study).image)
@@ -22,4 +49,4 @@ def main(result: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main([Path(argument) for argument in sys.argv[1:]])
