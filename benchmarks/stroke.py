@@ -1,0 +1,250 @@
+"""A whole stroke: nanoseconds per step, wall time of 10 ms, step sizes, CVODE beside it.
+
+``uv run python benchmarks/stroke.py`` prints all tables; ``--json FILE`` also writes
+``{name: {value, unit, goal}}``; ``--only speed``, ``steps``, ``cvode`` or ``books`` takes one part.
+
+The valve (:mod:`klack.verification.whole_valve`) has 20 + 40 + 20 modes, two end stops, each a
+contact before a compliance, with films when wet, solenoid with two poles, iron, leakage and one
+eddy term under peak and hold, ball seat, two chambers, a line with frequency-dependent friction.
+The model beside CVODE is :mod:`small_valve`.
+
+Times are the best of several runs, in one process, after compilation.
+"""
+
+import argparse
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from small_valve import Motion, by_cvode, by_klack, network
+
+from klack.magnetics.voltage_step import VoltageStep
+from klack.network.network import Network
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.verification.whole_valve import peak_and_hold, whole_valve
+
+__all__ = ["books_rows", "cvode_rows", "main", "speed_rows", "step_rows"]
+
+STEP, COARSE, RECORD = 20e-9, 16, 1.28e-6
+STROKE = 10e-3
+STEPS = (80e-9, 40e-9, 20e-9, 10e-9, 5e-9)
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number."""
+
+    name: str
+    value: float
+    unit: str
+    goal: float | None = None
+    at_least: bool = False
+
+    def line(self) -> str:
+        """As printed."""
+        if self.goal is None:
+            return f"{self.name:<58}{self.value:>12.4g} {self.unit}"
+        met = self.value >= self.goal if self.at_least else self.value <= self.goal
+        word = "goal >=" if self.at_least else "goal <="
+        verdict = "ok" if met else "MISSED"
+        return f"{self.name:<58}{self.value:>12.4g} {self.unit:<8}{word} {self.goal:g}  {verdict}"
+
+
+def valves(*, damping: float = 0.01, end: float = 2.5e-3) -> dict[str, Network]:
+    """The valve wet and dry."""
+    wet = whole_valve(damping=damping, driver=peak_and_hold(end=end))
+    return {"dry": wet.dry(), "wet": wet}
+
+
+def stroke(
+    valve: Network, duration: float, *, step: float = STEP, coarse: int = 1, record: float = RECORD
+) -> NetworkResult:
+    """Run from rest."""
+    return simulate_network(
+        valve.rows(), duration=duration, step=step, coarse=coarse, record=record
+    )
+
+
+def ns_per_step(valve: Network, *, coarse: int, steps: int = 20_000, repeats: int = 25) -> float:
+    """Best time of the loop per step, from the start: open, fly, hit the stop, bounce.
+
+    The clock runs in the loop alone, records included; many short runs find an undisturbed moment.
+    """
+    rows = valve.rows()
+    best = np.inf
+    for _ in range(repeats):
+        result = simulate_network(
+            rows, duration=steps * STEP, step=STEP, coarse=coarse, record=RECORD
+        )
+        best = min(best, result.wall_time / (result.fine_steps + result.coarse_steps))
+    return best * 1e9
+
+
+def closed_ns_per_step(*, wet: bool, steps: int = 20_000, repeats: int = 25) -> float:
+    """The same of a needle pressed onto its seat: all contacts closed, nothing moves."""
+    valve = whole_valve(driver=VoltageStep(voltage=12.0, start=1.0))
+    return ns_per_step(valve if wet else valve.dry(), coarse=1, steps=steps, repeats=repeats)
+
+
+def speed_rows() -> list[Row]:
+    """Speed of fine steps, and of a stroke of 10 ms."""
+    rows = []
+    goals = {"dry": 75.0, "wet": 140.0}
+    for name, valve in valves().items():
+        rows.append(Row(f"{name}: fine step", ns_per_step(valve, coarse=1), "ns", goals[name]))
+        rows.append(
+            Row(f"{name}: fine step, closed at rest", closed_ns_per_step(wet=name == "wet"), "ns")
+        )
+    for name, valve in valves().items():
+        runs = [stroke(valve, STROKE, coarse=COARSE) for _ in range(7)]
+        best = min(runs, key=lambda result: result.wall_time)
+        goal = 0.1 if name == "wet" else None
+        rows.append(Row(f"{name}: 10 ms, open and close", best.wall_time, "s", goal))
+        rows.append(Row(f"{name}: real-time factor", best.wall_time / STROKE, "-"))
+        rows.append(Row(f"{name}: fine steps", best.fine_steps, "-"))
+        rows.append(Row(f"{name}: coarse steps (16 fine ones)", best.coarse_steps, "-"))
+        rows.append(Row(f"{name}: impacts", len(best.events), "-"))
+        alone = min(stroke(valve, STROKE, coarse=1).wall_time for _ in range(3))
+        rows.append(Row(f"{name}: 10 ms in fine steps only", alone, "s"))
+    return rows
+
+
+def books_rows() -> list[Row]:
+    """Energy residual of undamped valves that open and close, over the throughput."""
+    rows = []
+    for name, valve in valves(damping=0.0, end=1e-3).items():
+        for coarse in (1, COARSE):
+            result = stroke(valve, 3e-3, coarse=coarse)
+            label = f"{name}: energy residual, 3 ms, coarse {coarse}"
+            rows.append(Row(label, result.books.relative_residual, "-", 1e-9))
+    return rows
+
+
+def first_impacts(events: tuple[ImpactEvent, ...]) -> dict[str, ImpactEvent]:
+    """First impact on each stop after the needle has opened."""
+    found: dict[str, ImpactEvent] = {}
+    for event in events:
+        found.setdefault(event.stop, event)
+    return found
+
+
+def step_rows() -> list[Row]:
+    """First impacts over step sizes against 5 ns; fine steps only, and with coarse ones at 20 ns.
+
+    The driver ends 0.35 ms after the first touch, before bounces have become chaotic.
+    """
+    rows, table = [], []
+    # 160 ns in common, so that all records end together
+    settings = [(step, 1) for step in STEPS] + [(STEP, COARSE)]
+    for name, valve in valves(end=0.45e-3).items():
+        runs = [
+            first_impacts(stroke(valve, 1.6e-3, step=step, coarse=coarse, record=1.28e-6).events)
+            for step, coarse in settings
+        ]
+        exact = runs[len(STEPS) - 1]
+        for (step, coarse), run in zip(settings, runs, strict=True):
+            for stop in ("opening", "seat"):
+                a, b = exact[stop], run[stop]
+                peak = b.peak_force / a.peak_force - 1.0
+                late = b.time - a.time
+                table.append(
+                    f"{name:<5}{stop:<9}{step * 1e9:5.0f} ns{'  coarse' if coarse > 1 else '':<8}"
+                    f"{b.peak_force:10.3f} N {100 * peak:+9.4f} %"
+                    f"{b.time * 1e6:12.3f} us {late * 1e6:+8.3f} us"
+                    f"{b.approach_speed:9.5f} m/s"
+                )
+                if step == STEP:
+                    kind = ", coarse" if coarse > 1 else ""
+                    where = f"{name}: {stop}, 20 ns{kind} against 5 ns"
+                    rows.append(Row(f"{where}, peak", 100 * abs(peak), "%", 0.1))
+                    rows.append(Row(f"{where}, time", 1e6 * abs(late), "us", 0.05))
+    print("\n".join(table))
+    return rows
+
+
+def cvode_rows() -> list[Row]:
+    """Time of klack and of CVODE at equal error of the state, on one small valve."""
+    rows = []
+    for name in ("dry", "wet"):
+        exact, ours, theirs = _both(wet=name == "wet")
+        for step, run in zip(STEPS, ours, strict=True):
+            print(_motion_line(f"{name} klack {step * 1e9:3.0f} ns", run, exact))
+        for rtol, run in zip(TOLERANCES, theirs, strict=True):
+            print(_motion_line(f"{name} CVODE {rtol:.0e}", run, exact))
+        at_20 = ours[STEPS.index(STEP)]
+        error = at_20.distance(exact)["state"]
+        enough = [run for run in theirs if run.distance(exact)["state"] <= error]
+        peer = min(enough or theirs[-1:], key=lambda run: run.seconds)
+        rows += [
+            Row(f"{name}: state at 20 ns against CVODE 1e-11", error, "-", 1e-4),
+            Row(f"{name}: time of CVODE at that error or better", peer.seconds, "s"),
+            Row(f"{name}: time of klack", at_20.seconds, "s"),
+            Row(
+                f"{name}: time ratio CVODE / klack",
+                peer.seconds / at_20.seconds,
+                "-",
+                100.0,
+                at_least=True,
+            ),
+        ]
+    return rows
+
+
+def _both(*, wet: bool) -> tuple[Motion, list[Motion], list[Motion]]:
+    """CVODE at 1e-11, klack over steps, CVODE over tolerances."""
+    rows = network(wet=wet)
+
+    def ours(step: float) -> Motion:
+        return by_klack(rows, step=step)[0]
+
+    def theirs(rtol: float) -> Motion:
+        return by_cvode(wet=wet, rtol=rtol)
+
+    return (
+        theirs(1e-11),
+        [_best(partial(ours, step)) for step in STEPS],
+        [_best(partial(theirs, rtol)) for rtol in TOLERANCES],
+    )
+
+
+def _best(run: Callable[[], Motion], repeats: int = 5) -> Motion:
+    return min((run() for _ in range(repeats)), key=lambda motion: motion.seconds)
+
+
+def _motion_line(label: str, run: Motion, exact: Motion) -> str:
+    away = run.distance(exact)
+    words = "  ".join(f"{key} {value:.1e}" for key, value in away.items())
+    return f"{label:<20}{run.steps:>7} steps {1e3 * run.seconds:9.3f} ms   {words}"
+
+
+PARTS = {"speed": speed_rows, "books": books_rows, "steps": step_rows, "cvode": cvode_rows}
+
+
+def main() -> None:
+    """Measure, print, write the JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=tuple(PARTS), help="one part alone")
+    parser.add_argument("--json", type=Path, help="write {name: {value, unit, goal}}")
+    args = parser.parse_args()
+    result = []
+    for name, part in PARTS.items():
+        if args.only in (None, name):
+            print(f"\n{name}")
+            rows = part()
+            result += rows
+            print("\n".join(row.line() for row in rows))
+    if args.json is not None:
+        entries = {
+            row.name: {"value": float(row.value), "unit": row.unit, "goal": row.goal}
+            for row in result
+        }
+        args.json.write_text(json.dumps(entries, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
