@@ -1,6 +1,6 @@
 r"""A small valve twice: as a network of klack, and as plain equations for CVODE of SUNDIALS.
 
-A needle (a rod with four elastic modes) between a Hertz seat and a linear stop, both with a
+A needle (a rod with its exact modes) between a Hertz seat and a linear stop, both with a
 compliance in series and, in the wet valve, a squeeze film; a return spring; a solenoid with leakage
 and one eddy term under a constant voltage; in the wet valve a chamber below the needle that an
 orifice joins to the surroundings.  The needle starts 15 um above its seat and falls onto it,
@@ -54,7 +54,7 @@ __all__ = ["DURATION", "MODES", "Motion", "by_cvode", "by_klack", "network", "sc
 Vector = NDArray[np.float64]
 
 DURATION = 160e-6  # [s] ends in flight, after one impact at each stop
-MODES = 5  # one of them rigid
+MODES = 5  # by default; one of them is rigid
 FILM, CONTACT, CAVITATED = 0, 1, 2
 SEAT, STOP = 0, 1
 
@@ -79,7 +79,7 @@ VOLUME, START_PRESSURE, FACE = 400e-9, 6e5, 3e-6
 HOLE, DISCHARGE, CRITICAL = 0.15e-3, 0.7, 1000.0
 
 
-def network(*, wet: bool = True) -> Rows:
+def network(*, wet: bool = True, modes: int = MODES) -> Rows:
     """Return the rows of the valve."""
     rod = rod_body(
         "needle",
@@ -87,7 +87,7 @@ def network(*, wet: bool = True) -> Rows:
         area=AREA,
         young=YOUNG,
         density=DENSITY,
-        elastic_modes=MODES - 1,
+        elastic_modes=modes - 1,
         damping=DAMPING,
     )
     hertz = {"kind": "hertz", "radius": 1e-3, "modulus": 0.75 * HERTZ / sqrt(1e-3)}
@@ -153,7 +153,7 @@ class Motion:
 
     Parameters
     ----------
-    q, v : array, shape (5,) [m kg^0.5], [m kg^0.5/s]
+    q, v : array, shape (modes,) [m kg^0.5], [m kg^0.5/s]
         Modal state at the end.
     pressure : float [Pa]
     flux, leakage : float [Wb]
@@ -181,7 +181,7 @@ class Motion:
 
     def distance(self, other: "Motion") -> dict[str, float]:
         """Relative distance of the mechanical state (in the energy norm), fields and peaks."""
-        omega = scales()
+        omega = scales(len(self.q))
         apart = np.concatenate([(self.q - other.q) * omega, self.v - other.v])
         size = np.concatenate([other.q * omega, other.v])
         return {
@@ -193,9 +193,9 @@ class Motion:
         }
 
 
-def scales() -> Vector:
+def scales(modes: int) -> Vector:
     """Angular frequencies of the needle [rad/s]; the rigid mode counts by its velocity alone."""
-    return np.arange(MODES) * pi * sqrt(YOUNG / DENSITY) / LENGTH
+    return np.arange(modes) * pi * sqrt(YOUNG / DENSITY) / LENGTH
 
 
 def by_klack(
@@ -211,6 +211,7 @@ def by_klack(
         start="free",
     )
     W = result.state["bodies.fine"].reshape(-1, ROW)
+    modes = rows.bodies[0].body.mode_count
     records = (result.interfaces[name] for name in ("seat", "stop"))
     forces = [(r.time, r.contact_force, r.contact_force + r.film_force) for r in records]
     channels = result.channels
@@ -218,8 +219,8 @@ def by_klack(
     magnetic = result.state["elements.state"]
     return (
         Motion(
-            q=W[ROW_Q, :MODES].copy(),
-            v=W[ROW_V, :MODES].copy(),
+            q=W[ROW_Q, :modes].copy(),
+            v=W[ROW_V, :modes].copy(),
             pressure=float(channels["below pressure"].values[-1]) if wet else 0.0,
             flux=float(channels["coil flux"].values[-1]),
             leakage=float(magnetic[1]),
@@ -251,14 +252,15 @@ def _indentation(K: float, linear: bool, closed: float) -> float:
 @njit(cache=True)
 def _gaps(y: Vector, scale: float, gaps: Vector) -> None:
     """Gap and gap rate of seat and stop."""
-    bottom, top, bottom_rate, top_rate = y[0], y[0], y[5], y[5]
+    modes = (y.size - 5) // 2
+    bottom, top, bottom_rate, top_rate = y[0], y[0], y[modes], y[modes]
     sign = 1.0
-    for n in range(1, 5):
+    for n in range(1, modes):
         sign = -sign
         bottom += sqrt(2.0) * y[n]
         top += sign * sqrt(2.0) * y[n]
-        bottom_rate += sqrt(2.0) * y[5 + n]
-        top_rate += sign * sqrt(2.0) * y[5 + n]
+        bottom_rate += sqrt(2.0) * y[modes + n]
+        top_rate += sign * sqrt(2.0) * y[modes + n]
     gaps[0], gaps[1] = 15e-6 + scale * bottom, 20e-6 - scale * top
     gaps[2], gaps[3] = scale * bottom_rate, -scale * top_rate
     gaps[4], gaps[5] = scale * bottom, scale * top
@@ -270,7 +272,7 @@ def _forces(
 ) -> None:
     """Force, relaxation rate of the compression, of seat and stop."""
     for k in range(2):
-        g, e = gaps[k], y[13 + k]
+        g, e = gaps[k], y[y.size - 2 + k]
         force[2 + k] = 0.0
         if mode[k] == 1.0:
             K = 1e10 if k == 0 else 4e7
@@ -292,17 +294,18 @@ def _rhs(t: float, y: Vector, out: Vector, data: Any) -> None:
     gaps, force = np.empty(6), np.empty(4)
     _gaps(y, scale, gaps)
     _forces(y, mode, gaps, B, suction, wet, force)
-    p, flux, leakage = y[10], y[11], y[12]
+    modes = omega.size
+    p, flux, leakage = y[2 * modes], y[2 * modes + 1], y[2 * modes + 2]
     mu0 = 4e-7 * pi * 0.99999999987
     pole = pi * POLE * POLE
     gap = 20e-6 - gaps[5] + RESIDUAL
     current = leakage / (LEAKAGE * TURNS)
     eddy = CONDUCTIVITY * CORE / (8.0 * pi)
-    out[11] = (TURNS * current - flux * gap / (mu0 * pole)) / eddy
-    out[12] = (VOLTAGE - RESISTANCE * current) / TURNS - out[11]
+    flux_rate = (TURNS * current - flux * gap / (mu0 * pole)) / eddy
+    leakage_rate = (VOLTAGE - RESISTANCE * current) / TURNS - flux_rate
     top = flux * flux / (2.0 * mu0 * pole) - PRELOAD - STIFFNESS * gaps[5] - force[1]
     bottom = force[0]
-    out[10] = 0.0
+    pressure_rate = 0.0
     if wet:
         bottom += FACE * (p - AMBIENT)
         rho = REFERENCE_DENSITY * (1.0 + BULK_SLOPE * (p - AMBIENT) / BULK) ** (1.0 / BULK_SLOPE)
@@ -314,18 +317,18 @@ def _rhs(t: float, y: Vector, out: Vector, data: Any) -> None:
         if p > AMBIENT:
             flow = -flow
         V = VOLUME + FACE * gaps[4]
-        rate = scale * y[5]
-        for n in range(1, 5):
-            rate += scale * sqrt(2.0) * y[5 + n]
-        out[10] = (BULK + BULK_SLOPE * (p - AMBIENT)) / V * (flow / rho - FACE * rate)
+        pressure_rate = (BULK + BULK_SLOPE * (p - AMBIENT)) / V * (flow / rho - FACE * gaps[2])
     sign = 1.0
-    out[0], out[5] = y[5], scale * (bottom + top)
-    for n in range(1, 5):
+    out[0], out[modes] = y[modes], scale * (bottom + top)
+    for n in range(1, modes):
         sign = -sign
-        out[n] = y[5 + n]
-        out[5 + n] = -omega[n] * omega[n] * y[n] - 2.0 * DAMPING * omega[n] * y[5 + n]
-        out[5 + n] += scale * sqrt(2.0) * (bottom + sign * top)
-    out[13], out[14] = force[2], force[3]
+        q, v = y[n], y[modes + n]
+        out[n] = v
+        out[modes + n] = scale * sqrt(2.0) * (bottom + sign * top)
+        out[modes + n] -= omega[n] * (omega[n] * q + 2.0 * DAMPING * v)
+    out[2 * modes] = pressure_rate
+    out[2 * modes + 1], out[2 * modes + 2] = flux_rate, leakage_rate
+    out[2 * modes + 3], out[2 * modes + 4] = force[2], force[3]
 
 
 @njit(cache=True)
@@ -335,7 +338,7 @@ def _roots(t: float, y: Vector, out: Vector, data: Any) -> None:
     gaps = np.empty(6)
     _gaps(y, scale, gaps)
     for k in range(2):
-        g, e = gaps[k], y[13 + k]
+        g, e = gaps[k], y[y.size - 2 + k]
         first, second = 1.0, 1.0
         if mode[k] == 1.0:
             first = -g / 1e-6
@@ -350,7 +353,9 @@ def _roots(t: float, y: Vector, out: Vector, data: Any) -> None:
         out[2 * k], out[2 * k + 1] = first, second
 
 
-def by_cvode(*, wet: bool = True, rtol: float, duration: float = DURATION) -> Motion:
+def by_cvode(
+    *, wet: bool = True, rtol: float, modes: int = MODES, duration: float = DURATION
+) -> Motion:
     """Integrate the equations with CVODE, piece by piece between its located events."""
     from time import perf_counter
 
@@ -362,14 +367,26 @@ def by_cvode(*, wet: bool = True, rtol: float, duration: float = DURATION) -> Mo
     logs = np.array([log(b / a) for a, b in zip(INNER, OUTER, strict=True)])
     B = 1.5 * pi * VISCOSITY * (outer**4 - inner**4 - widths**2 / logs)
     suction = pi * widths * (AMBIENT - VAPOUR)
-    omega, mode, scale = scales(), np.zeros(2), 1.0 / sqrt(mass)
+    omega, mode, scale = scales(modes), np.zeros(2), 1.0 / sqrt(mass)
     data = (omega, mode, B, suction, scale, wet)
-    y = np.zeros(15)
-    y[5] = SPEED * sqrt(mass)
-    y[10] = START_PRESSURE
-    ds = rtol / 1e-9
-    atol = ds * np.array(
-        [*[1e-18] * 5, *[1e-13] * 5, 1e-5, 1e-17, 1e-17, 1e-20, 1e-20]  # a 1e-9 of usual sizes
+    y = np.zeros(2 * modes + 5)
+    y[modes] = SPEED * sqrt(mass)
+    y[2 * modes] = START_PRESSURE
+    # of a size that is usual for each state
+    atol = (
+        rtol
+        / 1e-9
+        * np.array(
+            [
+                *[1e-18] * modes,
+                *[1e-13] * modes,
+                1e-5,
+                1e-17,
+                1e-17,
+                1e-20,
+                1e-20,
+            ]
+        )
     )
     options = {
         "rtol": rtol,
@@ -379,7 +396,7 @@ def by_cvode(*, wet: bool = True, rtol: float, duration: float = DURATION) -> Mo
         "num_events": 4,
         "userdata": data,
     }
-    _rhs(0.0, y, np.zeros(15), data)  # compiled before the clock starts
+    _rhs(0.0, y, np.zeros_like(y), data)  # compiled before the clock starts
     t, steps, peaks, touched = 0.0, 0, np.zeros(2), np.full(2, np.nan)
     gaps, force = np.empty(6), np.empty(4)
     begin = perf_counter()
@@ -404,19 +421,19 @@ def by_cvode(*, wet: bool = True, rtol: float, duration: float = DURATION) -> Mo
                     touched[k] = t
                 mode[k] = CONTACT if closing else FILM
                 # in contact it follows the gap; behind it the faces part by next to nothing
-                y[13 + k] = 0.0 if closing else 1e-16 - gaps[k]
+                y[y.size - 2 + k] = 0.0 if closing else 1e-16 - gaps[k]
             if crossed[2 * k + 1]:
                 resumes = mode[k] == CAVITATED
                 mode[k] = FILM if resumes else CAVITATED
-                y[13 + k] = -SERIES * suction[k]
+                y[y.size - 2 + k] = -SERIES * suction[k]
     seconds = perf_counter() - begin
     _forces(y, mode, gaps, B, suction, wet, force)
     return Motion(
-        q=y[:5],
-        v=y[5:10],
-        pressure=float(y[10]) if wet else 0.0,
-        flux=float(y[11]),
-        leakage=float(y[12]),
+        q=y[:modes],
+        v=y[modes : 2 * modes],
+        pressure=float(y[2 * modes]) if wet else 0.0,
+        flux=float(y[2 * modes + 1]),
+        leakage=float(y[2 * modes + 2]),
         compression=SERIES * force[:2],
         peaks=peaks,
         touched=touched,
