@@ -1,0 +1,215 @@
+"""klack stroke through main(argv), on the case of the how-to page.
+
+Truth: work and energy for the speed of the first impact, the numbers printed on that page, and one
+run of 2 ms against two of 1 ms.
+"""
+
+import json
+import re
+from math import sqrt
+from pathlib import Path
+from shutil import copytree
+
+import numpy as np
+import pytest
+
+from klack.cli.main import main
+from klack.workflow.stroke_store import load_stroke
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+CASE = HOW_TO / "small_valve.yaml"
+# 35 N of the magnet, less 12 N of the spring and its 10 N/mm, over 100 um, on 3 g
+SPEED = sqrt(2.0 * (23.0 * 1e-4 - 0.5 * 1e4 * 1e-4**2) / 3e-3)
+EVENT = {
+    "stop",
+    "time_s",
+    "approach_speed_m_s",
+    "peak_force_N",
+    "contact_time_s",
+    "impulse_Ns",
+    "restitution",
+}
+STUDY = {"events", "opening_time_s", "closing_time_s", "energy_residual", "steps", "wall_time_s"}
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    """Folder with the result and the numbers of the whole case."""
+    folder = tmp_path_factory.mktemp("stroke")
+    numbers = folder / "numbers.json"
+    words = ["--out", str(folder / "out"), "--json", str(numbers), "--no-report", "-q"]
+    assert main(["stroke", str(CASE), *words]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def numbers(run: Path) -> dict:
+    return json.loads((run / "numbers.json").read_text())
+
+
+def test_numbers_have_the_promised_keys(numbers):
+    assert set(numbers) >= STUDY
+    assert list(numbers["variants"]) == ["wet", "dry"]
+    for variant in numbers["variants"].values():
+        assert set(variant) >= STUDY
+        assert len(variant["events"]) > 5
+        assert all(set(event) >= EVENT for event in variant["events"])
+    reference = numbers["variants"]["wet"]
+    assert all(numbers[key] == reference[key] for key in STUDY)
+
+
+def test_the_first_impact_has_the_speed_that_work_gives(numbers):
+    event = numbers["variants"]["dry"]["events"][0]
+
+    assert event["stop"] == "opening"
+    # read at the last step before touch, up to 20 ns early at 7500 m/s^2
+    assert event["approach_speed_m_s"] == pytest.approx(SPEED, abs=1.5e-4)
+    assert numbers["variants"]["dry"]["opening_time_s"] == event["time_s"]
+    # momentum: what comes back is the restitution
+    back = event["approach_speed_m_s"] * (1.0 + event["restitution"])
+    pushed = 23.0 * event["contact_time_s"]  # by magnet and spring meanwhile
+    assert event["impulse_Ns"] == pytest.approx(3e-3 * back + pushed, rel=2e-3)
+
+
+def test_the_books_close(numbers):
+    for variant in numbers["variants"].values():
+        assert variant["energy_throughput_J"] > 3e-3
+        assert variant["energy_residual"] < 1e-9
+
+
+def test_fluid_slows_the_needle(numbers):
+    wet, dry = (numbers["variants"][name] for name in ("wet", "dry"))
+
+    assert wet["events"][0]["approach_speed_m_s"] < 0.9 * dry["events"][0]["approach_speed_m_s"]
+    assert wet["opening_time_s"] > dry["opening_time_s"]
+
+
+def test_the_page_of_the_how_to_prints_the_right_number():
+    text = (HOW_TO / "stroke.md").read_text(encoding="utf-8")
+    written = re.findall(r"([\d.]+) m/s", text)
+
+    assert written == ["1.2247", "1.2247"]
+    assert float(written[0]) == pytest.approx(SPEED, abs=5e-5)
+    # the excerpt is that of the file
+    case = CASE.read_text(encoding="utf-8")
+    blocks = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert len(blocks) == 2
+    for line in "".join(blocks).splitlines():
+        assert line.strip() in ("...", "") or line in case
+
+
+def test_what_does_not_exist_is_null(capsys):
+    # the needle is still on its way
+    words = ["--duration", "100 us", "--variant", "dry", "--json", "-", "--no-report"]
+    assert main(["stroke", str(CASE), *words]) == 0
+
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert (found["opening_time_s"], found["closing_time_s"], found["events"]) == (None, None, [])
+    assert list(found["variants"]) == ["dry"]
+    assert "no impacts" in err
+    assert "klack-results/small_valve: result.zarr\n" in err
+
+
+def test_the_terminal_shows_variants_and_impacts(capsys):
+    assert main(["stroke", str(CASE), "--duration=1.3 ms", "--no-report", "--out", "x"]) == 0
+
+    out = capsys.readouterr().out
+    for words in ("opens [ms]", "real-time factor", "peak force [N]", "dry, rigid bodies"):
+        assert words in out
+    assert "1.2247 " in out  # as on the page
+    assert out.index("wet:") < out.index("dry:")
+
+
+def test_two_runs_are_one(run):
+    """The state is complete: the second half goes on to the same bits."""
+    half = ["stroke", str(CASE), "--duration", "1 ms", "--variant=dry", "--no-report", "-q"]
+    assert main([*half, "--out", "first"]) == 0
+    assert main([*half, "--out", "second", "--continue", "first"]) == 0
+
+    whole = load_stroke(run / "out").variants["dry"].result
+    parts = [load_stroke(Path(name)).variants["dry"].result for name in ("first", "second")]
+    assert len(parts[0].events) > 3 < len(parts[1].events)
+    found = [(e.stop, e.time, e.peak_force) for part in parts for e in part.events]
+    assert found == [(e.stop, e.time, e.peak_force) for e in whole.events]
+    lift = "needle.tip displacement"
+    np.testing.assert_array_equal(
+        whole.channels[lift].values[-500:], parts[1].channels[lift].values[-500:]
+    )
+
+
+def test_the_report_of_a_stroke_is_written_again(run, capsys):
+    copytree(run / "out", "r")
+
+    assert main(["report", "r"]) == 0
+
+    assert sorted(path.name for path in Path("r").iterdir()) == [
+        "report.html",
+        "report.pdf",
+        "result.zarr",
+    ]
+    assert "Report in r: report.html, report.pdf" in capsys.readouterr().out
+    page = Path("r/report.html").read_text(encoding="utf-8")
+    assert "A small valve of rigid parts" in page
+    assert Path("r/report.pdf").read_bytes().startswith(b"%PDF")
+
+
+BAD = {
+    "duration without unit": (["--duration", "5"], ["--duration", "a unit"]),
+    "negative duration": (["--duration=-1 ms"], ["--duration", "above 0 s"]),
+    "endless": (["--duration", "1 min"], ["--duration", "50000000 steps"]),
+    "step too long": (["--step", "1 ms"], ["--step", "10 to 50000000 steps"]),
+    "unknown variant": (["--variant", "wett"], ["'wett'", "did you mean 'wet'"]),
+    "lumped without stiffness": (["--variant", "dry,dry-lumped"], ["lumped: {stiffness: 1e9 N/m}"]),
+    "nothing to go on from": (["--continue", "none"], ["none", "result.zarr"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_options_give_one_message_and_exit_2(name, capsys, tmp_path):
+    options, words = BAD[name]
+
+    code = main(["stroke", str(CASE), *options])
+
+    out, err = capsys.readouterr()
+    assert (code, out) == (2, "")
+    assert err.startswith("klack stroke: ")
+    assert "\nTry: " in err
+    assert "Traceback" not in err
+    for word in words:
+        assert word in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_goes_on_only_with_its_own_step_and_variants(run, capsys, tmp_path):
+    go_on = ["stroke", str(CASE), "--continue", str(run / "out")]
+    copytree(run / "out", tmp_path / "r")
+
+    assert main([*go_on, "--step", "50 ns"]) == 2
+    assert "expected 20 ns" in capsys.readouterr().err
+    text = CASE.read_text(encoding="utf-8") + "lumped: {stiffness: 1e9 N/m}\n"
+    Path("small_valve.yaml").write_text(text, encoding="utf-8")
+    assert main(["stroke", "small_valve.yaml", "--continue", "r", "--variant=dry-lumped"]) == 2
+    assert "'dry-lumped', which the result to go on from does not hold" in capsys.readouterr().err
+
+
+def test_an_impact_case_is_no_stroke(capsys):
+    drawn = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
+
+    assert main(["stroke", str(drawn)]) == 2
+
+    assert "run it with klack impact" in capsys.readouterr().err
+
+
+def test_schema_of_a_stroke_names_the_components(capsys):
+    assert main(["schema", "--kind", "stroke"]) == 0
+
+    printed = capsys.readouterr().out
+    assert {"network", "run", "stops"} <= set(json.loads(printed)["properties"])
+    for word in ("rigid-mass", "end-stop", "solenoid", "orifice"):
+        assert f'"{word}"' in printed
