@@ -111,7 +111,7 @@ def variant(name: str, *, peak: float, late: float) -> StrokeVariant:
             "seat": half_sine(back, 0.5 * peak, 30e-6),
         },
         events=(
-            impact("seat", 30e-6, 0.02, 80e-9, -1e-3),  # the pressed seat lets go
+            impact("seat", 30e-6, 0.02, 80e-9, 1e-3),  # the pressed seat lets go
             impact("opening", begin, peak, 20e-6, 1.0),
             impact("seat", back, 0.5 * peak, 30e-6, 0.7),
         ),
