@@ -21,7 +21,9 @@ rises with a slope of 1 or more.
 compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
 1/2 would let ``e`` change its sign in every step for ever.  ``theta = 1 - D c / h`` is the smallest
 value that does not; without a film it is 1, and a compression left at release vanishes with its
-energy booked.
+energy booked.  It is 1, too, for the first closed step after a film has carried force: the film
+ends at first touch, the contact has not begun, and what the film had compressed is lost.  With 1/2
+this share of ``e`` would change its sign in every step of the contact.
 """
 
 from math import log
@@ -46,6 +48,7 @@ _FORCE_LEFT = 1e-9  # [N] accepted error of a force
 _ROUND_OFF = 1e-17  # [m]
 _UNKNOWN = 1e18  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-14 m
 _NEWTON_LIMIT = 100
+_LEFT_BY_FILM = 0.1  # share of e that the contact does not carry: above it the film has just ended
 _SERIES = 0.05  # below it the logarithm is a short series
 
 
@@ -174,6 +177,11 @@ def solve_interface(
     theta = 0.5
     if series > 0.0 and z0 > 0.0:
         theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
+    elif series > 0.0 and z0 < 0.0 and kind != NO_LAW:
+        # first touch: the film's force has just ended, and its part of e with it
+        settled, _, _ = mean_force(kind, law_data, law_start, -z0, -z0, hint)
+        if abs(e0 - series * settled) > _LEFT_BY_FILM * abs(e0):
+            theta = 1.0
     if z0 >= 0.0:
         S, base = _line(G, series, theta, g_free, e0)
         film, found = _film_alone(cubic, linear, cut_off, suction, h, S, z0, base, guess)

@@ -53,6 +53,7 @@ STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0,
 SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
 SETTLED_COARSE = 1e-14  # [m] the same for a coarse step, whose forces change more
 _MOST_SWEEPS = 200
+_COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
 _PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
@@ -477,7 +478,7 @@ def run_network(
         while done < M:
             m = M if level == 1 else 1
             H = m * h
-            t = step * h
+            t = 0.0 if settle else step * h
             inverse_H = inverse_h if level == 0 else inverse_h / M
             # 1. modes
             for i in range(ports):
@@ -708,13 +709,15 @@ def run_network(
                     moved = max(moved, abs(y1[i] - used[i]))
                 if moved <= (SETTLED if level == 0 else SETTLED_COARSE):
                     break
+                if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
+                    break
                 if sweep == _MOST_SWEEPS - 1:
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
             F[ports] = 0.0
             # a coarse step may not meet what it cannot see
             if level == 1 and not settle:
-                fits = True
+                fits = moved <= SETTLED_COARSE
                 for c in range(count_interfaces):
                     closed = interface_since[c] < np.inf
                     if closed != (f_contact[c] > 0.0):
@@ -809,7 +812,8 @@ def run_network(
                 interface_rate[c] = (gap - interface_gap[c]) * inverse_H
                 interface_gap[c] = gap
                 was_closed = interface_since[c] < np.inf
-                if settle or f_contact[c] != 0.0 or f_film[c] != 0.0 or was_closed:
+                acted = f_contact[c] != 0.0 or f_film[c] != 0.0 or lost_contact[c] != 0.0
+                if settle or acted or was_closed:
                     interface_e[c] = e1[c]
                     interface_force[c] = fi[c]
                     if settle:
