@@ -110,5 +110,6 @@ def film_by_ode(
         atol=relative * scale,
         dense_output=True,
     )
+    assert solution.sol is not None  # dense_output was asked for
     fine = solution.sol(np.linspace(0.0, duration, 20001))
     return float(np.max(fine[-1]) / series), solution.y[:-1, -1]

@@ -1,7 +1,6 @@
 """A coil with a driver and an armature on a prescribed course: the smallest world it needs."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -12,7 +11,7 @@ from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import FAILURES, flux_numbers, flux_state, magnet_step
-from klack.network.step_function import pointer
+from klack.network.step_function import address_of, call, first
 
 __all__ = ["CoilRun", "run_coil"]
 
@@ -68,14 +67,14 @@ class CoilRun:
 
 @njit(cache=True)
 def _march(
-    table: Any, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
+    address: int, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
 ) -> int:
     size, steps = state.size - 1, y.size - 1
     inp, out = np.zeros(6), np.zeros(2 + state.size + 4)
     for k in range(-1, steps):
         inp[0], inp[1] = max(k, 0) * h, h if k >= 0 else 0.0
         inp[2], inp[3] = y[max(k, 0)], y[k + 1]
-        status = table[0](pointer(par, 0), pointer(state, 0), pointer(inp, 0), pointer(out, 0))
+        status = call(address, first(par), first(state), first(inp), first(out))
         if status != 0:
             return int(status)
         for j in range(size):
@@ -127,7 +126,7 @@ def run_coil(
     par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
     start = flux_state(par, fluxes)
     log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(6)
-    status = _march((magnet_step,), par, np.append(start, 0.0), y, step, log, sums)
+    status = _march(address_of(magnet_step), par, np.append(start, 0.0), y, step, log, sums)
     if status != 0:
         raise ConvergenceError(f"coil: {FAILURES[status]}.")
     loops = (start.size - _FRONT) // 3 if isinstance(plant, FluxMap) else plant.loops.shape[1]
