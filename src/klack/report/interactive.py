@@ -178,7 +178,8 @@ def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) ->
                 "layer": "below",
             }
         )
-        layout["annotations"].append(_label(band.label, band.low, 0.02, y_axis, log_x, "left"))
+        if band.label:
+            layout["annotations"].append(_label(band.label, band.low, 0.02, y_axis, log_x, "left"))
     upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for mark in panel.marks:
         across = mark.axis == "y"

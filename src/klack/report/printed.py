@@ -103,7 +103,8 @@ def svg_bars(chart: BarChart) -> bytes:
 def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
     for band in panel.bands:
         axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
-        _note(axes, band.low, 0.02, " " + band.label, "left", "bottom")
+        if band.label:
+            _note(axes, band.low, 0.02, " " + band.label, "left", "bottom")
     for mark in panel.marks:
         draw = axes.axvline if mark.axis == "x" else axes.axhline
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
@@ -148,6 +149,7 @@ def _note(axes: Any, x: float, y: float, text: str, side: str, height: str) -> N
         fontsize=6.5,
         color="#444a52",
         clip_on=True,
+        bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6},
     )
 
 

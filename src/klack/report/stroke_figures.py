@@ -11,7 +11,18 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.report.chart import AxisSpec, BarChart, BarPart, Chart, Colour, Curve, Mark, Panel, Style
+from klack.report.chart import (
+    AxisSpec,
+    Band,
+    BarChart,
+    BarPart,
+    Chart,
+    Colour,
+    Curve,
+    Mark,
+    Panel,
+    Style,
+)
 from klack.report.figures import PART_LOOKS
 from klack.report.thinning import thinned
 from klack.report.wording import listed, quantity
@@ -338,7 +349,7 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
     since = 1e6 * (variant.result.time - event.time)
     window = (-echo, min(6.0 * echo, float(since[-1])))
     marks = [
-        Mark(value=k * echo, label=f"{k}·2L/a" if k else "touch")
+        Mark(value=k * echo, label=f"{2 * k}L/a" if k else "touch")
         for k in range(7)
         if k * echo <= window[1]
     ]
@@ -369,6 +380,7 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
             Panel(
                 y=AxisSpec(label="velocity", unit="m/s"),
                 curves=tuple(motion),
+                bands=_contacts(variant, event.time, window),
                 marks=(*_staggered(marks), _ZERO),
                 share=0.9,
             ),
@@ -384,8 +396,27 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
             f"{quantity(line.echo_time, 's', 3)} (L = {quantity(line.length, 'm', 3)}, "
             f"a = {line.sound_speed:.4g} m/s) from first touch: there the pressure wave that the "
             "impact sent into the line comes back and changes the force on the needle in steps, "
-            "the stairs of the rebound velocity. Chambers between needle and line round them off."
+            "the stairs of the rebound velocity. Chambers between needle and line round them off; "
+            "jumps in the shaded stretches are impacts."
         ),
+    )
+
+
+def _contacts(variant: StrokeVariant, zero: float, window: tuple[float, float]) -> tuple[Band, ...]:
+    """Stretches in which a stop carries force [us]."""
+    spans = [
+        (1e6 * (event.time - zero), 1e6 * (event.separation_time - zero))
+        for event in variant.result.events
+        if event.approach_speed > 0.0
+    ]
+    seen = [
+        (max(low, window[0]), min(high, window[1]) if isfinite(high) else window[1])
+        for low, high in spans
+        if low < window[1] and not high < window[0]
+    ]
+    return tuple(
+        Band(low=low, high=high, label="contact" if i == 0 else "")
+        for i, (low, high) in enumerate(seen)
     )
 
 
