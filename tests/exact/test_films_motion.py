@@ -118,7 +118,23 @@ def test_compression_dies_without_changing_its_sign(damper):
     g = gap
     for _ in range(30):
         _, _, g, e, _, lost, loss = solve_interface(
-            NO_LAW, np.zeros(1), 0, 0.0, cubic, 0.0, 1e-7, NEVER, h, 1e-16, D, g, g, e, 0.0, 0
+            NO_LAW,
+            np.zeros(1),
+            0,
+            0.0,
+            cubic,
+            0.0,
+            1e-7,
+            NEVER,
+            h,
+            1e-16,
+            D,
+            g,
+            g,
+            e,
+            0.0,
+            0,
+            0.0,
         )
         assert lost == 0.0
         assert loss >= 0.0
@@ -150,6 +166,7 @@ def test_compression_left_at_release_vanishes_and_is_booked():
         e0,
         0.0,
         0,
+        0.0,
     )
 
     assert (contact, film, g1, e1, loss) == (0.0, 0.0, 2e-8, 0.0, 0.0)

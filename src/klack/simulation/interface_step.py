@@ -21,9 +21,12 @@ rises with a slope of 1 or more.
 compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
 1/2 would let ``e`` change its sign in every step for ever.  ``theta = 1 - D c / h`` is the smallest
 value that does not; without a film it is 1, and a compression left at release vanishes with its
-energy booked.  It is 1, too, for the first closed step after a film has carried force: the film
-ends at first touch, the contact has not begun, and what the film had compressed is lost.  With 1/2
-this share of ``e`` would change its sign in every step of the contact.
+energy booked.
+
+At first touch the film ends while the contact begins, and what only the film had compressed is
+lost: ``theta`` is 1 in the step after it.  With 1/2 this share of ``e`` would change its sign in
+every step of the contact, and end in the rebound with one sign or the other.  That one step is of
+order 1.
 """
 
 from math import log
@@ -47,8 +50,8 @@ _LINEAR, _TABLE = LAW_LINEAR, LAW_TABLE
 _FORCE_LEFT = 1e-9  # [N] accepted error of a force
 _ROUND_OFF = 1e-17  # [m]
 _UNKNOWN = 1e18  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-14 m
+_LEFT_BY_FILM = 0.01  # share of the compression that a film must have made to end at first touch
 _NEWTON_LIMIT = 100
-_LEFT_BY_FILM = 0.1  # share of e that the contact does not carry: above it the film has just ended
 _SERIES = 0.05  # below it the logarithm is a short series
 
 
@@ -128,6 +131,7 @@ def solve_interface(
     e0: float,
     guess: float,
     hint: int,
+    film_before: float,
 ) -> Step:
     """Forces of an interface over one step, and where it ends.
 
@@ -156,6 +160,8 @@ def solve_interface(
         Total force, from the last step or sweep.
     hint : int
         Interval of a table law that was used last.
+    film_before : float [N]
+        Film force of the last step, if the contact closed in it; else 0.
 
     Returns
     -------
@@ -174,14 +180,12 @@ def solve_interface(
             relaxed = 0.5 * e0 * e0 / series if e0 != 0.0 else 0.0
             return 0.0, 0.0, g_free, 0.0, hint, relaxed, 0.0
         return _bare(kind, law_data, law_start, chi_over_h, G, series, z0, g_free, e0, guess, hint)
+    left = abs(film_before) * series > _LEFT_BY_FILM * abs(e0)
     theta = 0.5
     if series > 0.0 and z0 > 0.0:
         theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
-    elif series > 0.0 and z0 < 0.0 and kind != NO_LAW:
-        # first touch: the film's force has just ended, and its part of e with it
-        settled, _, _ = mean_force(kind, law_data, law_start, -z0, -z0, hint)
-        if abs(e0 - series * settled) > _LEFT_BY_FILM * abs(e0):
-            theta = 1.0
+    elif left and z0 < 0.0:
+        theta = 1.0
     if z0 >= 0.0:
         S, base = _line(G, series, theta, g_free, e0)
         film, found = _film_alone(cubic, linear, cut_off, suction, h, S, z0, base, guess)

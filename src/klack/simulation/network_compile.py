@@ -25,6 +25,8 @@ from klack.simulation.modal_step import (
 )
 from klack.simulation.network_kernel import (
     LOSS,
+    PORTS,
+    ROWS_AT,
     STORE,
     SUPPLY,
     Bodies,
@@ -169,7 +171,14 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
     ports = sum(len(row.ports) for row in rows)
     first, last = np.zeros(ports + 1, np.int64), np.zeros(ports + 1, np.int64)
     first[ports] = last[ports] = ports
-    G = np.zeros((2, ports, ports))
+    if ports >= PORTS:
+        raise InputError(
+            "network",
+            got=f"{ports} mechanical ports",
+            expected=f"fewer than {PORTS}",
+            hint="leave out ports of bodies that nothing is joined to.",
+        )
+    G = np.zeros((2, PORTS, PORTS))
     for row in rows:
         body, own = row.body, len(row.ports)
         height = FIXED_ROWS + own + 1
@@ -214,12 +223,8 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         port1=np.array(port1, dtype=np.int64),
         first=first,
         last=last,
-        G=G,
-        force=np.zeros(ports + 1),
-        before=np.zeros(ports + 1),
-        y=np.zeros(ports + 1),
-        seen=np.zeros(ports + 1),
-        work=np.zeros(ports + 1),
+        G=G.ravel(),
+        at=np.zeros(ROWS_AT * PORTS),
     )
     return bodies, np.array(blocks, dtype=np.int64)
 
@@ -321,11 +326,11 @@ def _nodes(
     volume = np.array([node.volume for node in given[:volumes]], dtype=float)
     gamma = np.zeros((2, max(volumes, 1)))
     walls = [(node_of[w.node], port_of[w.port], w.area) for w in rows.walls]
-    ports = bodies.y.size - 1
+    G = bodies.G.reshape(2, PORTS, PORTS)
     for i, a, area_a in walls:
         for j, b, area_b in walls:
-            if i == j and i < volumes and a < ports and b < ports:
-                gamma[:, i] += area_a * bodies.G[:, a, b] * area_b
+            if i == j and i < volumes:
+                gamma[:, i] += area_a * G[:, a, b] * area_b
     return Nodes(
         volumes=volumes,
         fluid=fluid,
@@ -391,6 +396,7 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
         force=np.zeros(count),
         chi=np.zeros(count),
         since=np.full(count, np.inf),
+        film_before=np.zeros(count),
         contact_loss=np.zeros(count),
         film_loss=np.zeros(count),
     )
@@ -398,12 +404,10 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
 
 def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
     """Opening of each gap per unit force during a fine and during a coarse step, flat (2 n,)."""
-    ports = bodies.y.size - 1
-    jump = np.zeros((len(upper), ports + 1))
+    jump = np.zeros((len(upper), PORTS))
     jump[np.arange(len(upper)), upper] += 1.0
     jump[np.arange(len(lower)), lower] -= 1.0
-    jump = jump[:, :ports]
-    return np.einsum("ci,lij,cj->lc", jump, bodies.G, jump).ravel()
+    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(2, PORTS, PORTS), jump).ravel()
 
 
 def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:

@@ -27,6 +27,7 @@ from klack.simulation.interface_step import solve_interface
 from klack.simulation.modal_step import ROW, advance, apply_forces, watch
 
 __all__ = [
+    "PORTS",
     "STATUS_BRANCH",
     "STATUS_DONE",
     "STATUS_ELEMENT",
@@ -55,13 +56,31 @@ SETTLED_COARSE = 1e-14  # [m] the same for a coarse step, whose forces change mo
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
-_PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
+_PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
-_FILM_SMALL = 0.02  # [N] film force that a coarse step may meet
+_FILM_SMALL = 0.5  # [N] film force that a coarse step may begin with; it may end with twice of it
+_FILM_FELT = 0.02  # [N] film force from which on fine steps are recorded
 _REST_TIME = 50e-6  # [s] closed for so long: at rest
+_SLOWEST = 1e-3  # [m/s] approach speed from which on a dashpot of a given restitution is scaled
 _SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
 STORE, SUPPLY, LOSS = 0, 1, 2
+
+PORTS = 64
+"""Length of a row of port numbers; one less is the most a network can have."""
+
+# Rows at constant distances: the compiler knows that none overlaps another.
+Y0 = 0 * PORTS  # displacements at the start of the step
+Y1 = 1 * PORTS  # ... at its end
+USED = 2 * PORTS  # ... as elements and fluid use them in this sweep
+SEEN = 3 * PORTS  # ... as they saw them at the end of the last step
+FREE = 4 * PORTS  # ... without the forces of this step
+FORCE = 5 * PORTS  # forces of this step
+PENDING = 6 * PORTS  # ... of the last step, not yet in the modes
+LAST = 7 * PORTS  # ... of the last step
+BEFORE = 8 * PORTS  # ... of the step before
+WORK = 9 * PORTS  # work done by the forces so far
+ROWS_AT = 10
 
 
 class Bodies(NamedTuple):
@@ -75,12 +94,8 @@ class Bodies(NamedTuple):
     port1: Index
     first: Index  # (ports,) first port of the body of each port
     last: Index
-    G: Cube  # (2, ports, ports) displacement at the end of a step per unit force during it
-    force: Vector  # (ports + 1,) forces of the last step
-    before: Vector  # (ports + 1,) forces of the step before
-    y: Vector  # (ports + 1,) displacements
-    seen: Vector  # (ports + 1,) the same as elements and fluid saw them
-    work: Vector  # (ports + 1,) work done by the forces at each port
+    G: Vector  # (2, PORTS, PORTS) displacement at the end of a step per unit force during it
+    at: Vector  # (10, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 
 class StepRows(NamedTuple):
@@ -156,6 +171,7 @@ class Interfaces(NamedTuple):
     force: Vector
     chi: Vector
     since: Vector  # closed since; infinity while open
+    film_before: Vector  # film force of the last step if the contact closed in it, else 0
     contact_loss: Vector
     film_loss: Vector
 
@@ -163,7 +179,6 @@ class Interfaces(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of the time loop: it cannot ask for any itself."""
 
-    ports: Matrix
     interfaces: Matrix
     nodes: Matrix
     branches: Matrix
@@ -172,12 +187,9 @@ class Scratch(NamedTuple):
     sums: Vector
 
 
-def scratch_memory(
-    *, ports: int, interfaces: int, nodes: int, branches: int, ends: int, sums: int
-) -> Scratch:
+def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
     """Memory for a network of these sizes."""
     return Scratch(
-        ports=np.zeros((9, ports + 1)),
         interfaces=np.zeros((8, interfaces)),
         nodes=np.zeros((10, nodes)),
         branches=np.zeros((3, branches)),
@@ -249,13 +261,31 @@ def _solve(A: Any, r: Any, n: int) -> None:
 
 
 @njit(cache=True)
-def _move(y1: Any, free: Any, G: Any, F: Any, body_first: Any, body_last: Any, ports: int) -> None:
-    """Displacements at the end of a step; ``G`` of its level, row by row."""
+def _move_by_guess(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> None:
+    """Displacements at the end of a step under the forces so far; ``G`` of its level.
+
+    These loops over ports stay scalar on purpose: a vector that is loaded from numbers stored one
+    by one a moment before has to wait until they have left the store buffer.
+    """
     for p in range(ports):
-        total = free[p]
+        total = S[FREE + p]
         for j in range(body_first[p], body_last[p]):
-            total += G[p * ports + j] * F[j]
-        y1[p] = total
+            total += G[p * PORTS + j] * S[FORCE + j]
+        S[Y1 + p] = total
+        S[USED + p] = total
+
+
+@njit(cache=True)
+def _move(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> float:
+    """The same under the new forces; returns the largest change."""
+    moved = 0.0
+    for p in range(ports):
+        total = S[FREE + p]
+        for j in range(body_first[p], body_last[p]):
+            total += G[p * PORTS + j] * S[FORCE + j]
+        S[Y1 + p] = total
+        moved = max(moved, abs(total - S[USED + p]))
+    return moved
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -290,24 +320,22 @@ def run_network(
     its time.  With ``settle`` the velocities are taken out after every step and nothing but the
     bodies moves: the static start.
     """
-    at_ports, at_interfaces, at_nodes = scratch.ports, scratch.interfaces, scratch.nodes
+    S = first(bodies.at)
+    ports = bodies.first.size - 1
+    width = 4 * (ports // 4 + 1)
+    at_interfaces, at_nodes = scratch.interfaces, scratch.nodes
     at_branches, at_ends = scratch.branches, scratch.ends
     A, sums = first(scratch.matrix), first(scratch.sums)
     # pointers, because every access to an array checks for a negative index and loads a stride
     body_G = first(bodies.G)
-    body_before = first(bodies.before)
     body_coarse = bodies.coarse
     body_fine = bodies.fine
     body_first = first(bodies.first)
-    body_force = first(bodies.force)
     body_last = first(bodies.last)
     body_modes = bodies.modes
     body_port0 = first(bodies.port0)
     body_port1 = first(bodies.port1)
     body_start = bodies.start
-    body_work = first(bodies.work)
-    body_y = first(bodies.y)
-    body_seen = first(bodies.seen)
     element_book0 = first(elements.book0)
     element_books = first(elements.books)
     element_function = first(elements.function)
@@ -383,28 +411,15 @@ def run_network(
     interface_series = first(interfaces.series)
     interface_since = first(interfaces.since)
     interface_suction = first(interfaces.suction)
+    interface_film_before = first(interfaces.film_before)
     interface_upper = first(interfaces.upper)
     record_filled = first(recording.filled)
     record_fine = recording.fine
     record_means = recording.means
     record_peaks = recording.peaks
-    ports = bodies.y.size - 1
     count_interfaces = interfaces.upper.size
     volumes, count_nodes = node_volumes, nodes.p.size
     ends = nodes.end_node.size
-    y0, y1, used, free = (
-        first(at_ports[0]),
-        first(at_ports[1]),
-        first(at_ports[2]),
-        first(at_ports[3]),
-    )
-    seen = first(at_ports[8])
-    F, smooth, pending, before = (
-        first(at_ports[4]),
-        first(at_ports[5]),
-        first(at_ports[6]),
-        first(at_ports[7]),
-    )
     f_contact, f_film, g1 = (
         first(at_interfaces[0]),
         first(at_interfaces[1]),
@@ -427,10 +442,9 @@ def run_network(
     mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
     gammas = nodes.gamma.shape[1]
-    for k in range(ports + 1):
-        pending[k] = 0.0
-        F[k], before[k], y0[k] = body_force[k], body_before[k], body_y[k]
-        seen[k] = body_seen[k]
+    for k in range(width):
+        S[PENDING + k] = 0.0
+        S[FORCE + k] = S[LAST + k]
     for k in range(count_interfaces):
         fi[k] = interface_force[k]
         peaks[k] = 0.0
@@ -478,27 +492,34 @@ def run_network(
         while done < M:
             m = M if level == 1 else 1
             H = m * h
-            t = 0.0 if settle else step * h
+            t = -H if settle else step * h  # the start knows the forces before it
             inverse_H = inverse_h if level == 0 else inverse_h / M
             # 1. modes
-            for i in range(ports):
-                free[i] = 0.0
+            for i in range(width):
+                S[FREE + i] = 0.0
             for k in range(body_modes.size):
                 block = pointer(body_fine, body_start[k])
                 if level == 1:
                     block = pointer(body_coarse, body_start[k])
-                advance(block, body_modes[k], pending, body_port0[k], body_port1[k], free)
+                advance(
+                    block,
+                    body_modes[k],
+                    shift(S, PENDING),
+                    body_port0[k],
+                    body_port1[k],
+                    shift(S, FREE),
+                )
             # guesses from the past
             if level == last_level and not settle:
-                for i in range(ports):
-                    guess = 2.0 * F[i] - before[i]
-                    before[i] = F[i]
-                    F[i] = guess
+                for i in range(width):
+                    S[FORCE + i] = 2.0 * S[LAST + i] - S[BEFORE + i]
+                    S[BEFORE + i] = S[LAST + i]
                 for i in range(volumes):
                     p[i] = max(2.0 * node_p[i] - node_before[i], _LEAST_PRESSURE)
             else:
-                for i in range(ports):
-                    before[i] = F[i]
+                for i in range(width):
+                    S[FORCE + i] = S[LAST + i]
+                    S[BEFORE + i] = S[LAST + i]
                 for i in range(volumes):
                     p[i] = node_p[i]
             for i in range(volumes, count_nodes):
@@ -508,13 +529,10 @@ def run_network(
                 lines_incoming(lines, line_state, m, c_end, Z_end)
             # 2. sweeps
             for sweep in range(_MOST_SWEEPS):
-                _move(
-                    y1, free, shift(body_G, level * ports * ports), F, body_first, body_last, ports
-                )
-                for i in range(ports):
-                    used[i] = y1[i]
-                    smooth[i] = 0.0
-                smooth[ports] = 0.0
+                own_G = shift(body_G, level * PORTS * PORTS)
+                _move_by_guess(S, own_G, body_first, body_last, ports)
+                for i in range(width):
+                    S[FORCE + i] = 0.0
                 for k in range(count_elements):
                     i0, o0 = element_input0[k], element_output0[k]
                     q0, q1 = element_port0[k], element_port0[k + 1]
@@ -522,8 +540,8 @@ def run_network(
                     element_inputs[i0 + 1] = H
                     for j in range(q0, q1):
                         port = element_ports[j]
-                        element_inputs[i0 + 2 + 2 * (j - q0)] = seen[port]
-                        element_inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
+                        element_inputs[i0 + 2 + 2 * (j - q0)] = S[SEEN + port]
+                        element_inputs[i0 + 3 + 2 * (j - q0)] = S[Y1 + port]
                     status = call(
                         element_function[k],
                         shift(element_parameters, element_parameter0[k]),
@@ -535,7 +553,7 @@ def run_network(
                         report[0], report[1], report[2] = k, status, t
                         return STATUS_ELEMENT
                     for j in range(q0, q1):
-                        smooth[element_ports[j]] += element_outputs[o0 + j - q0]
+                        S[FORCE + element_ports[j]] += element_outputs[o0 + j - q0]
                 # pressures
                 if count_nodes > 0:
                     for i in range(volumes):
@@ -544,7 +562,7 @@ def run_network(
                     for w in range(nodes.wall_node.size):
                         i = node_wall_node[w]
                         if i < volumes:
-                            V_used[i] += node_wall_area[w] * used[node_wall_port[w]]
+                            V_used[i] += node_wall_area[w] * S[USED + node_wall_port[w]]
                     for iteration in range(_MOST_NEWTON):
                         if settle:
                             break
@@ -574,8 +592,8 @@ def run_network(
                             branch_inputs[i0 + 5] = rho[b]
                             for j in range(q0, q1):
                                 port = branch_ports[j]
-                                branch_inputs[i0 + 6 + 2 * (j - q0)] = seen[port]
-                                branch_inputs[i0 + 7 + 2 * (j - q0)] = used[port]
+                                branch_inputs[i0 + 6 + 2 * (j - q0)] = S[SEEN + port]
+                                branch_inputs[i0 + 7 + 2 * (j - q0)] = S[USED + port]
                             status = call(
                                 branch_function[k],
                                 shift(branch_parameters, branch_parameter0[k]),
@@ -639,7 +657,7 @@ def run_network(
                         for i in range(volumes):
                             V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
                     for w in range(nodes.wall_node.size):
-                        smooth[node_wall_port[w]] += node_wall_area[w] * (
+                        S[FORCE + node_wall_port[w]] += node_wall_area[w] * (
                             p[node_wall_node[w]] - node_ambient
                         )
                     if not settle:
@@ -647,26 +665,24 @@ def run_network(
                             o0 = branch_output0[k] + 3
                             q0, q1 = branch_port0[k], branch_port0[k + 1]
                             for j in range(q0, q1):
-                                smooth[branch_ports[j]] += branch_outputs[o0 + j - q0]
+                                S[FORCE + branch_ports[j]] += branch_outputs[o0 + j - q0]
                 # interfaces
-                for i in range(ports):
-                    F[i] = smooth[i]
                 for c in range(count_interfaces):
-                    F[interface_upper[c]] += fi[c]
-                    F[interface_lower[c]] -= fi[c]
-                _move(
-                    y1, free, shift(body_G, level * ports * ports), F, body_first, body_last, ports
-                )
+                    if fi[c] != 0.0:
+                        S[FORCE + interface_upper[c]] += fi[c]
+                        S[FORCE + interface_lower[c]] -= fi[c]
+                moved = _move(S, own_G, body_first, body_last, ports)
                 for c in range(count_interfaces):
                     u, low = interface_upper[c], interface_lower[c]
                     Gc = interface_G[level * count_interfaces + c]
                     g0 = interface_gap[c]
-                    gap_free = interface_gap0[c] + y1[u] - y1[low] - Gc * fi[c]
+                    gap_free = interface_gap0[c] + S[Y1 + u] - S[Y1 + low] - Gc * fi[c]
                     if interface_dry[c] and g0 >= 0.0 and gap_free >= 0.0 and interface_e[c] == 0.0:
                         f_contact[c] = f_film[c] = e1[c] = lost_contact[c] = lost_film[c] = 0.0
                     else:
                         if interface_alpha[c] > 0.0 and interface_chi[c] == 0.0 and gap_free < 0.0:
-                            interface_chi[c] = interface_alpha[c] * H / max(g0 - gap_free, 1e-30)
+                            speed = max((g0 - gap_free) * inverse_H, _SLOWEST)
+                            interface_chi[c] = interface_alpha[c] / speed
                         (
                             f_contact[c],
                             f_film[c],
@@ -692,21 +708,19 @@ def run_network(
                             interface_e[c],
                             fi[c],
                             interface_hint[c],
+                            interface_film_before[c],
                         )
                     change = f_contact[c] + f_film[c] - fi[c]
                     if change != 0.0:
                         fi[c] += change
-                        F[u] += change
-                        F[low] -= change
-                        if u < ports:
-                            for i in range(body_first[u], body_last[u]):
-                                y1[i] += body_G[(level * ports + i) * ports + u] * change
-                        if low < ports:
-                            for i in range(body_first[low], body_last[low]):
-                                y1[i] -= body_G[(level * ports + i) * ports + low] * change
-                moved = 0.0
-                for i in range(ports):
-                    moved = max(moved, abs(y1[i] - used[i]))
+                        S[FORCE + u] += change
+                        S[FORCE + low] -= change
+                        for i in range(body_first[u], body_last[u]):
+                            S[Y1 + i] += own_G[i * PORTS + u] * change
+                            moved = max(moved, abs(S[Y1 + i] - S[USED + i]))
+                        for i in range(body_first[low], body_last[low]):
+                            S[Y1 + i] -= own_G[i * PORTS + low] * change
+                            moved = max(moved, abs(S[Y1 + i] - S[USED + i]))
                 if moved <= (SETTLED if level == 0 else SETTLED_COARSE):
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
@@ -714,7 +728,7 @@ def run_network(
                 if sweep == _MOST_SWEEPS - 1:
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
-            F[ports] = 0.0
+            S[FORCE + ports] = 0.0  # what pushes the ground moves nothing
             # a coarse step may not meet what it cannot see
             if level == 1 and not settle:
                 fits = moved <= SETTLED_COARSE
@@ -722,14 +736,14 @@ def run_network(
                     closed = interface_since[c] < np.inf
                     if closed != (f_contact[c] > 0.0):
                         fits = False
-                    if abs(f_film[c]) > 10.0 * _FILM_SMALL:
+                    if abs(f_film[c]) > 2.0 * _FILM_SMALL:
                         fits = False
                 if not fits:
                     level = 0
                     last_level = -1
-                    for i in range(ports):
-                        F[i] = body_force[i]
-                        before[i] = body_force[i]
+                    for i in range(width):
+                        S[FORCE + i] = S[LAST + i]
+                        S[BEFORE + i] = S[LAST + i]
                     for c in range(count_interfaces):
                         fi[c] = interface_force[c]
                     continue
@@ -766,7 +780,7 @@ def run_network(
                         power = (g[a] - g[b]) * mdot[k] * H
                         for j in range(q0, q1):
                             port = branch_ports[j]
-                            power -= branch_outputs[o0 + j - q0] * (used[port] - seen[port])
+                            power -= branch_outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
                         o0 += q1 - q0
                         for j in range(branch_states[k]):
                             branch_state[branch_state0[k] + j] = branch_outputs[o0 + j]
@@ -808,7 +822,7 @@ def run_network(
                         node_p[i] = p[i]
                         node_g[i] = g[i]
             for c in range(count_interfaces):
-                gap = interface_gap0[c] + y1[interface_upper[c]] - y1[interface_lower[c]]
+                gap = interface_gap0[c] + S[Y1 + interface_upper[c]] - S[Y1 + interface_lower[c]]
                 interface_rate[c] = (gap - interface_gap[c]) * inverse_H
                 interface_gap[c] = gap
                 was_closed = interface_since[c] < np.inf
@@ -820,16 +834,18 @@ def run_network(
                         continue
                     interface_contact_loss[c] += lost_contact[c]
                     interface_film_loss[c] += lost_film[c]
+                    interface_film_before[c] = 0.0
                     if f_contact[c] > 0.0:
                         if not was_closed:
                             interface_since[c] = t
+                            interface_film_before[c] = f_film[c]
                     else:
                         interface_since[c] = np.inf
                     column = element_forces + count_branches + 2 * c
                     sums[column] += H * f_contact[c]
                     sums[column + 1] += H * f_film[c]
                     peaks[c] = max(peaks[c], fi[c])
-                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_SMALL
+                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_FELT
                     if level == 0 and (felt or was_closed):
                         place = record_filled[c]
                         if place < record_fine.shape[1]:
@@ -841,12 +857,12 @@ def run_network(
                         record_filled[c] = place + 1
                 if gap > _SEPARATED:
                     interface_chi[c] = 0.0
-            for i in range(ports):
-                body_work[i] += F[i] * (y1[i] - y0[i])
-                y0[i] = y1[i]
-                seen[i] = used[i]
-                pending[i] = F[i]
-                body_force[i] = F[i]
+            for i in range(width):
+                S[WORK + i] += S[FORCE + i] * (S[Y1 + i] - S[Y0 + i])
+                S[Y0 + i] = S[Y1 + i]
+                S[SEEN + i] = S[USED + i]
+                S[PENDING + i] = S[FORCE + i]
+                S[LAST + i] = S[FORCE + i]
             last_level = level
             done += m
             step += m
@@ -861,12 +877,12 @@ def run_network(
             apply_forces(
                 block,
                 body_modes[k],
-                pending,
+                shift(S, PENDING),
                 body_port0[k],
                 body_port1[k],
             )
-        for i in range(ports):
-            pending[i] = 0.0
+        for i in range(width):
+            S[PENDING + i] = 0.0
         if settle:
             _stop(body_coarse, body_start, body_modes)
             continue
@@ -887,7 +903,7 @@ def run_network(
                 body_fine,
                 body_start,
                 body_modes,
-                at_ports[0],
+                bodies.at,
                 nodes.p,
                 elements.state,
                 branches.state,
@@ -896,8 +912,6 @@ def run_network(
             record += 1
             in_record = 0
             record_time = 0.0
-    for i in range(ports):
-        body_before[i], body_y[i], body_seen[i] = before[i], y0[i], seen[i]
     clock[0], clock[1] = step, last_level
     clock[2] += fine_steps
     clock[3] += coarse_steps
@@ -959,7 +973,7 @@ def record_points(
 ) -> None:
     """Columns: port displacements, port velocities, centres of mass, pressures, states, gaps."""
     out, place = recording.points, 0
-    ports = y.size - 1
+    ports = recording.port_row.size
     for i in range(ports):
         out[record, place + i] = y[i]
     place += ports

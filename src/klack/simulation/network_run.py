@@ -23,12 +23,18 @@ from klack.simulation.network_compile import (
     modal_state,
 )
 from klack.simulation.network_kernel import (
+    BEFORE,
+    LAST,
+    PORTS,
+    SEEN,
     STATUS_BRANCH,
     STATUS_DONE,
     STATUS_ELEMENT,
     STATUS_PRESSURES,
     STORE,
     SUPPLY,
+    WORK,
+    Y0,
     Recording,
     Scratch,
     read_stores,
@@ -49,6 +55,7 @@ __all__ = ["simulate_network"]
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
 
+_BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard, 50 ms; a call costs 0.7 ms
@@ -107,8 +114,12 @@ def simulate_network(
             hint="1 switches coarse steps off, 16 is usual.",
         )
     network = compile_network(rows, step=step, coarse=coarse)
-    per_record = max(1, round(record / (coarse * step)))
-    records = max(1, int(np.ceil(duration / (per_record * coarse * step) - 1e-9)))
+    block = coarse
+    if coarse == 1:  # no coarse steps: as many fine ones at a time as divide a record
+        of_record = max(1, round(record / step))
+        block = next(size for size in range(_BLOCK, 0, -1) if of_record % size == 0)
+    per_record = max(1, round(record / (block * step)))
+    records = max(1, int(np.ceil(duration / (per_record * block * step) - 1e-9)))
     recorder = _Recorder(network, records)
     clock = np.array([0, -1, 0, 0], dtype=np.int64)
     if state is not None:
@@ -120,7 +131,7 @@ def simulate_network(
     _read_stores(network)
     before = _stores(network)
     recorder.take(0)
-    chunk = max(1, _CHUNK // (per_record * coarse))
+    chunk = max(1, _CHUNK // (per_record * block))
     begin = perf_counter()
     for first in range(0, records, chunk):
         count = min(chunk, records - first)
@@ -132,11 +143,12 @@ def simulate_network(
             per_record,
             first + 1,
             step,
-            coarse,
+            block,
+            coarse > 1,
         )
         progress((first + count) / records)
     wall_time = perf_counter() - begin
-    time = step * np.arange(records + 1, dtype=float) * (per_record * coarse) + first_step * step
+    time = step * np.arange(records + 1, dtype=float) * (per_record * block) + first_step * step
     channels = recorder.channels()
     interfaces = recorder.interfaces()
     return NetworkResult(
@@ -161,7 +173,8 @@ def _advance(
     per_record: int,
     record0: int,
     step: float,
-    coarse: int,
+    block: int,
+    allow_coarse: bool,
 ) -> None:
     report = np.zeros(3)
     status = run_network(
@@ -169,9 +182,9 @@ def _advance(
         per_record,
         record0,
         clock,
-        coarse,
+        block,
         step,
-        coarse > 1,
+        allow_coarse,
         False,
         network.bodies,
         network.elements,
@@ -193,7 +206,6 @@ def _advance(
 
 def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
     return scratch_memory(
-        ports=len(network.ports),
         interfaces=len(network.rows.interfaces),
         nodes=len(network.nodes.p),
         branches=len(network.rows.branches),
@@ -237,15 +249,13 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
     for k in range(len(real.modes)):
         begin = real.start[k]
         real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
-    for name in ("force", "before", "y"):
-        getattr(real, name)[:] = getattr(bodies, name)
-    real.before[:] = real.force
-    real.seen[:] = real.y
+    for row, source in ((Y0, Y0), (SEEN, Y0), (LAST, LAST), (BEFORE, LAST)):
+        real.at[row : row + PORTS] = bodies.at[source : source + PORTS]
     nodes = network.nodes
     for w in range(len(nodes.wall_node)):
         i = nodes.wall_node[w]
         if i < nodes.volumes:
-            nodes.held[i] += nodes.wall_area[w] * real.y[nodes.wall_port[w]]
+            nodes.held[i] += nodes.wall_area[w] * real.at[Y0 + nodes.wall_port[w]]
     nodes.mass[:] *= nodes.held / nodes.volume
     interfaces.rate[:] = 0.0
     interfaces.since[interfaces.gap + interfaces.e < 0.0] = -1.0
@@ -370,7 +380,7 @@ class _Recorder:
             network.bodies.fine,
             network.bodies.start,
             network.bodies.modes,
-            network.bodies.y,
+            network.bodies.at,
             network.nodes.p,
             network.elements.state,
             network.branches.state,
@@ -421,7 +431,7 @@ def _read_stores(network: CompiledNetwork) -> None:
         failed = read_stores(
             rows,
             head,
-            network.bodies.y,
+            network.bodies.at,
             nodes.p,
             rho,
             network.books,
@@ -434,7 +444,8 @@ def _read_stores(network: CompiledNetwork) -> None:
 
 def _reset_books(network: CompiledNetwork) -> None:
     nodes, interfaces = network.nodes, network.interfaces
-    accounts = (network.books, network.line_books, network.bodies.work, nodes.numeric)
+    work = network.bodies.at[WORK : WORK + PORTS]
+    accounts = (network.books, network.line_books, work, nodes.numeric)
     for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
         account[:] = 0.0
 
@@ -492,7 +503,7 @@ def _energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
             losses[f"{line.component} {what}"] = float(network.line_books[k, j])
     place = 0
     for row in rows.bodies:
-        work = float(network.bodies.work[place : place + len(row.ports)].sum())
+        work = float(network.bodies.at[WORK + place : WORK + place + len(row.ports)].sum())
         place += len(row.ports)
         if np.any(row.body.damping > 0.0):
             name = f"{row.component} kinetic and strain"
@@ -503,12 +514,12 @@ def _energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
 
 
 _SAVED = {
-    "bodies": ("fine", "force", "before", "y", "seen"),
+    "bodies": ("fine", "at"),
     "elements": ("state",),
     "branches": ("state",),
     "nodes": ("mass", "held", "p", "before", "g", "hint"),
     "line_state": ("samples", "head", "memory", "cavity"),
-    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "since"),
+    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "since", "film_before"),
 }
 
 
@@ -517,6 +528,7 @@ def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, NDArr
     for owner, names in _SAVED.items():
         for name in names:
             saved[f"{owner}.{name}"] = getattr(getattr(network, owner), name).copy()
+    saved["bodies.at"][WORK : WORK + PORTS] = 0.0  # counts from the start of each run
     return saved
 
 

@@ -170,6 +170,7 @@ def _run(
     G = np.sum(c * c * A[4])
     g, e, force, chi, hint = gaps[0], 0.0, 0.0, 0.0, 0
     start = g
+    closed, film_before = False, 0.0
     for n in range(gaps.size - 1):
         free_q = A[0] * q + A[1] * v + A[4] * push
         v[:] = A[2] * q + A[3] * v + A[5] * push
@@ -194,7 +195,10 @@ def _run(
             e,
             force,
             hint,
+            film_before,
         )
+        film_before = film if contact > 0.0 and not closed else 0.0
+        closed = contact > 0.0
         force = contact + film
         q += A[4] * c * force
         v += A[5] * c * force
