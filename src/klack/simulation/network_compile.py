@@ -23,7 +23,7 @@ from klack.simulation.modal_step import (
     ROW_Q,
     ROW_V,
 )
-from klack.simulation.network_kernel import (
+from klack.simulation.network_arrays import (
     LOSS,
     PORTS,
     ROWS_AT,

@@ -1,7 +1,6 @@
 """Run a network: static start, time loop, channels, impacts, energy books."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Literal
 
@@ -10,44 +9,36 @@ from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
-from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.impact_events import impact_events
-from klack.simulation.interface_step import interface_store
-from klack.simulation.modal_step import FIXED_ROWS, ROW
-from klack.simulation.network_compile import (
-    CompiledNetwork,
-    body_energy,
-    compile_bodies,
-    compile_network,
-    interface_compliance,
-    modal_state,
-)
-from klack.simulation.network_kernel import (
+from klack.simulation.modal_step import ROW
+from klack.simulation.network_arrays import (
     BEFORE,
     LAST,
     PORTS,
     SEEN,
-    STATUS_BRANCH,
-    STATUS_DONE,
-    STATUS_ELEMENT,
-    STATUS_PRESSURES,
-    STORE,
-    SUPPLY,
     WORK,
     Y0,
     Recording,
     Scratch,
-    read_stores,
-    record_points,
-    run_network,
     scratch_memory,
 )
-from klack.simulation.network_result import (
-    ChannelData,
-    EnergyBooks,
-    InterfaceRecord,
-    NetworkResult,
+from klack.simulation.network_compile import (
+    CompiledNetwork,
+    compile_bodies,
+    compile_network,
+    interface_compliance,
 )
+from klack.simulation.network_kernel import (
+    STATUS_BRANCH,
+    STATUS_DONE,
+    STATUS_ELEMENT,
+    STATUS_PRESSURES,
+    read_stores,
+    run_network,
+)
+from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
+from klack.simulation.network_recorder import Recorder
+from klack.simulation.network_result import NetworkResult
 from klack.units import format_si
 
 __all__ = ["simulate_network"]
@@ -59,8 +50,6 @@ _BLOCK = 16  # most fine steps between two looks at the record, without coarse s
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard, 50 ms; a call costs 0.7 ms
-_MOST_FINE = 1_000_000  # recorded fine steps per interface
-_MOST_VALUES = 400_000_000
 
 
 def simulate_network(
@@ -120,16 +109,16 @@ def simulate_network(
         block = next(size for size in range(_BLOCK, 0, -1) if of_record % size == 0)
     per_record = max(1, round(record / (block * step)))
     records = max(1, int(np.ceil(duration / (per_record * block * step) - 1e-9)))
-    recorder = _Recorder(network, records)
+    recorder = Recorder(network, records)
     clock = np.array([0, -1, 0, 0], dtype=np.int64)
     if state is not None:
         _restore(network, clock, state)
     elif start == "rest":
         _settle(network, recorder.recording)
     first_step, done_before = int(clock[0]), clock[2:4].copy()
-    _reset_books(network)
+    reset_books(network)
     _read_stores(network)
-    before = _stores(network)
+    before = energy_stores(network)
     recorder.take(0)
     chunk = max(1, _CHUNK // (per_record * block))
     begin = perf_counter()
@@ -156,7 +145,7 @@ def simulate_network(
         channels=channels,
         interfaces=interfaces,
         events=impact_events(rows, time, channels, interfaces),
-        books=_energy_books(network, before),
+        books=energy_books(network, before),
         step=step,
         fine_steps=int(clock[2] - done_before[0]),
         coarse_steps=int(clock[3] - done_before[1]),
@@ -298,132 +287,6 @@ def _numbers(values: Vector) -> str:
     return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
 
 
-@dataclass(frozen=True, slots=True)
-class _Column:
-    name: str
-    unit: str
-
-
-class _Recorder:
-    """Memory for the records, and the words for its columns."""
-
-    def __init__(self, network: CompiledNetwork, records: int) -> None:
-        self.network = network
-        rows, elements = network.rows, network.elements
-        states = [
-            (elements.state0[k] + channel.index, _column(row, channel.label), channel.unit)
-            for k, row in enumerate(rows.elements)
-            for channel in row.channels
-        ]
-        branch_states = [
-            (network.branches.state0[k] + channel.index, _column(row, channel.label), channel.unit)
-            for k, row in enumerate(rows.branches)
-            for channel in row.channels
-        ]
-        free = [b for b, row in enumerate(rows.bodies) if row.body.rigid_count > 0]
-        blocks = network.body_blocks
-        owner = [b for b, row in enumerate(rows.bodies) for _ in row.ports]
-        place = [i for row in rows.bodies for i in range(len(row.ports))]
-        self.means = [
-            *(
-                _Column(_column(row, "force", port), "N")
-                for row in rows.elements
-                for port in row.names
-            ),
-            *(_Column(_column(row, "flow"), "kg/s") for row in rows.branches),
-            *(
-                _Column(f"{row.component} {kind} force", "N")
-                for row in rows.interfaces
-                for kind in ("contact", "film")
-            ),
-        ]
-        ports = [f"{name.component}.{name.port}" for name in network.ports]
-        nodes = [rows.nodes[handle].component for handle in network.node_order]
-        self.points = [
-            *(_Column(f"{port} displacement", "m") for port in ports),
-            *(_Column(f"{port} velocity", "m/s") for port in ports),
-            *(_Column(f"{rows.bodies[b].component} velocity", "m/s") for b in free),
-            *(_Column(f"{node} pressure", "Pa") for node in nodes),
-            *(_Column(name, unit) for _, name, unit in states + branch_states),
-            *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
-        ]
-        values = (records + 1) * (len(self.means) + len(self.points))
-        if values > _MOST_VALUES:
-            raise InputError(
-                "record",
-                got=f"{records} records of {len(self.means) + len(self.points)} channels",
-                expected=f"{_MOST_VALUES} values or fewer",
-                hint="take a longer record, or a shorter duration.",
-            )
-        count = len(rows.interfaces)
-        self.recording = Recording(
-            means=np.zeros((records + 1, len(self.means))),
-            peaks=np.zeros((records + 1, count)),
-            points=np.zeros((records + 1, len(self.points))),
-            states=np.array([index for index, _, _ in states], dtype=np.int64),
-            branch_states=np.array([index for index, _, _ in branch_states], dtype=np.int64),
-            cm_block0=blocks[free].astype(np.int64),
-            cm_block1=blocks[[b + 1 for b in free]].astype(np.int64),
-            port_block0=blocks[owner].astype(np.int64),
-            port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
-            port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
-            fine=np.empty((count, _MOST_FINE, 5)),
-            filled=np.zeros(count, np.int64),
-        )
-
-    def take(self, record: int) -> None:
-        """Record the present state."""
-        network = self.network
-        record_points(
-            self.recording,
-            record,
-            network.bodies.fine,
-            network.bodies.start,
-            network.bodies.modes,
-            network.bodies.at,
-            network.nodes.p,
-            network.elements.state,
-            network.branches.state,
-            network.interfaces.gap,
-        )
-
-    def channels(self) -> dict[str, ChannelData]:
-        """All channels by name."""
-        recording = self.recording
-        recording.means[0] = recording.means[1]
-        recording.peaks[0] = recording.peaks[1]
-        result = {}
-        for columns, values in ((self.means, recording.means), (self.points, recording.points)):
-            for i, column in enumerate(columns):
-                result[column.name] = ChannelData(unit=column.unit, values=values[:, i].copy())
-        for c, row in enumerate(self.network.rows.interfaces):
-            peak = ChannelData(unit="N", values=recording.peaks[:, c].copy())
-            result[f"{row.component} peak force"] = peak
-        return result
-
-    def interfaces(self) -> dict[str, InterfaceRecord]:
-        """Every fine step in which an interface carried force."""
-        result = {}
-        for c, row in enumerate(self.network.rows.interfaces):
-            filled = int(self.recording.filled[c])
-            part = self.recording.fine[c, : min(filled, _MOST_FINE)]
-            columns = [part[:, i].copy() for i in range(5)]
-            result[row.component] = InterfaceRecord(
-                time=columns[0],
-                step=columns[1],
-                contact_force=columns[2],
-                film_force=columns[3],
-                gap=columns[4],
-                complete=filled <= _MOST_FINE,
-            )
-        return result
-
-
-def _column(row: ElementRow | BranchRow, what: str, port: str = "") -> str:
-    owner = f"{row.component}.{port}" if port else row.component
-    return " ".join(filter(None, (owner, row.label, what)))
-
-
 def _read_stores(network: CompiledNetwork) -> None:
     nodes = network.nodes
     rho = np.full(len(nodes.p), nodes.density)
@@ -440,77 +303,6 @@ def _read_stores(network: CompiledNetwork) -> None:
         if failed >= 0:
             status = STATUS_BRANCH if head else STATUS_ELEMENT
             raise _failure(network, status, np.array([float(failed), 0.0, 0.0]))
-
-
-def _reset_books(network: CompiledNetwork) -> None:
-    nodes, interfaces = network.nodes, network.interfaces
-    work = network.bodies.at[WORK : WORK + PORTS]
-    accounts = (network.books, network.line_books, work, nodes.numeric)
-    for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
-        account[:] = 0.0
-
-
-def _stores(network: CompiledNetwork) -> dict[str, float]:
-    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
-    stores = {}
-    for b, row in enumerate(rows.bodies):
-        kinetic, strain = body_energy(row.body, *modal_state(network, b))
-        stores[f"{row.component} kinetic and strain"] = kinetic + strain
-    for i, kind in enumerate(network.book_kind):
-        if kind == STORE:
-            stores[network.book_names[i]] = float(network.books[i])
-    for c, contact in enumerate(rows.interfaces):
-        stores[f"{contact.component} contact"] = float(
-            interface_store(
-                int(interfaces.kind[c]),
-                interfaces.law,
-                int(interfaces.law0[c]),
-                float(interfaces.series[c]),
-                float(interfaces.gap[c]),
-                float(interfaces.e[c]),
-            )
-        )
-    for i in range(nodes.volumes):
-        excess = nodes.p[i] - nodes.ambient
-        name = rows.nodes[network.node_order[i]].component
-        stores[f"{name} compression"] = float(nodes.mass[i] * nodes.g[i] - excess * nodes.held[i])
-    for k, line in enumerate(rows.lines):
-        stores[f"{line.component} waves"] = float(line_store(network.lines, network.line_state, k))
-    return stores
-
-
-def _energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
-    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
-    after = _stores(network)
-    supplies: dict[str, float] = {}
-    losses: dict[str, float] = {}
-    for i, kind in enumerate(network.book_kind):
-        if kind != STORE:
-            (supplies if kind == SUPPLY else losses)[network.book_names[i]] = float(
-                network.books[i]
-            )
-    for i, energy in enumerate(nodes.supply):
-        name = rows.nodes[network.node_order[nodes.volumes + i]].component
-        supplies[f"{name} pressure"] = supplies.get(f"{name} pressure", 0.0) + float(energy)
-    for i in range(nodes.volumes):
-        name = rows.nodes[network.node_order[i]].component
-        losses[f"{name} implicit step"] = float(nodes.numeric[i])
-    for c, contact in enumerate(rows.interfaces):
-        losses[f"{contact.component} contact"] = float(interfaces.contact_loss[c])
-        losses[f"{contact.component} film"] = float(interfaces.film_loss[c])
-    for k, line in enumerate(rows.lines):
-        for j, what in enumerate(LINE_LOSSES):
-            losses[f"{line.component} {what}"] = float(network.line_books[k, j])
-    place = 0
-    for row in rows.bodies:
-        work = float(network.bodies.at[WORK + place : WORK + place + len(row.ports)].sum())
-        place += len(row.ports)
-        if np.any(row.body.damping > 0.0):
-            name = f"{row.component} kinetic and strain"
-            losses[f"{row.component} damping"] = work - (after[name] - before[name])
-    return EnergyBooks(
-        supplies=supplies, losses=losses, stores_before=dict(before), stores_after=after
-    )
 
 
 _SAVED = {

@@ -1,0 +1,90 @@
+"""Energy books of a run: what is held at a moment, what came in and was lost between two."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from klack.simulation.delay_line import LINE_LOSSES, line_store
+from klack.simulation.interface_step import interface_store
+from klack.simulation.network_arrays import PORTS, STORE, SUPPLY, WORK
+from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
+from klack.simulation.network_result import EnergyBooks
+
+__all__ = ["energy_books", "energy_stores", "reset_books"]
+
+
+def reset_books(network: CompiledNetwork) -> None:
+    """Begin new books: all supplies, losses and works are zero."""
+    nodes, interfaces = network.nodes, network.interfaces
+    work = network.bodies.at[WORK : WORK + PORTS]
+    accounts = (network.books, network.line_books, work, nodes.numeric)
+    for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
+        account[:] = 0.0
+
+
+def energy_stores(network: CompiledNetwork) -> dict[str, float]:
+    """Energy [J] that each part holds now, by name."""
+    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    stores = {}
+    for b, row in enumerate(rows.bodies):
+        kinetic, strain = body_energy(row.body, *modal_state(network, b))
+        stores[f"{row.component} kinetic and strain"] = kinetic + strain
+    for i, kind in enumerate(network.book_kind):
+        if kind == STORE:
+            stores[network.book_names[i]] = float(network.books[i])
+    for c, contact in enumerate(rows.interfaces):
+        stores[f"{contact.component} contact"] = float(
+            interface_store(
+                int(interfaces.kind[c]),
+                interfaces.law,
+                int(interfaces.law0[c]),
+                float(interfaces.series[c]),
+                float(interfaces.gap[c]),
+                float(interfaces.e[c]),
+            )
+        )
+    for i in range(nodes.volumes):
+        excess = nodes.p[i] - nodes.ambient
+        name = rows.nodes[network.node_order[i]].component
+        stores[f"{name} compression"] = float(nodes.mass[i] * nodes.g[i] - excess * nodes.held[i])
+    for k, line in enumerate(rows.lines):
+        stores[f"{line.component} waves"] = float(line_store(network.lines, network.line_state, k))
+    return stores
+
+
+def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
+    """Books from the moment of ``before`` until now.
+
+    The damping of modes is what is missing in the balance of its body.
+    """
+    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    after = energy_stores(network)
+    supplies: dict[str, float] = {}
+    losses: dict[str, float] = {}
+    for i, kind in enumerate(network.book_kind):
+        if kind != STORE:
+            (supplies if kind == SUPPLY else losses)[network.book_names[i]] = float(
+                network.books[i]
+            )
+    for i, energy in enumerate(nodes.supply):
+        name = rows.nodes[network.node_order[nodes.volumes + i]].component
+        supplies[f"{name} pressure"] = supplies.get(f"{name} pressure", 0.0) + float(energy)
+    for i in range(nodes.volumes):
+        name = rows.nodes[network.node_order[i]].component
+        losses[f"{name} implicit step"] = float(nodes.numeric[i])
+    for c, contact in enumerate(rows.interfaces):
+        losses[f"{contact.component} contact"] = float(interfaces.contact_loss[c])
+        losses[f"{contact.component} film"] = float(interfaces.film_loss[c])
+    for k, line in enumerate(rows.lines):
+        for j, what in enumerate(LINE_LOSSES):
+            losses[f"{line.component} {what}"] = float(network.line_books[k, j])
+    place = 0
+    for row in rows.bodies:
+        work = float(network.bodies.at[WORK + place : WORK + place + len(row.ports)].sum())
+        place += len(row.ports)
+        if np.any(row.body.damping > 0.0):
+            name = f"{row.component} kinetic and strain"
+            losses[f"{row.component} damping"] = work - (after[name] - before[name])
+    return EnergyBooks(
+        supplies=supplies, losses=losses, stores_before=dict(before), stores_after=after
+    )
