@@ -26,7 +26,7 @@ In a time loop: :func:`compile_lines` and :func:`start_lines` once; then per ste
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -34,6 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.network.rows import LineRow
+from klack.network.step_function import first, shift
 from klack.units import format_si
 
 __all__ = [
@@ -258,8 +259,8 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
                 state.samples[window] = level + slope * places[wave] + sign * Z * Q
             before += delays[k]
         K = lines.first_term[line + 1] - lines.first_term[line]
-        first = lines.first_memory[line]
-        memory = state.memory[first : first + K * (len(segments) + 1)].reshape(len(segments) + 1, K)
+        begin = lines.first_memory[line]
+        memory = state.memory[begin : begin + K * (len(segments) + 1)].reshape(len(segments) + 1, K)
         memory[:] = Q
         memory[-1:] = -Q
 
@@ -291,23 +292,21 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _memory(memory: Vector, first: int, z: Vector, k0: int, k1: int) -> float:
-    """Part of the pressure drop of a lump that its memory takes back [Pa]."""
+def _memory(memory: Any, z: Any, count: int) -> float:
+    """Part of the pressure drop of a lump that its memory takes back [Pa]; pointers."""
     drop = 0.0
-    for k in range(k0, k1):
-        drop += z[k] * memory[first + k - k0]
+    for k in range(count):
+        drop += z[k] * memory[k]
     return drop
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _rub(
-    memory: Vector, first: int, decay: Vector, heat: Vector, k0: int, k1: int, q: float
-) -> float:
-    """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]."""
+def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
+    """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]; pointers."""
     total = 0.0
-    for k in range(k0, k1):
-        d = q - memory[first + k - k0]
-        memory[first + k - k0] = q - decay[k] * d
+    for k in range(count):
+        d = q - memory[k]
+        memory[k] = q - decay[k] * d
         total += heat[k] * d * d
     return total
 
@@ -343,17 +342,17 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
                 else:
                     # sums about one of the samples; not a function of its own, since numba then
                     # counts references to every array in each call, ten times the work itself
-                    first = state.samples[oldest + 1]
+                    base = state.samples[oldest + 1]
                     total, spread, jumps = 0.0, 0.0, 0.0
                     for i in range(oldest, oldest + m):
                         x = state.samples[i + 1]
                         jump = state.samples[i] - x
-                        y = x - first + f * jump
+                        y = x - base + f * jump
                         total += y
                         spread += y * y
                         jumps += jump * jump
                     mean = total / m
-                    state.incoming[s, wave] = first + mean
+                    state.incoming[s, wave] = base + mean
                     lost += f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
         impedance = lines.impedance[line]
         state.scatter[line] = lines.step / (4.0 * impedance) * lost
@@ -361,10 +360,14 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
         a, b = 2 * line, 2 * line + 1
         c[a], c[b] = state.incoming[s0, 1], state.incoming[s1 - 1, 0]
         Z[a] = Z[b] = impedance + 0.5 * lines.lump[level, line]
-        if k1 > k0:
-            first = lines.first_memory[line]
-            c[a] -= 0.5 * _memory(state.memory, first, z, k0, k1)
-            c[b] -= 0.5 * _memory(state.memory, first + (s1 - s0) * (k1 - k0), z, k0, k1)
+        terms = k1 - k0
+        if terms > 0:
+            own_z, memory = (
+                shift(first(z), k0),
+                shift(first(state.memory), lines.first_memory[line]),
+            )
+            c[a] -= 0.5 * _memory(memory, own_z, terms)
+            c[b] -= 0.5 * _memory(shift(memory, (s1 - s0) * terms), own_z, terms)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
@@ -387,14 +390,17 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
-        terms, at = k1 - k0, lines.first_memory[line]
+        terms = k1 - k0
+        memory = shift(first(state.memory), lines.first_memory[line])
+        own_z, own_decay = shift(first(z), k0), shift(first(decay), k0)
+        own_heat = shift(first(heating), k0)
         Z, R = lines.impedance[line], lines.resistance[line]
         q_a, q_b = q[2 * line], q[2 * line + 1]
         heat = 0.5 * duration * R * (q_a * q_a + q_b * q_b)
         if terms > 0:
-            heat += 0.5 * _rub(state.memory, at, decay, heating, k0, k1, q_a)
-            last = at + terms * (s1 - s0)
-            heat += 0.5 * _rub(state.memory, last, decay, heating, k0, k1, q_b)
+            last = shift(memory, terms * (s1 - s0))
+            heat += 0.5 * _rub(memory, own_decay, own_heat, terms, q_a)
+            heat += 0.5 * _rub(last, own_decay, own_heat, terms, q_b)
         out = state.incoming[s0, 1] + 2.0 * Z * q_a
         collapse = 0.0
         for s in range(s0, s1):
@@ -407,11 +413,11 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
             else:
                 # a lump with a cavity in its middle: Q + dQ flows in from the left, Q - dQ out
                 left, right = state.incoming[s, 0], state.incoming[s + 1, 1]
-                at += terms
-                Q = left - right + _memory(state.memory, at, z, k0, k1)
+                memory = shift(memory, terms)
+                Q = left - right + _memory(memory, own_z, terms)
                 Q /= 2.0 * Z + lines.lump[level, line]
                 if terms > 0:
-                    heat += _rub(state.memory, at, decay, heating, k0, k1, Q)
+                    heat += _rub(memory, own_decay, own_heat, terms, Q)
                 heat += duration * R * Q * Q
                 free = 0.5 * (left + right)
                 V0, dQ = state.cavity[s], 0.0
