@@ -83,7 +83,8 @@ def _falls() -> list[Check]:
     pulled = _alone(ConstantForce(force=40.0), speed=0.0, duration=1e-3)
     work = 0.5 * 40.0**2 / MASS * pulled.time[-1] ** 2
     return [
-        _check("thrown mass, height after 10 ms [m]", drop, float(_place(fall)[-1]), 1e-12, NEWTON),
+        # 30 000 to 500 000 additions, each to round-off
+        _check("thrown mass, height after 10 ms [m]", drop, float(_place(fall)[-1]), 1e-11, NEWTON),
         _check(
             "mass pulled by 40 N, booked work after 1 ms [J]",
             work,
