@@ -95,14 +95,20 @@ def _stop(W: Vector, start: Index, count: Index) -> None:
 
 @njit(cache=True)
 def _table(time: Vector, value: Vector, first: int, last: int, t: float) -> float:
+    """Lines through points, constant beyond them."""
     if t <= time[first]:
         return value[first]
-    for i in range(first + 1, last):
-        if t <= time[i]:
-            return value[i - 1] + (value[i] - value[i - 1]) * (t - time[i - 1]) / (
-                time[i] - time[i - 1]
-            )
-    return value[last - 1]
+    if t >= time[last - 1]:
+        return value[last - 1]
+    low, high = first, last - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    share = (t - time[low]) / (time[high] - time[low])
+    return value[low] + share * (value[high] - value[low])
 
 
 @njit(cache=True)
