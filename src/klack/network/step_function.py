@@ -20,8 +20,9 @@ mass flow ``mdot`` [kg/s] runs from a to b.
 
 Books [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
 outside during it; a *loss* what was turned into heat.  An element must satisfy, to round-off,
-``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch books only what it stores.  The solver books the rest of the hydraulic power: into the
-branch's supply, if it names one (a pump), else as its loss.
+``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch books only what it stores.
+The solver books the rest of the hydraulic power: into the branch's supply, if it names one (a
+pump), else as its loss.
 
 The solver calls a function several times in a step, with better and better ``y1`` and pressures,
 and takes over the next state of the last call.  Before the first step it calls once with ``h = 0``
