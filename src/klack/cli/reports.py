@@ -1,12 +1,18 @@
-"""Reports of finished studies, of either kind, beside their results."""
+"""Results of finished studies, of either kind, with their reports beside them."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+from klack.cli.output import staged_folder
 
 if TYPE_CHECKING:
     from klack.report.study_content import Study
+    from klack.workflow.progress import Progress
 
-__all__ = ["REPORTS", "remove_reports", "write_reports"]
+__all__ = ["REPORTS", "write_reports", "write_result"]
+
+_Study = TypeVar("_Study", bound="Study")
 
 REPORTS = ("report.html", "report.pdf")
 
@@ -21,7 +27,35 @@ def write_reports(study: "Study", folder: Path) -> None:
     write_pdf(study, print_)
 
 
-def remove_reports(folder: Path) -> None:
-    """Remove reports that do not belong to the result any more."""
+def write_result(
+    study: _Study,
+    folder: Path,
+    save: Callable[[_Study, Path], object],
+    *,
+    report: bool,
+    progress: "Progress",
+) -> Exception | None:
+    """Put a result, and its report if wanted, into a folder: all of it or nothing.
+
+    A mistake in a picture may not cost the calculation: it is returned, the result is kept, and no
+    report of an earlier result stays beside it.
+    """
+    failure: Exception | None = None
+    with staged_folder(folder) as stage:
+        progress("result", 0.0)
+        save(study, stage)
+        if report:
+            progress("report", 0.0)
+            try:
+                write_reports(study, stage)
+            except Exception as error:
+                failure = error
+        if failure or not report:
+            _remove_reports(stage)
+            _remove_reports(folder)
+    return failure
+
+
+def _remove_reports(folder: Path) -> None:
     for name in REPORTS:
         (folder / name).unlink(missing_ok=True)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
-from klack.cli.reports import REPORTS, remove_reports, write_reports
+from klack.cli.reports import REPORTS, write_result
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
@@ -81,19 +81,7 @@ def stroke(
         study = run_stroke(
             checked, variants=wanted, after=after, progress=progress, threads=threads
         )
-        failure: Exception | None = None
-        with staged_folder(folder) as stage:
-            progress("result", 0.0)
-            save_stroke(study, stage)
-            if report:
-                progress("report", 0.0)
-                try:
-                    write_reports(study, stage)
-                except Exception as error:  # a mistake in a picture may not cost the calculation
-                    failure = error
-            if failure or not report:
-                remove_reports(stage)
-                remove_reports(folder)  # they would show an earlier result
+        failure = write_result(study, folder, save_stroke, report=report, progress=progress)
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")

@@ -49,7 +49,7 @@ State = Mapping[str, NDArray[np.generic]]
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
-_CHUNK = 250_000  # fine steps between two looks at the keyboard, 50 ms; a call costs 0.7 ms
+_CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
 
 
 def simulate_network(
