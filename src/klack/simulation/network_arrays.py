@@ -161,7 +161,7 @@ class Scratch(NamedTuple):
 def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
     """Memory for a network of these sizes."""
     return Scratch(
-        interfaces=np.zeros((8, interfaces)),
+        interfaces=np.zeros((7, interfaces)),
         nodes=np.zeros((10, nodes)),
         branches=np.zeros((3, branches)),
         ends=np.zeros((3, ends)),

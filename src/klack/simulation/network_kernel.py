@@ -287,7 +287,7 @@ def run_network(
     count_interfaces = interfaces.upper.size
     volumes, count_nodes = node_volumes, nodes.p.size
     ends = nodes.end_node.size
-    f_contact, f_film, g1 = (
+    f_contact, f_film, fi = (
         first(at_interfaces[0]),
         first(at_interfaces[1]),
         first(at_interfaces[2]),
@@ -297,7 +297,7 @@ def run_network(
         first(at_interfaces[4]),
         first(at_interfaces[5]),
     )
-    fi, peaks = first(at_interfaces[6]), first(at_interfaces[7])
+    peaks = first(at_interfaces[6])
     rho, slope, g, p = (
         first(at_nodes[0]),
         first(at_nodes[1]),
@@ -553,7 +553,7 @@ def run_network(
                         (
                             f_contact[c],
                             f_film[c],
-                            g1[c],
+                            _,
                             e1[c],
                             interface_hint[c],
                             lost_contact[c],
