@@ -3,7 +3,10 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.units import format_si
 
 if TYPE_CHECKING:
     from klack.case.bodies import CaseFile, SurfaceName
@@ -23,6 +26,9 @@ def check_consistency(case: "Case") -> None:
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_local_law(case)
+    _check_solid_only(case)
+    _check_guide(case)
+    _check_shots(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
             ("run", "levels"),
@@ -150,4 +156,82 @@ def _check_local_law(case: "Case") -> None:
             expected="a local law of the kind linear, hertz or submodel",
             hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or take the correction "
             "'consistent'.",
+        )
+
+
+def _check_solid_only(case: "Case") -> None:
+    """Refuse what breaks the symmetry of axisymmetric bodies."""
+    if case.dimension == 3:
+        return
+    asked: list[tuple[Key, str]] = []
+    if not case.motion.placement.is_centred:
+        asked.append((("motion", "placement"), "a placement off the axis"))
+    if case.guide is not None:
+        asked.append((("guide",), "a guide"))
+    if case.shots is not None:
+        asked.append((("shots",), "shots, which differ in their placement,"))
+    for key, what in asked:
+        raise CaseProblem(
+            key,
+            got=f"{what} of axisymmetric bodies",
+            expected="three-dimensional bodies",
+            hint="take 'model: swept' with 'layers: 18' for both of them.",
+            on_key=True,
+        )
+
+
+def _check_guide(case: "Case") -> None:
+    guide = case.guide
+    profile = case.moving_body.geometry.profile
+    if guide is None or profile is None:
+        return  # the names of other geometries are inside their files
+    known = profile.surfaces
+    require_known(
+        ("guide", "surface"), guide.surface, known, f"surface of {case.contact.moving.body}"
+    )
+    curves = [c for p in profile.profiles().values() for c in p.curves if c.name == guide.surface]
+    ends = [z for curve in curves for z in curve.at(np.linspace(0.0, 1.0, 65))[:, 1]]
+    low, high = min(ends), max(ends)
+    for i, height in enumerate(guide.heights):
+        if not low <= height <= high:
+            raise CaseProblem(
+                ("guide", "heights", i),
+                got=f"a height of {format_si(height, 'm')}",
+                expected=f"one on '{guide.surface}': {format_si(low, 'm')} to "
+                f"{format_si(high, 'm')}",
+                hint="heights are z in the drawing of the moving body.",
+            )
+
+
+def _check_shots(case: "Case") -> None:
+    shots = case.shots
+    if shots is None:
+        return
+    if case.guide is None and shots.friction is not None:
+        raise CaseProblem(
+            ("shots", "friction"),
+            got="friction without a guide",
+            expected="a section 'guide': that is where the moving body rubs",
+            hint="add 'guide', or remove 'friction'.",
+            on_key=True,
+        )
+    if case.guide is not None and (shots.eccentricity is None) != (shots.tilt is None):
+        given, other = ("tilt", "eccentricity")
+        if shots.tilt is None:
+            given, other = other, given
+        raise CaseProblem(
+            ("shots", given),
+            got=f"{given} without {other}, and a guide",
+            expected="both of them, or none: the guide then says how far the body may go",
+            hint=f"add '{other}' (0 is possible), or remove '{given}'.",
+            on_key=True,
+        )
+    drawn = ("eccentricity", "tilt", "force", "waviness")
+    if case.guide is None and all(getattr(shots, name) is None for name in drawn):
+        raise CaseProblem(
+            ("shots",),
+            got="shots that are all the same",
+            expected=f"a section 'guide', or at least one of: {one_of(drawn)}",
+            hint="'guide' lets the moving body stand wherever its clearance allows.",
+            on_key=True,
         )

@@ -21,6 +21,9 @@ from klack.case.bodies import (
     SurfaceName,
 )
 from klack.case.consistency import check_consistency
+from klack.case.guide import CaseGuide
+from klack.case.placement import Placement
+from klack.case.shots import Shots
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Count, Name, Section
@@ -32,6 +35,7 @@ __all__ = [
     "Case",
     "CaseBody",
     "CaseContact",
+    "CaseGuide",
     "CaseMaterial",
     "ConsistentLocalLaw",
     "HertzLocalLaw",
@@ -41,9 +45,11 @@ __all__ = [
     "Lumped",
     "ModeChoice",
     "Motion",
+    "Placement",
     "RayleighCoefficients",
     "Reduction",
     "Run",
+    "Shots",
     "Spring",
     "SubmodelLocalLaw",
     "SurfaceName",
@@ -51,7 +57,13 @@ __all__ = [
 ]
 
 Level = Literal[
-    "lumped", "reduced", "reduced-attachment", "reduced-none", "reduced-participation", "full"
+    "lumped",
+    "reduced",
+    "reduced-attachment",
+    "reduced-none",
+    "reduced-participation",
+    "interface",
+    "full",
 ]
 LEVELS: tuple[Level, ...] = (
     "lumped",
@@ -59,9 +71,11 @@ LEVELS: tuple[Level, ...] = (
     "reduced-attachment",
     "reduced-none",
     "reduced-participation",
+    "interface",
     "full",
 )
-_MOST_STEPS = {"reduced_step": 20_000_000, "full_step": 200_000}
+_MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
+_STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
 
 class ConsistentLocalLaw(Section):
@@ -152,6 +166,14 @@ class Motion(Section):
         default=0.0, description="Constant force on the moving body, positive in -z (closing)."
     )
     spring: Spring | None = Field(default=None, description="Closing spring.")
+    placement: Placement = Field(
+        default=Placement(), description="Off the axis or leaning; centred and upright without."
+    )
+
+    @property
+    def closing_force(self) -> float:
+        """Force that presses the bodies together at first touch [N]."""
+        return self.force + (self.spring.preload if self.spring else 0.0)
 
 
 class TransferSweep(Section):
@@ -180,6 +202,9 @@ class Run(Section):
 
     duration: Time = Field(gt=0, description="Time to compute, from the start of the motion.")
     reduced_step: Time = Field(default=20e-9, gt=0, description="Time step of the reduced levels.")
+    interface_step: Time = Field(
+        default=40e-9, gt=0, description="Time step of the interface level."
+    )
     full_step: Time = Field(default=50e-9, gt=0, description="Time step of the full order.")
     levels: tuple[Level, ...] = Field(
         default=("reduced", "full"), min_length=1, description="Levels that klack impact runs."
@@ -192,7 +217,7 @@ class Run(Section):
     def _steps(self) -> Self:
         for name, most in _MOST_STEPS.items():
             step = getattr(self, name)
-            used = name != "full_step" or "full" in self.levels
+            used = _STEP_OF_LEVEL.get(name, self.levels[0]) in self.levels
             if used and not 4 * step <= self.duration <= most * step:
                 raise CaseProblem(
                     ("duration",),
@@ -222,11 +247,13 @@ class Case(CaseFile):
     bodies: Mapping[Name, CaseBody] = Field(description="name: body; exactly two.")
     contact: CaseContact = Field(description="Which surfaces meet.")
     motion: Motion = Field(description="How the moving body arrives.")
+    guide: CaseGuide | None = Field(default=None, description="Guide of the moving body.")
     reduction: Reduction = Field(
         default=Reduction(), description="Kept modes and their correction."
     )
     run: Run = Field(description="Levels, steps, duration.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
+    shots: Shots | None = Field(default=None, description="What klack shots draws.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -36,8 +36,8 @@ Levels = Annotated[
         name="--level",
         consume_multiple=True,
         negative="",
-        help="lumped, reduced, reduced-attachment, reduced-none, reduced-participation, full; "
-        "several (a,b,c) are compared. [default: as in the case]",
+        help="lumped, reduced, reduced-attachment, reduced-none, reduced-participation, "
+        "interface, full; several (a,b,c) are compared. [default: as in the case]",
     ),
 ]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES, ElementFamily
+from klack.mesh.rigid import Pose
 
 __all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface"]
 
@@ -135,3 +136,20 @@ class Mesh:
     def moved(self, shift: NDArray[np.float64]) -> Self:
         """Translate the mesh by ``shift``, shape (dimension,) [m]."""
         return replace(self, points=self.points + np.asarray(shift))
+
+    def placed(self, pose: Pose) -> Self:
+        """Turn and shift the mesh of a solid rigidly.
+
+        Raises
+        ------
+        InputError
+            For an axisymmetric body, which cannot leave its axis.
+        """
+        if self.dimension != 3:
+            raise InputError(
+                "mesh: rigid displacement",
+                got="an axisymmetric body",
+                expected="a solid",
+                hint="take 'model: swept' with 'layers: 18'; a shift along z is 'moved'.",
+            )
+        return replace(self, points=pose.of(self.points))

@@ -1,5 +1,6 @@
 """From a case to meshed, placed and supported elastic bodies."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,13 +10,14 @@ import numpy as np
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
-from klack.contact.mortar import touching_shift
+from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.mesh.abaqus import read_abaqus
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_revolved, mesh_step
 from klack.mesh.supports import sector_nodes, surface_nodes
@@ -24,6 +26,9 @@ from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_o
 from klack.workflow.progress import Progress
 
 __all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
+
+_SAME_HEIGHT = 1e-6  # [m] clearances that differ by less belong to one touch
+_SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of the contact
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,15 +41,20 @@ class BodyPair:
         The moving body and the one that it hits.
     upper_surface, lower_surface : Surface
         Where they meet.
-    shift : float [m]
-        Translation of the upper body along z from where it was drawn.
+    pose : Pose
+        Where the upper body stands, compared with its drawing.
     """
 
     upper: ElasticBody
     lower: ElasticBody
     upper_surface: Surface
     lower_surface: Surface
-    shift: float
+    pose: Pose
+
+    @property
+    def shift(self) -> float:
+        """Translation of the upper body along z from where it was drawn [m]."""
+        return float(self.pose.shift[2])
 
 
 def build_bodies(case: Case, progress: Progress) -> BodyPair:
@@ -63,8 +73,9 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
-    shift = _shift(case, upper, upper_surface, lower, lower_surface)
-    upper = upper.moved(np.array([0.0] * (upper.dimension - 1) + [shift]))
+    pose = _pose(case, upper, upper_surface, lower, lower_surface, touch)
+    upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)
+    _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose)
     progress("mesh", 1.0)
     progress("assemble", 0.0)
     bodies = []
@@ -76,7 +87,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         lower=bodies[1],
         upper_surface=upper_surface,
         lower_surface=lower_surface,
-        shift=shift,
+        pose=pose,
     )
 
 
@@ -180,6 +191,72 @@ def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surfac
             hint="give contact.gap (for example 0 um): the upper body is then moved there.",
         )
     return 0.0
+
+
+def _pose(
+    case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
+) -> Pose:
+    """Lean the upper body, shift it off the axis, and move it along z to the gap of the case."""
+    placement = case.motion.placement
+    about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
+    if not placement.is_centred:
+        about[2] = _touch_height(upper, surface, lower, other, touch)
+        aside = placement.eccentricity * _towards(placement.direction)
+        # z x d: the upper end leans towards d
+        lean = placement.tilt * np.cross([0.0, 0.0, 1.0], _towards(placement.tilt_direction))
+        upper = upper.placed(Pose(rotation=lean, about=about, shift=aside))
+    shift = _shift(case, upper, surface, lower, other)
+    return Pose(rotation=lean, about=about, shift=aside + np.array([0.0, 0.0, shift]))
+
+
+def _towards(angle: float) -> np.ndarray:
+    return np.array([np.cos(angle), np.sin(angle), 0.0])
+
+
+def _touch_height(
+    upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
+) -> float:
+    """Height z [m] in the drawing of the upper body where it touches first when centred."""
+    if touch is None or not touch.upper:
+        touch = first_touch_of_meshes(upper, surface, lower, other, tolerance=_SAME_HEIGHT)
+    return float(np.mean([place[-1] for place in touch.upper]))
+
+
+def _check_refinement(
+    case: Case,
+    upper: Mesh,
+    surface: Surface,
+    lower: Mesh,
+    other: Surface,
+    touch: Touch | None,
+    pose: Pose,
+) -> None:
+    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    if case.motion.placement.is_centred or touch is None or not touch.upper:
+        return
+    space = contact_space(upper, surface, lower, other)
+    facing = space.axial > 1e-6
+    at = space.points[facing][np.argmin(space.gap[facing] / space.axial[facing])]
+    sides = (
+        (case.contact.moving.body, case.moving_body, touch.upper, pose.drawn(at)),
+        (case.contact.stop.body, case.stop_body, touch.lower, at),
+    )
+    for name, body, places, point in sides:
+        if body.mesh is None or body.mesh.contact is None:
+            continue
+        extent = body.mesh.contact.extent
+        turned = body.geometry.profile is not None
+        first = _ring(tuple(point)) if turned else tuple(point)
+        rings = [_ring(place) if turned else place for place in places]
+        away = min(float(np.linalg.norm(np.subtract(first, ring))) for ring in rings)
+        if away > _SAFE_SHARE * extent:
+            warnings.warn(
+                f"'{name}' touches first {away * 1e6:.3g} um away from where its mesh is finest: "
+                f"the refinement reaches {extent * 1e6:.3g} um. Try: bodies.{name}.mesh.contact: "
+                f"{{extent: {2.0 * away / _SAFE_SHARE * 1e6:.2g} um}}, or a smaller placement.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
 
 
 def _fixed_nodes(body: CaseBody, mesh: Mesh) -> np.ndarray:

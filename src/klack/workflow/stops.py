@@ -20,6 +20,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
+from klack.mesh.rigid import Pose
 from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -152,7 +153,7 @@ def _touching(name: str, stop: CaseStop, bodies: Mapping[str, ElasticBody]) -> B
         lower=lower,
         upper_surface=surfaces[0],
         lower_surface=surfaces[1],
-        shift=shift,
+        pose=Pose.along_z(shift),
     )
 
 

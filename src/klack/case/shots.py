@@ -1,0 +1,89 @@
+"""What differs from one drop of the valve to the next, for ``klack shots``."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, Strict, model_validator
+
+from klack.case.distribution import (
+    AngleDistribution,
+    ForceDistribution,
+    LengthDistribution,
+    RatioDistribution,
+)
+from klack.input.problem import CaseProblem
+from klack.input.section import Count, Section
+from klack.units import Time, format_si
+
+__all__ = ["Shots", "Waviness"]
+
+_MOST_STEPS = 20_000_000
+_HIGHEST_HARMONIC = 40
+
+
+class Waviness(Section):
+    """Out-of-roundness of the ring that meets the seat in this shot.
+
+    The moving body turns between shots, so the same ring looks different each time: the harmonics
+    share the mean square evenly on average, with random amplitudes and phases.
+    """
+
+    rms: LengthDistribution = Field(
+        description="Root mean square of the deviation from roundness, round the ring."
+    )
+    harmonics: tuple[Count, Count] = Field(
+        default=(2, 8), description="Lowest and highest number of waves round the ring."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        low, high = self.harmonics
+        if not 2 <= low <= high <= _HIGHEST_HARMONIC:
+            raise CaseProblem(
+                ("harmonics",),
+                got=f"[{low}, {high}]",
+                expected=f"two rising whole numbers from 2 to {_HIGHEST_HARMONIC}",
+                hint="0 waves is another diameter, 1 wave an eccentricity; 2 is an oval.",
+            )
+        return self
+
+
+class Shots(Section):
+    """What ``klack shots`` draws: many drops of one valve, each a little different."""
+
+    count: Annotated[Count, Field(le=100_000)] = Field(default=50, description="Number of shots.")
+    seed: Annotated[int, Strict()] = Field(
+        default=1, ge=0, description="Seed of the random numbers; another seed, other shots."
+    )
+    impacts: Annotated[Count, Field(ge=2, le=1000)] = Field(
+        default=4, description="A shot ends after that many impacts."
+    )
+    duration: Time = Field(default=5e-3, gt=0, description="Longest time of a shot.")
+    step: Time = Field(default=40e-9, gt=0, description="Time step.")
+    eccentricity: LengthDistribution | None = Field(
+        default=None,
+        description="Distance of the moving body off the axis; drawn from the guide without.",
+    )
+    tilt: AngleDistribution | None = Field(
+        default=None, description="Its lean; drawn from the guide without."
+    )
+    force: ForceDistribution | None = Field(
+        default=None,
+        description="Closing force at first touch; that of 'motion' without (force and preload).",
+    )
+    friction: RatioDistribution | None = Field(
+        default=None, description="Coulomb's coefficient in the guide; that of 'guide' without."
+    )
+    waviness: Waviness | None = Field(
+        default=None, description="Out-of-roundness of the contact ring; none without."
+    )
+
+    @model_validator(mode="after")
+    def _steps(self) -> Self:
+        if not 100 * self.step <= self.duration <= _MOST_STEPS * self.step:
+            raise CaseProblem(
+                ("duration",),
+                got=f"{self.duration / self.step:.4g} steps of {format_si(self.step, 's')}",
+                expected=f"100 to {_MOST_STEPS} steps",
+                hint="some milliseconds in steps of 40 ns hold the bounces of a small valve.",
+            )
+        return self
