@@ -22,6 +22,7 @@ from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_revolved, mesh_step
 from klack.mesh.supports import sector_nodes, surface_nodes
 from klack.mesh.swept import sweep
+from klack.units import format_si
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
 
@@ -251,9 +252,10 @@ def _check_refinement(
         away = min(float(np.linalg.norm(np.subtract(first, ring))) for ring in rings)
         if away > _SAFE_SHARE * extent:
             warnings.warn(
-                f"'{name}' touches first {away * 1e6:.3g} um away from where its mesh is finest: "
-                f"the refinement reaches {extent * 1e6:.3g} um. Try: bodies.{name}.mesh.contact: "
-                f"{{extent: {2.0 * away / _SAFE_SHARE * 1e6:.2g} um}}, or a smaller placement.",
+                f"'{name}' touches first {format_si(away, 'm', 2)} away from where its mesh is "
+                f"finest; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
+                f"{format_si(1.2 * away / _SAFE_SHARE, 'm', 2)} in bodies.{name}.mesh.contact, or "
+                "a smaller placement.",
                 AccuracyWarning,
                 stacklevel=2,
             )
