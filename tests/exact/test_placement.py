@@ -2,8 +2,9 @@ r"""A body placed off its axis: truth = a rigid motion, and a sphere on a cone.
 
 A sphere of radius R whose centre is at the distance e from the axis of a cone z = r tan(a) touches
 it on the side it was shifted to.  The centre is then R away from the straight line of that side, at
-the height z = e tan(a) + R/cos(a): higher by e tan(a) than centred.  A lean by the angle t about a point of the axis at the distance h from the centre of the
-sphere shifts that centre by h sin(t) and lowers it by h (1 - cos t).
+the height z = e tan(a) + R/cos(a): higher by e tan(a) than centred.  A lean by the angle t about a
+point of the axis at the distance h from the centre of the sphere shifts that centre by h sin(t) and
+lowers it by h (1 - cos t).
 """
 
 from math import cos, pi, sin
