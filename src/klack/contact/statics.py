@@ -89,6 +89,8 @@ class StaticContact:
     half_width : array, shape (n,) [m]
         Half width of a ring contact, or radius of a contact around one point, of the Hertzian
         pressure with the same second moment.
+    compliance : array, shape (nc, nc) [m/N]
+        Static compliance of both bodies, condensed to the contact points.
     """
 
     space: ContactSpace
@@ -98,6 +100,7 @@ class StaticContact:
     area: NDArray[np.float64]
     active_count: NDArray[np.int64]
     half_width: NDArray[np.float64]
+    compliance: NDArray[np.float64]
 
     @property
     def max_force(self) -> float:
@@ -173,6 +176,7 @@ def static_contact(
         area=active @ space.area,
         active_count=active.sum(axis=1),
         half_width=np.array([_half_width(space, lam) for lam in pressures]),
+        compliance=C,
     )
     check_rim(result)
     return result

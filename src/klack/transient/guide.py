@@ -1,0 +1,190 @@
+r"""The guide of a needle: a bore with clearance that holds its shaft at a few heights.
+
+At each height the shaft may move freely inside a disc of the radial clearance *c*; beyond it the
+bore pushes it back towards the axis,
+
+.. math:: N \ge 0, \qquad |x| - c \le k^{-1} N, \qquad x = x_0 + T q,
+
+with the lateral displacement *x* of the shaft section (mean over its ring of nodes, which has the
+same weights as the force) and the compliance :math:`k^{-1}` that the modes do not have: of the
+bore, and, for the consistent law, of the shaft itself (static flexibility less that of the kept
+modes).  Along the axis the bore brakes: Coulomb friction :math:`\mu N` against the direction of
+sliding, faded out below a small speed, and viscous drag.
+
+Limits: the bore does not move; friction acts along the axis only; no fluid film in the guide.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError, require_nonnegative, require_positive
+from klack.transient.interface_model import InterfaceModel
+
+__all__ = ["Guide", "guide_of_shaft"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Guide:
+    """Clearance contacts of the moving body with a bore along z.
+
+    Parameters
+    ----------
+    heights : array, shape (k,) [m]
+        z of the sections, at the placement of the moving body.
+    clearance : array, shape (k,) [m]
+        Radial.
+    offset : array, shape (k, 2) [m]
+        Position of the sections across the axis of the bore (z), at the placement.
+    traces : array, shape (k, 2, M) [1/sqrt(kg)]
+        Displacement of the section along x and y per unit modal coordinate.
+    slide : array, shape (k, M) [1/sqrt(kg)]
+        The same along z.
+    compliance : array, shape (k, 2, 2) [m/N]
+        Of bore and shaft, without that of the kept modes.
+    friction : array, shape (k,) [-]
+    viscous : array, shape (k,) [N s/m]
+        Drag at each height.
+    """
+
+    heights: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    traces: NDArray[np.float64]
+    slide: NDArray[np.float64]
+    compliance: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    viscous: NDArray[np.float64]
+
+    def with_friction(self, coefficient: float) -> Self:
+        """Return the same guide with another Coulomb coefficient [-] at all heights."""
+        require_nonnegative("guide: friction", coefficient, "-")
+        return replace(self, friction=np.full(len(self.heights), coefficient))
+
+
+def guide_of_shaft(
+    model: InterfaceModel,
+    body: ElasticBody,
+    shapes: NDArray[np.float64],
+    flexibility: Flexibility,
+    *,
+    surface: str,
+    heights: Sequence[float],
+    clearance: float,
+    stiffness: float | None = None,
+    consistent: bool = True,
+    friction: float = 0.0,
+    viscous: float = 0.0,
+) -> Guide:
+    """Sections of the shaft as guide contacts.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    body : ElasticBody
+        The moving one, a solid.
+    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+        Its kept modes, rigid ones first, as in the model.
+    flexibility : Flexibility
+        Of the moving body.
+    surface : str
+        Cylindrical surface of the shaft.
+    heights : sequence of float [m]
+        z at the placement; each takes the ring of nodes of the surface that is nearest.
+    clearance : float [m]
+        Radial.
+    stiffness : float, optional [N/m]
+        Of the bore at each height; rigid without.
+    consistent : bool
+        Add the compliance of the shaft that the kept modes miss.
+    friction, viscous : float [-], [N s/m]
+        The drag is shared equally between the heights.
+
+    Raises
+    ------
+    InputError
+        For a height without nodes, a body of revolution, or a contact without any compliance.
+    """
+    require_positive("guide: clearance", clearance, "m")
+    require_nonnegative("guide: friction", friction, "-")
+    require_nonnegative("guide: viscous", viscous, "N s/m")
+    if body.dimension != 3:
+        raise InputError(
+            f"guide of body '{body.name}'",
+            got="a body of revolution, which can only move along its axis",
+            expected="a solid body",
+            hint="model the bodies as swept or solid.",
+        )
+    count, modes = len(heights), model.mode_count
+    traces, slide = np.zeros((count, 2, modes)), np.zeros((count, modes))
+    compliance = np.zeros((count, 2, 2))
+    centre = np.zeros((count, 3))
+    for k, height in enumerate(heights):
+        load, centre[k] = _section(body, surface, height)
+        own = load.T @ shapes
+        traces[k, :, : shapes.shape[1]] = own[:2]
+        slide[k, : shapes.shape[1]] = own[2]
+        if stiffness is not None:
+            compliance[k] = np.eye(2) / stiffness
+        if consistent:
+            compliance[k] += _missing(model, own[:2], load[:, :2], flexibility)
+        if not np.linalg.eigvalsh(compliance[k])[0] > 0:
+            raise InputError(
+                f"guide of body '{body.name}' at z = {height * 1e3:.4g} mm",
+                got="a contact without compliance",
+                expected="a stiffness of the bore, or the consistent law",
+                hint="give law: {kind: linear, stiffness: 1e8 N/m}.",
+            )
+    return Guide(
+        heights=centre[:, 2],
+        clearance=np.full(count, clearance),
+        offset=centre[:, :2],
+        traces=traces,
+        slide=slide,
+        compliance=compliance,
+        friction=np.full(count, friction),
+        viscous=np.full(count, viscous / count),
+    )
+
+
+def _section(
+    body: ElasticBody, surface: str, height: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights of the ring of nodes nearest to a height, shape (n_dof, 3), and its centre."""
+    nodes = body.mesh.surface(surface).nodes
+    z = body.mesh.points[nodes, 2]
+    if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
+        raise InputError(
+            f"guide of body '{body.name}': heights",
+            got=f"z = {height * 1e3:.4g} mm",
+            expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
+            f"'{surface}' is",
+            hint="heights are those of the placed body.",
+        )
+    at = float(z[np.argmin(np.abs(z - height))])
+    width = max(1e-6, 0.02 * float(np.ptp(body.mesh.points[nodes, 0])))
+    ring = nodes[np.abs(z - at) <= width]
+    load = np.zeros((body.dof_count, 3))
+    for c in range(3):
+        load[3 * ring + c, c] = 1.0 / len(ring)
+    return load, body.mesh.points[ring].mean(axis=0)
+
+
+def _missing(
+    model: InterfaceModel,
+    own: NDArray[np.float64],
+    load: NDArray[np.float64],
+    flexibility: Flexibility,
+) -> NDArray[np.float64]:
+    """Static compliance of a section less that of the kept modes, shape (2, 2) [m/N]."""
+    omega = model.omega[: own.shape[1]]
+    elastic = omega > 0
+    whole = load.T @ flexibility.solve(load)
+    modal = (own[:, elastic] / omega[elastic]) @ (own[:, elastic] / omega[elastic]).T
+    rest = whole - modal
+    return np.asarray(0.5 * (rest + rest.T))

@@ -1,0 +1,433 @@
+r"""Elastic bodies as modes, and the compliance that the modes miss, point by point.
+
+Between the contact points of several bodies
+
+.. math:: g = g_0 + \Phi q + C_l \lambda, \qquad \ddot q + 2 \zeta \omega \dot q + \omega^2 q
+    = f + \Phi^T \lambda, \qquad 0 \le \lambda \perp g \ge 0
+
+with the contact traces :math:`\Phi = \sum_b G_b V_b` of the kept modes V (rigid ones included) and
+the *residual* compliance
+
+.. math:: C_l = \sum_b \Big( G_b F_b G_b^T - \sum_{i\,\text{elastic}}
+    \frac{\varphi_i \varphi_i^T}{\omega_i^2} \Big),
+
+positive definite, where F is the static flexibility of a whole body (of a free one with inertia
+relief).  Statics are therefore exact for any number of modes and for *every* pressure pattern:
+centred, eccentric, tilted, or touching in a few places.  The contact points carry no inertia.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.contact.mortar import ContactSpace
+from klack.contact.statics import contact_compliance
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.errors import ConvergenceError, InputError
+
+__all__ = [
+    "InterfaceBody",
+    "InterfaceContact",
+    "InterfaceModel",
+    "StaticChecks",
+    "interface_model",
+    "rigid_motion",
+]
+
+_RECIPROCITY = 1e-6
+"""Largest asymmetry of the static compliance, relative to its largest entry."""
+
+_STATIC_LIMIT = 1e-6
+"""Largest deviation of the static answer to a load pattern."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceBody:
+    """A body, its static flexibility and what is kept of its vibration.
+
+    Parameters
+    ----------
+    body : ElasticBody
+    flexibility : Flexibility
+    modes : Modes
+        The kept elastic modes.
+    damping : array, shape (m,) [-]
+        Damping ratio of each of them.
+    """
+
+    body: ElasticBody
+    flexibility: Flexibility
+    modes: Modes
+    damping: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceContact:
+    """Two surfaces that may meet.
+
+    Parameters
+    ----------
+    name : str
+    upper, lower : str
+        Names of the bodies a and b of ``space``.
+    space : ContactSpace
+    compliance : array, shape (nc, nc) [m/N], optional
+        Static compliance of both bodies at these points, if it is known already.
+    """
+
+    name: str
+    upper: str
+    lower: str
+    space: ContactSpace
+    compliance: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StaticChecks:
+    """What was found when the model was built.
+
+    Parameters
+    ----------
+    lowest_pivot : float [-]
+        Smallest Cholesky pivot of the residual compliance over its largest diagonal entry, above 0.
+    reciprocity : float [-]
+        Largest difference of the static compliance from its transpose, over its largest entry.
+    static_limit : float [-]
+        Deviation of modes + residual from the static answer of the whole bodies to one load.
+    modal_share : float [-]
+        Share of the static compliance (trace) that the kept modes carry.
+    """
+
+    lowest_pivot: float
+    reciprocity: float
+    static_limit: float
+    modal_share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceModel:
+    """Modal coordinates of all bodies and the contact points between them; plain arrays.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        The moving body first.
+    masses : tuple of float [kg]
+        ``inf`` for a supported body.
+    omega, damping : array, shape (M,) [rad/s], [-]
+        Of all modal coordinates: body by body, rigid modes first.
+    owner : int array, shape (M,)
+        Body of each coordinate.
+    traces : array, shape (nc, M) [1/sqrt(kg)]
+        Change of the gaps per unit modal coordinate.
+    compliance : array, shape (nc, nc) [m/N]
+        Residual compliance.
+    gap : array, shape (nc,) [m]
+        At q = 0 without contact forces.
+    axial : array, shape (nc,) [-]
+        Change of the gaps per unit translation of the moving body along +z.
+    area : array, shape (nc,) [m^2]
+    points : array, shape (nc, dimension) [m]
+    contacts : tuple of (name, first, last)
+        Rows ``first <= k < last`` belong to the contact.
+    rim, beyond : array, shape (nc,) [-], [m]
+        See :class:`klack.contact.mortar.ContactSpace`.
+    rigid : array, shape (6, M) [1/sqrt(kg)]
+        Translation of the centre of mass and rotation vector of the moving body per unit modal
+        coordinate; rows other than z vanish for bodies of revolution.
+    drift : array, shape (bodies, M) [1/sqrt(kg)]
+        Displacement of each centre of mass along z per unit modal coordinate.
+    centre : array, shape (3,) [m]
+        Centre of mass of the moving body.
+    longest_period : float [s]
+        Of its elastic modes, 0 without any.
+    checks : StaticChecks
+    """
+
+    bodies: tuple[str, ...]
+    masses: tuple[float, ...]
+    omega: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    owner: NDArray[np.int64]
+    traces: NDArray[np.float64]
+    compliance: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    axial: NDArray[np.float64]
+    area: NDArray[np.float64]
+    points: NDArray[np.float64]
+    contacts: tuple[tuple[str, int, int], ...]
+    rim: NDArray[np.bool_]
+    beyond: NDArray[np.float64]
+    rigid: NDArray[np.float64]
+    drift: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    longest_period: float
+    checks: StaticChecks
+
+    @property
+    def count(self) -> int:
+        """Number of contact points."""
+        return len(self.gap)
+
+    @property
+    def mode_count(self) -> int:
+        """Number of modal coordinates."""
+        return len(self.omega)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the moving body [kg]."""
+        return self.masses[0]
+
+    def with_gap(self, gap: NDArray[np.float64]) -> Self:
+        """Return the same model with other initial gaps, shape (nc,) [m]."""
+        gap = np.asarray(gap, dtype=float)
+        if gap.shape != self.gap.shape or not np.all(np.isfinite(gap)):
+            raise InputError(
+                "interface model: gap",
+                got=f"shape {gap.shape}, finite: {bool(np.all(np.isfinite(gap)))}",
+                expected=f"{len(self.gap)} finite gaps",
+                hint="give one gap per contact point, in metres.",
+            )
+        return replace(self, gap=gap)
+
+
+def interface_model(
+    bodies: Sequence[InterfaceBody], contacts: Sequence[InterfaceContact]
+) -> InterfaceModel:
+    """Reduce bodies to modes and the residual compliance of all contact points.
+
+    Parameters
+    ----------
+    bodies : sequence of InterfaceBody
+        The moving one first; it must be free along z.
+    contacts : sequence of InterfaceContact
+        One or more, for example seat and stop.
+
+    Raises
+    ------
+    InputError
+        For bodies and contacts that do not belong together.
+    ConvergenceError
+        When the residual compliance is not positive definite, not reciprocal, or the static limit
+        is missed.
+    """
+    names = [item.body.name for item in bodies]
+    moving = bodies[0].body
+    if moving.is_fixed:
+        raise InputError(
+            f"interface model: body '{moving.name}'",
+            got="a moving body that is held",
+            expected="a body that is free along z",
+            hint="give the needle first and take its supports away.",
+        )
+    rows = [len(contact.space.gap) for contact in contacts]
+    last = np.cumsum(rows).astype(np.int64)
+    first = np.asarray(last - rows, dtype=np.int64)
+    whole, asymmetry = _static_compliance(bodies, contacts, names, first, last)
+    blocks = [_traces(item, contacts, first, last) for item in bodies]
+    traces = np.hstack(blocks)
+    omega = np.concatenate([_with_rigid(item, item.modes.omega) for item in bodies])
+    elastic = omega > 0
+    modal = (traces[:, elastic] / omega[elastic]) @ (traces[:, elastic] / omega[elastic]).T
+    compliance = whole - modal
+    compliance = 0.5 * (compliance + compliance.T)
+    checks = StaticChecks(
+        lowest_pivot=_lowest_pivot(compliance),
+        reciprocity=asymmetry,
+        static_limit=_static_limit(bodies, contacts, names, first, last, compliance + modal),
+        modal_share=float(np.trace(modal) / np.trace(whole)),
+    )
+    _require_sound(checks)
+    periods = 2.0 * np.pi / bodies[0].modes.omega
+    counts = [block.shape[1] for block in blocks]
+    return InterfaceModel(
+        bodies=tuple(names),
+        masses=tuple(inf if item.body.is_fixed else item.body.mass for item in bodies),
+        omega=omega,
+        damping=np.concatenate([_with_rigid(item, item.damping) for item in bodies]),
+        owner=np.repeat(np.arange(len(bodies)), counts),
+        traces=np.ascontiguousarray(traces),
+        compliance=compliance,
+        gap=np.concatenate([contact.space.gap for contact in contacts]),
+        axial=np.concatenate(
+            [
+                contact.space.axial * (1.0 if contact.upper == names[0] else -1.0)
+                for contact in contacts
+            ]
+        ),
+        area=np.concatenate([contact.space.area for contact in contacts]),
+        points=np.concatenate([contact.space.points for contact in contacts]),
+        contacts=tuple(
+            (contact.name, int(a), int(b))
+            for contact, a, b in zip(contacts, first, last, strict=True)
+        ),
+        rim=np.concatenate([contact.space.rim for contact in contacts]),
+        beyond=np.repeat([contact.space.beyond for contact in contacts], rows),
+        rigid=np.hstack([rigid_motion(moving), np.zeros((6, sum(counts) - _rigid_count(moving)))]),
+        drift=_drift(bodies, counts),
+        centre=_in_space(moving.centre_of_mass),
+        longest_period=float(np.max(periods, initial=0.0)),
+        checks=checks,
+    )
+
+
+def rigid_motion(body: ElasticBody) -> NDArray[np.float64]:
+    """Translation of the centre of mass and rotation vector per unit rigid mode, shape (6, r)."""
+    R, d = body.rigid_modes, body.dimension
+    out = np.zeros((6, R.shape[1]))
+    if d == 2:
+        out[2] = R[1::2].T @ body.nodal_mass / body.mass
+        return out
+    fields = R.reshape(-1, 3, R.shape[1])
+    out[:3] = np.einsum("n,nki->ki", body.nodal_mass, fields) / body.mass
+    # the angular momentum of the mode gives its rotation
+    arm = body.mesh.points - body.centre_of_mass
+    momentum = (body.M @ R).reshape(-1, 3, R.shape[1])
+    spin = np.cross(arm[:, :, None], momentum, axisa=1, axisb=1, axisc=1).sum(axis=0)
+    out[3:] = np.linalg.solve(body.inertia, spin)
+    return out
+
+
+def _rigid_count(body: ElasticBody) -> int:
+    return int(body.rigid_modes.shape[1])
+
+
+def _with_rigid(item: InterfaceBody, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([np.zeros(_rigid_count(item.body)), values])
+
+
+def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    return x if len(x) == 3 else np.array([0.0, 0.0, x[1]])
+
+
+def _traces(
+    item: InterfaceBody,
+    contacts: Sequence[InterfaceContact],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Contact traces of the modes of one body at all contact points."""
+    shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
+    out = np.zeros((int(last[-1]), shapes.shape[1]))
+    for contact, a, b in zip(contacts, first, last, strict=True):
+        for name, G in ((contact.upper, contact.space.G_a), (contact.lower, contact.space.G_b)):
+            if name == item.body.name:
+                out[a:b] += G @ shapes
+    return out
+
+
+def _drift(bodies: Sequence[InterfaceBody], counts: Sequence[int]) -> NDArray[np.float64]:
+    out = np.zeros((len(bodies), sum(counts)))
+    start = 0
+    for number, (item, count) in enumerate(zip(bodies, counts, strict=True)):
+        if not item.body.is_fixed:
+            rigid = rigid_motion(item.body)[2]
+            out[number, start : start + len(rigid)] = rigid
+        start += count
+    return out
+
+
+def _static_compliance(
+    bodies: Sequence[InterfaceBody],
+    contacts: Sequence[InterfaceContact],
+    names: Sequence[str],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], float]:
+    """Static compliance of all points, and its largest asymmetry over its largest entry.
+
+    A body with several contacts couples them.
+    """
+    total = np.zeros((int(last[-1]),) * 2)
+    for contact in contacts:
+        for name in (contact.upper, contact.lower):
+            if name not in names:
+                raise InputError(
+                    f"interface model: contact '{contact.name}'",
+                    got=f"body '{name}'",
+                    expected=f"one of: {', '.join(names)}",
+                    hint="give every body of the contacts.",
+                )
+    for contact, a, b in zip(contacts, first, last, strict=True):
+        C = contact.compliance
+        if C is None:
+            pair = [
+                bodies[names.index(name)].flexibility for name in (contact.upper, contact.lower)
+            ]
+            C = contact_compliance(contact.space, pair[0], pair[1])
+        total[a:b, a:b] = C
+    asymmetry = float(np.max(np.abs(total - total.T), initial=0.0) / np.max(np.abs(total)))
+    for i, one in enumerate(contacts):
+        for j, other in enumerate(contacts):
+            if i == j:
+                continue
+            for item in bodies:
+                G, H = _rows_of(one, item.body.name), _rows_of(other, item.body.name)
+                if G is not None and H is not None:
+                    part = G @ item.flexibility.solve(H.T.toarray())
+                    total[first[i] : last[i], first[j] : last[j]] += part
+    if len(contacts) > 1:
+        asymmetry = float(np.max(np.abs(total - total.T)) / np.max(np.abs(total)))
+    return 0.5 * (total + total.T), asymmetry
+
+
+def _rows_of(contact: InterfaceContact, name: str) -> csr_array | None:
+    if contact.upper == name:
+        return contact.space.G_a
+    return contact.space.G_b if contact.lower == name else None
+
+
+def _lowest_pivot(compliance: NDArray[np.float64]) -> float:
+    try:
+        factor = np.linalg.cholesky(compliance)
+    except np.linalg.LinAlgError:
+        lowest = float(np.linalg.eigvalsh(compliance)[0])
+        return min(lowest, 0.0) / float(np.max(np.diag(compliance)))
+    return float(np.min(np.diag(factor)) ** 2 / np.max(np.diag(compliance)))
+
+
+def _static_limit(
+    bodies: Sequence[InterfaceBody],
+    contacts: Sequence[InterfaceContact],
+    names: Sequence[str],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    whole: NDArray[np.float64],
+) -> float:
+    """Deviation of ``whole`` from fresh static solutions of the bodies under one uneven load."""
+    load = np.random.default_rng(5).uniform(0.0, 1.0, int(last[-1]))
+    answer = np.zeros(len(load))
+    for item in bodies:
+        parts = [
+            (G, slice(int(a), int(b)))
+            for contact, a, b in zip(contacts, first, last, strict=True)
+            if (G := _rows_of(contact, item.body.name)) is not None
+        ]
+        force = sum(G.T @ load[rows] for G, rows in parts)
+        u = item.flexibility.solve(np.asarray(force))
+        for G, rows in parts:
+            answer[rows] += G @ u
+    return float(np.max(np.abs(whole @ load - answer)) / np.max(np.abs(answer)))
+
+
+def _require_sound(checks: StaticChecks) -> None:
+    if not checks.lowest_pivot > 0:
+        raise ConvergenceError(
+            "interface model: the residual compliance of the contact points is not positive "
+            f"definite (lowest eigenvalue {checks.lowest_pivot:.2g} of the largest entry).\n"
+            "Try: fewer kept modes, or a finer mesh on the contact surface."
+        )
+    if checks.reciprocity > _RECIPROCITY or checks.static_limit > _STATIC_LIMIT:
+        raise ConvergenceError(
+            f"interface model: the statics miss reciprocity by {checks.reciprocity:.2g} and the "
+            f"exact answer by {checks.static_limit:.2g}.\n"
+            "Try: look for distorted elements; solve the statics with another back end."
+        )

@@ -1,0 +1,117 @@
+"""What an interface-level run leaves behind."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.history import ImpactHistory
+
+__all__ = ["ImpactSegment", "InterfaceEnergy", "InterfaceResult", "RigidMotion"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ImpactSegment:
+    """A stretch of fine steps around one impact.
+
+    Parameters
+    ----------
+    contact : str
+        Name of the contact that carried most.
+    history : ImpactHistory
+        Axial contact force (magnitude), smallest gap, velocities of the centres of mass.
+    point_force : float32 array, shape (n, nc) [N]
+        Mean force of every contact point in each step; no rows when points were not asked for.
+    position : array, shape (6,) [m], [rad]
+        Rigid placement of the moving body when the segment began: translation of the centre of
+        mass and rotation vector.
+    velocity : array, shape (6,) [m/s], [rad/s]
+    """
+
+    contact: str
+    history: ImpactHistory
+    point_force: NDArray[np.float32]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RigidMotion:
+    """Rigid motion of the moving body over a whole run.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+    position, velocity : array, shape (n, 6)
+        Translation of the centre of mass [m], [m/s] and rotation vector [rad], [rad/s].
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InterfaceEnergy:
+    """Books of a whole run.
+
+    Parameters
+    ----------
+    initial, final : float [J]
+        Kinetic and strain energy of all bodies, of the contacts, the guides and the spring.
+    damping, guide : float [J]
+        Lost in modal damping; in the guides (friction, drag, and their numerical part).
+    work : float [J]
+        Of constant forces.
+    debt : float [J]
+        Energy that the contact steps have given too much and not yet taken back; the residual
+        of the books but for round-off.
+    """
+
+    initial: float
+    final: float
+    damping: float
+    guide: float
+    work: float
+    debt: float
+
+    @property
+    def residual(self) -> float:
+        """Energy from nowhere over the largest of initial energy and work [-]."""
+        scale = max(abs(self.initial), abs(self.work), 1e-300)
+        return (self.final - self.initial + self.damping + self.guide - self.work) / scale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterfaceResult:
+    """One or several impacts at the interface level.
+
+    Parameters
+    ----------
+    impacts : tuple of ImpactSegment
+        In the order of time; without flight one segment holds the whole run.
+    motion : RigidMotion
+    energy : InterfaceEnergy
+    steps, steps_in_contact : int
+        Fine steps.
+    rounds_per_step : float
+        Active sets tried per step in contact.
+    approach : float [m]
+        Largest way of the centre of mass of the moving body after first touch.
+    wall_time : float [s]
+        Of the time loop.
+    """
+
+    impacts: tuple[ImpactSegment, ...]
+    motion: RigidMotion
+    energy: InterfaceEnergy
+    steps: int
+    steps_in_contact: int
+    rounds_per_step: float
+    approach: float
+    wall_time: float
+
+    @property
+    def history(self) -> ImpactHistory:
+        """History of the first segment."""
+        return self.impacts[0].history

@@ -1,0 +1,576 @@
+"""Impacts at the interface level: the model, the compiled step, and the flight in between.
+
+Around an impact the step is fine and every gap is looked at.  Far from it the exact propagator
+jumps, as far as no gap can close (:func:`klack.transient.interface_kernel.safe_flight`) and the
+guide allows.  Before each impact the gaps can be taken anew from the geometry at the rigid
+placement reached by then, so that tilt and eccentricity may grow over many bounces while each
+impact stays linear.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.simulation.propagator import damping_loss, modal_propagator
+from klack.transient.guide import Guide
+from klack.transient.interface_kernel import FAILED, OPEN, march, safe_flight
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_result import (
+    ImpactSegment,
+    InterfaceEnergy,
+    InterfaceResult,
+    RigidMotion,
+)
+
+__all__ = ["Gaps", "simulate_interface"]
+
+Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
+
+_CHUNK = 500
+_CLUSTER_TIME = 50e-6  # open for so long ends an impact [s]
+_DOUBLINGS = 9  # of the fine step in flight
+_GUIDED_DOUBLINGS = 4
+_FLIGHT_CHUNK = 20e-6  # [s]
+_NEAR = 8.0  # fine steps before a possible touch
+_FAR = 200.0  # fine steps that end a segment without a touch
+_STALE = 0.2e-6  # what the gaps of the last impact may be wrong by after a flight [m]
+_SLIP_SPEED = 1e-3  # [m/s]
+_RIM_RESERVE = 1.1
+
+
+def simulate_interface(
+    model: InterfaceModel,
+    *,
+    speed: float,
+    duration: float,
+    step: float = 40e-9,
+    force: float = 0.0,
+    spring_stiffness: float = 0.0,
+    guide: Guide | None = None,
+    offset: NDArray[np.float64] | None = None,
+    velocity: NDArray[np.float64] | None = None,
+    height: float | None = None,
+    gaps: Gaps | None = None,
+    flight: bool = False,
+    impacts: int | None = None,
+    points: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> InterfaceResult:
+    """Let the moving body fly in -z and follow it through one or several impacts.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    speed : float [m/s]
+        Of approach.
+    duration : float [s]
+    step : float [s]
+        Around impacts; about one 500th of the contact time.
+    force : float [N]
+        Constant, presses the moving body towards -z (closing), spread over it like its weight.
+    spring_stiffness : float [N/m]
+        Of a spring that pulls the centre of mass back to where it started; its preload belongs to
+        ``force``.
+    guide : Guide, optional
+    offset : array, shape (6,), optional [m], [rad]
+        Rigid placement of the moving body, from that of the meshes: translation of the centre of
+        mass and rotation vector.
+    velocity : array, shape (6,), optional [m/s], [rad/s]
+        Besides ``speed``.
+    height : float, optional [m]
+        Start this far above first touch; without it, where the offset puts the body.
+    gaps : callable, optional
+        Exact gaps at a rigid placement, asked before every impact; without it the gaps stay
+        linear in the placement.
+    flight : bool
+        Jump over free flight; the result then has one segment per impact.
+    impacts : int, optional
+        Stop after so many; with ``flight`` only.
+    points : bool
+        Keep the force of every contact point.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    InputError
+        Bad numbers; a contact that grows to the border of the candidate points.
+    ConvergenceError
+        When contact forces are not found.
+    """
+    require_nonnegative("simulate_interface: speed", speed, "m/s")
+    require_positive("simulate_interface: duration", duration, "s")
+    require_positive("simulate_interface: step", step, "s")
+    begin = perf_counter()
+    with threadpool_limits(limits=1, user_api="blas"):
+        run = _Run(model, step, force, spring_stiffness, guide, gaps, points)
+        run.place(offset, velocity, speed, height)
+        run.go(duration, flight, impacts, progress)
+    return run.result(perf_counter() - begin)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stepper:
+    """Everything that depends on the length of the step."""
+
+    step: float
+    propagator: NDArray[np.float64]
+    loss: NDArray[np.float64]
+
+
+def _stepper(model: InterfaceModel, step: float) -> _Stepper:
+    P = modal_propagator(model.omega, model.damping, step)
+    loss = np.zeros((0, model.mode_count))
+    if np.any(model.damping > 0):
+        L = damping_loss(model.omega, model.damping, step)
+        loss = np.array([L.Q11, L.Q12, L.Q22, L.L1, L.L2, L.S])
+    return _Stepper(step, np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]), loss)
+
+
+class _Segment:
+    """Records of fine steps as they come."""
+
+    def __init__(self, run: "_Run") -> None:
+        self.time = run.time
+        self.ledger = run.ledger_start()
+        self.position, self.velocity = run.rigid_state()
+        self.drift = [run.model.drift @ run.v]
+        self.parts: list[tuple[NDArray[np.float64], ...]] = []
+        self.point_force: list[NDArray[np.float32]] = []
+        self.contact_steps = run.books[7]
+
+    @property
+    def steps(self) -> int:
+        return sum(len(part[0]) for part in self.parts)
+
+
+class _Run:
+    """State of one run."""
+
+    def __init__(
+        self,
+        model: InterfaceModel,
+        step: float,
+        force: float,
+        spring: float,
+        guide: Guide | None,
+        gaps: Gaps | None,
+        points: bool,
+    ) -> None:
+        self.model, self.step, self.guide, self.gaps, self.points = model, step, guide, gaps, points
+        self.constant, self.spring = -force, spring
+        n, M = model.count, model.mode_count
+        self.steppers: dict[int, _Stepper] = {}
+        self.A = np.ascontiguousarray(
+            model.compliance + 0.5 * (model.traces * self.stepper(0).propagator[4]) @ model.traces.T
+        )
+        self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
+        self.gap0 = np.array(model.gap)
+        self.q, self.v, self.lam = np.zeros(M), np.zeros(M), np.zeros(n)
+        self.active = np.zeros(n, dtype=bool)
+        self.index = np.zeros(n, dtype=np.int64)
+        self.B = np.zeros((n, n))
+        self.counts = np.zeros(2, dtype=np.int64)
+        self.books = np.zeros(9)
+        self.carried = np.zeros(n, dtype=bool)
+        self.guide_arrays = _guide_arrays(guide, M)
+        self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
+        self.push = np.ascontiguousarray(model.rigid[2])
+        self.time = 0.0
+        self.segments: list[ImpactSegment] = []
+        self.motion: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
+        self.steps = 0
+        self.lowest = np.inf
+        self.touched_at: float | None = None
+
+    def stepper(self, doublings: int) -> _Stepper:
+        if doublings not in self.steppers:
+            self.steppers[doublings] = _stepper(self.model, self.step * 2.0**doublings)
+        return self.steppers[doublings]
+
+    # ------------------------------------------------------------------ placement
+
+    def place(
+        self,
+        offset: NDArray[np.float64] | None,
+        velocity: NDArray[np.float64] | None,
+        speed: float,
+        height: float | None,
+    ) -> None:
+        placement = np.zeros(6) if offset is None else np.array(offset, dtype=float)
+        for _ in range(1 if height is None else 4):
+            self.q[: self.rigid_count] = self.coordinates(placement)
+            self.take_gaps()
+            if height is None:
+                break
+            placement[2] += height - self.touch()
+        self.start_lift = float(self.push @ self.q)
+        motion = np.zeros(6) if velocity is None else np.array(velocity, dtype=float)
+        motion[2] -= speed
+        self.v[: self.rigid_count] = self.coordinates(motion)
+        # the spring counts from q = 0 in the kernel
+        self.constant += self.spring * self.start_lift
+        self.start_energy = self.energy()
+        self.keep_motion()
+
+    def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rigid modal coordinates of a translation and rotation vector."""
+        R = self.model.rigid[:, : self.rigid_count]
+        q, *_ = np.linalg.lstsq(R / _SCALE[:, None], rigid / _SCALE, rcond=1e-12)
+        if np.max(np.abs(R @ q - rigid) / _SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / _SCALE))):
+            raise InputError(
+                "simulate_interface: offset or velocity",
+                got="a motion across the axis, or a rotation",
+                expected="motion along z only, for bodies of revolution",
+                hint="model the bodies as swept or solid to tilt or shift them.",
+            )
+        return np.asarray(q)
+
+    def rigid_state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return self.model.rigid @ self.q, self.model.rigid @ self.v
+
+    def take_gaps(self) -> None:
+        """Take the gaps from the geometry at the present placement."""
+        if self.gaps is None:
+            return
+        r = self.rigid_count
+        fresh = self.gaps(self.model.rigid @ self.q)
+        self.gap0 = fresh - self.model.traces[:, :r] @ self.q[:r]
+
+    def touch(self) -> float:
+        """Way of the moving body along -z until the first gap closes [m]."""
+        facing = self.model.axial > 1e-6
+        gap = self.gap0 + self.model.traces @ self.q
+        return float(np.min(gap[facing] / self.model.axial[facing]))
+
+    # ------------------------------------------------------------------ motion
+
+    def go(
+        self,
+        duration: float,
+        flight: bool,
+        impacts: int | None,
+        progress: Callable[[float], None] | None,
+    ) -> None:
+        end = duration * (1.0 - 1e-9)
+        wait = ceil(max(_CLUSTER_TIME, 2.0 * self.model.longest_period) / self.step)
+        while self.time < end:
+            if flight:
+                self.fly(duration, progress)
+                if self.time >= end:
+                    break
+                self.take_gaps()
+            self.impact(duration, wait if flight else 0, progress)
+            if impacts is not None and flight and len(self.segments) >= impacts:
+                break
+        if progress is not None:
+            progress(1.0)
+
+    def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
+        """Jump until a gap may close soon."""
+        empty = np.zeros((0, self.model.mode_count))
+        reserve = self.gap0 - (0.0 if self.gaps is None else _STALE)
+        while self.time < duration:
+            safe = self.safe(reserve, min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step))
+            if safe < _NEAR * self.step:
+                return
+            doublings = int(np.log2(safe / self.step))
+            doublings = min(doublings, _DOUBLINGS if self.unguided(safe) else _GUIDED_DOUBLINGS)
+            length = self.step * 2.0**doublings
+            steps = max(1, int(min(safe, _FLIGHT_CHUNK) / length))
+            self.march(self.stepper(doublings), steps, 0, empty, np.zeros(0), np.zeros((0, 0)))
+            self.time += steps * length
+            self.keep_motion()
+            if progress is not None:
+                progress(min(self.time / duration, 1.0))
+
+    def safe(self, gap: NDArray[np.float64], horizon: float) -> float:
+        outside = self.constant - self.spring * float(self.push @ self.q)
+        force = self.push * outside
+        return float(
+            safe_flight(gap, self.model.traces, self.model.omega, self.q, self.v, force, horizon)
+        )
+
+    def unguided(self, time: float) -> bool:
+        """Tell whether the shaft surely stays clear of its guide for so long."""
+        if self.guide is None:
+            return True
+        if np.any(self.guide_force):
+            return False
+        elastic = self.model.omega > 0
+        swing = np.zeros(self.model.mode_count)
+        swing[elastic] = np.hypot(
+            self.q[elastic], self.v[elastic] / self.model.omega[elastic]
+        ) + np.abs(self.q[elastic])
+        rigid = np.where(elastic, 0.0, self.v)
+        position = self.guide.offset + self.guide.traces @ self.q
+        reach = np.linalg.norm(self.guide.traces @ rigid, axis=1) * time
+        reach = reach + np.linalg.norm(np.abs(self.guide.traces) @ swing, axis=1)
+        return bool(np.all(np.linalg.norm(position, axis=1) + reach < self.guide.clearance))
+
+    def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
+        """Fine steps through one impact, or to the end of the run."""
+        segment = _Segment(self)
+        self.books[5] = -1.0
+        status = 0
+        while self.time < duration * (1.0 - 1e-9) and status != OPEN:
+            steps = min(_CHUNK, ceil((duration - self.time) / self.step * (1.0 - 1e-9)))
+            status = self.fine(segment, steps, wait)
+            if progress is not None:
+                progress(min(self.time / duration, 1.0))
+            touched = self.books[7] > segment.contact_steps
+            if wait and not touched and self.safe(self.gap0, self.step * 1e3) > _FAR * self.step:
+                return  # it went by
+        if self.books[7] > segment.contact_steps or not wait:
+            self.check_rim()
+            self.segments.append(self.close(segment))
+
+    def fine(self, segment: _Segment, steps: int, wait: int) -> int:
+        out = self.march(
+            self.stepper(0), steps, wait, self.model.traces, self.gap0, self.A, self.points
+        )
+        taken, status, force, gap, drift, outside, point_force = out
+        if status == FAILED:
+            raise ConvergenceError(
+                f"interface level: no contact forces found at {1e6 * self.time:.4g} us.\n"
+                "Try: a shorter step, or fewer kept modes."
+            )
+        segment.parts.append((force[:taken], gap[:taken], outside[:taken]))
+        segment.drift.extend(drift[:taken])
+        if self.points:
+            segment.point_force.append(point_force[:taken])
+        self.time += taken * self.step
+        self.steps += taken
+        self.keep_motion()
+        if self.books[7] > segment.contact_steps:
+            way = np.concatenate([[0.0], np.cumsum(drift[:taken, 0]) * self.step])
+            end = float(self.push @ self.q)
+            path = end - way[-1] + way
+            if self.touched_at is None:
+                closed = np.flatnonzero(force[:taken] > 0)
+                self.touched_at = float(path[closed[0]]) if len(closed) else path[0]
+            self.lowest = min(self.lowest, float(path.min()))
+        return status
+
+    def march(  # type: ignore[no-untyped-def]
+        self,
+        stepper: _Stepper,
+        steps: int,
+        wait: int,
+        traces: NDArray[np.float64],
+        gap0: NDArray[np.float64],
+        A: NDArray[np.float64],
+        points: bool = False,
+    ):
+        model, n = self.model, len(gap0)
+        outside, force, gap = np.zeros((3, steps))
+        drift = np.zeros((steps, len(model.bodies)))
+        point_force = np.zeros((steps if points else 0, n), dtype=np.float32)
+        taken, status = march(
+            steps,
+            wait,
+            stepper.step,
+            A,
+            traces,
+            gap0,
+            model.axial[:n],
+            model.drift,
+            stepper.propagator,
+            stepper.loss,
+            self.push,
+            self.constant,
+            self.spring,
+            *self.guide_arrays,
+            _SLIP_SPEED,
+            self.q,
+            self.v,
+            self.lam[:n],
+            self.active[:n],
+            self.index,
+            self.B,
+            self.counts,
+            self.guide_force,
+            self.books,
+            self.carried,
+            force,
+            gap,
+            drift,
+            outside,
+            point_force,
+        )
+        return taken, status, force, gap, drift, outside, point_force
+
+    # ------------------------------------------------------------------ records
+
+    def keep_motion(self) -> None:
+        position, velocity = self.rigid_state()
+        if not np.all(np.isfinite(position)):
+            raise ConvergenceError(
+                f"interface level: the motion is not finite at {1e6 * self.time:.4g} us.\n"
+                "Try: a shorter step."
+            )
+        self.motion.append((self.time, position, velocity))
+
+    def contact_energy(self) -> float:
+        return float(-0.5 * self.lam @ (self.gap0 + self.model.traces @ self.q))
+
+    def spring_energy(self) -> float:
+        return float(0.5 * self.spring * (self.push @ self.q) ** 2)
+
+    def energy(self) -> float:
+        modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
+        return float(modal) + self.contact_energy() + self.spring_energy() + float(self.books[8])
+
+    def ledger_start(self) -> tuple[float, float, NDArray[np.float64]]:
+        modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
+        return float(modal), self.spring_energy(), self.books.copy()
+
+    def body_energies(self) -> tuple[BodyEnergy, ...]:
+        model, entries = self.model, []
+        kinetic, strain = 0.5 * self.v**2, 0.5 * (model.omega * self.q) ** 2
+        for number, name in enumerate(model.bodies):
+            own = model.owner == number
+            elastic = own & (model.omega > 0)
+            mass = model.masses[number]
+            drift = float(model.drift[number] @ self.v)
+            translation = 0.5 * mass * drift**2 if np.isfinite(mass) else 0.0
+            entries.append(
+                BodyEnergy(
+                    name=name,
+                    translation=translation,
+                    vibration=float(np.sum(kinetic[own]) + np.sum(strain[own])) - translation,
+                    strain=float(np.sum(strain[own])),
+                    frequency=model.omega[elastic] / (2.0 * np.pi),
+                    modal=kinetic[elastic] + strain[elastic],
+                )
+            )
+        return tuple(entries)
+
+    def close(self, segment: _Segment) -> ImpactSegment:
+        model = self.model
+        force, gap, outside = (np.concatenate(part) for part in zip(*segment.parts, strict=True))
+        drift = np.array(segment.drift)
+        points = np.zeros((0, model.count), dtype=np.float32)
+        if self.points:
+            points = np.concatenate(segment.point_force)
+        initial, spring, books = segment.ledger
+        spent = self.books - books
+        own = segment.velocity[2] - drift[0, 1] if drift.shape[1] > 1 else segment.velocity[2]
+        history = ImpactHistory(
+            step=self.step,
+            start=segment.time,
+            force=np.abs(force),
+            gap=gap,
+            velocity_a=drift[:, 0],
+            velocity_b=drift[:, 1] if drift.shape[1] > 1 else np.zeros(len(drift)),
+            speed=abs(float(own)),
+            mass_a=model.masses[0],
+            mass_b=model.masses[1] if len(model.masses) > 1 else np.inf,
+            ledger=EnergyLedger(
+                initial=initial,
+                bodies=self.body_energies(),
+                contact=self.contact_energy(),
+                contact_dissipation=float(spent[2]),
+                damping=float(spent[0]),
+                work=float(spent[1]),
+                spring=self.spring_energy() - spring + float(spent[8]),
+            ),
+            external_force=outside,
+            longest_period=model.longest_period,
+            solver=f"interface level, {model.mode_count} modal coordinates, "
+            f"{model.count} contact points",
+        )
+        return ImpactSegment(
+            contact=self.busiest(force),
+            history=history,
+            point_force=points,
+            position=segment.position,
+            velocity=segment.velocity,
+        )
+
+    def busiest(self, force: NDArray[np.float64]) -> str:
+        """Name of the contact that carried: the sign of the axial force tells which side."""
+        up = float(np.sum(force)) >= 0.0
+        for name, first, last in self.model.contacts:
+            if (float(np.mean(self.model.axial[first:last])) >= 0.0) == up:
+                return name
+        return self.model.contacts[0][0]
+
+    def check_rim(self) -> None:
+        """Refuse a contact that has grown to the border of the candidate points."""
+        at_rim = self.carried & self.model.rim
+        if not np.any(at_rim):
+            return
+        travel = _RIM_RESERVE * abs(self.start_lift - min(self.lowest, self.start_lift))
+        if np.all(travel * np.abs(self.model.axial[at_rim]) < self.model.beyond[at_rim]):
+            return
+        at = ", ".join(f"{x * 1e3:.4g}" for x in self.model.points[np.argmax(at_rim)])
+        raise InputError(
+            "interface level: contact",
+            got=f"a contact point at the rim of the candidates, at ({at}) mm, that carried",
+            expected="contact only inside of the candidates",
+            hint="enlarge contact.reach, or make eccentricity and tilt smaller.",
+        )
+
+    def result(self, wall_time: float) -> InterfaceResult:
+        times, positions, velocities = zip(*self.motion, strict=True)
+        contact_steps = int(self.books[7])
+        approach = 0.0
+        if self.touched_at is not None:
+            approach = max(0.0, self.touched_at - self.lowest)
+        return InterfaceResult(
+            impacts=tuple(self.segments),
+            motion=RigidMotion(
+                time=np.array(times),
+                position=np.array(positions),
+                velocity=np.array(velocities),
+            ),
+            energy=InterfaceEnergy(
+                initial=self.start_energy,
+                final=self.energy(),
+                damping=float(self.books[0]),
+                guide=float(self.books[2]),
+                work=float(self.books[1]),
+                debt=float(self.books[3]),
+            ),
+            steps=self.steps,
+            steps_in_contact=contact_steps,
+            rounds_per_step=float(self.books[6]) / max(contact_steps, 1),
+            approach=approach,
+            wall_time=wall_time,
+        )
+
+
+_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
+"""A millimetre of translation weighs like a radian over a metre: lengths of valves."""
+
+
+def _guide_arrays(guide: Guide | None, modes: int) -> tuple[NDArray[np.float64], ...]:
+    if guide is None:
+        none = np.zeros(0)
+        return (
+            np.zeros((0, 2, modes)),
+            np.zeros((0, modes)),
+            np.zeros((0, 2)),
+            none,
+            np.zeros((0, 2, 2)),
+            none,
+            none,
+        )
+    return (
+        np.ascontiguousarray(guide.traces),
+        np.ascontiguousarray(guide.slide),
+        np.ascontiguousarray(guide.offset),
+        guide.clearance,
+        np.ascontiguousarray(guide.compliance),
+        guide.friction,
+        guide.viscous,
+    )
