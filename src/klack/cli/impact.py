@@ -24,6 +24,13 @@ def impact(
     *,
     level: Levels = None,
     report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    certify: Annotated[
+        bool,
+        Parameter(
+            help="Estimate the error of reduced levels by one run at the interface level, with "
+            "twice as many modes."
+        ),
+    ] = True,
     out: Out = None,
     json: Json = None,
     threads: Threads = None,
@@ -32,7 +39,16 @@ def impact(
     """Compute one impact; several levels are compared with each other."""
     # both "--level a,b" and "--level a --level b"
     levels = [name for item in level or () for name in item.split(",") if name]
-    run_case(case, levels, report=report, out=out, json=json, threads=threads, quiet=quiet)
+    run_case(
+        case,
+        levels,
+        report=report,
+        certify=certify,
+        out=out,
+        json=json,
+        threads=threads,
+        quiet=quiet,
+    )
     return 0
 
 
@@ -41,6 +57,7 @@ def run_case(
     level: list[str],
     *,
     report: bool,
+    certify: bool = True,
     out: Path | None,
     json: Path | None,
     threads: int | None,
@@ -61,7 +78,9 @@ def run_case(
     from klack.workflow.summary import study_to_json
 
     with show_progress(quiet) as progress:
-        study = run_impact(checked, levels=levels, progress=progress, threads=threads)
+        study = run_impact(
+            checked, levels=levels, certify=certify, progress=progress, threads=threads
+        )
         failure = write_result(study, folder, save_study, report=report, progress=progress)
     if not quiet:
         made = report and failure is None
@@ -74,10 +93,12 @@ def run_case(
 
 
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.summary import SUMMARY_COLUMNS, summary_rows
+    from klack.workflow.summary import SUMMARY_COLUMNS, estimate_lines, summary_rows
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
+    for line in estimate_lines(study):
+        print(line, file=stream)
     for warning in study.warnings:
         print(f"Note: {warning}", file=stream)
     made = ["result.zarr", *(REPORTS if report else ())]

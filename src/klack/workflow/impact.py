@@ -20,6 +20,13 @@ from klack.reduction.reduce import Correction
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
 from klack.workflow.body_summary import summarise_body
+from klack.workflow.interface_level import (
+    build_guide,
+    build_interface,
+    certificate_modes,
+    run_interface,
+    simulate_case,
+)
 from klack.workflow.levels import (
     PARTICIPATION_POOL,
     ReducedPair,
@@ -67,6 +74,7 @@ def run_impact(
     case: Case,
     *,
     levels: Sequence[str],
+    certify: bool = True,
     progress: Progress = silent,
     threads: int | None = None,
 ) -> ImpactStudy:
@@ -77,6 +85,8 @@ def run_impact(
     case : Case
     levels : sequence of str
         Among :data:`klack.case.schema.LEVELS`.
+    certify : bool
+        Estimate the error of reduced levels by one interface-level run with twice as many modes.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -97,6 +107,9 @@ def run_impact(
             needed.append(TRANSFER_MODES)
         if "reduced-participation" in wanted:
             needed.append(PARTICIPATION_POOL)
+        reduced = [level for level in wanted if level.startswith("reduced")]
+        if certify and reduced:
+            needed.append(certificate_modes(case))
         pools = mode_pools(problem, at_least=max(needed), progress=clock)
         clock("reduced", 0.0)
         preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
@@ -109,10 +122,13 @@ def run_impact(
         for level in wanted:
             if level == "lumped":
                 results[level] = run_lumped(problem)
-            elif level != "full":
+            elif level.startswith("reduced"):
                 pair = own if level == "reduced" else _variant(level, problem, pools)
                 results[level] = _run_variant(case, level, pair, setup_time=clock.spent(_SET_UP))
         clock("reduced", 1.0)
+        if "interface" in wanted:
+            results["interface"] = _run_interface(problem, pools, own, clock)
+        estimates, basis = _certificate(problem, pools, results if certify else {}, clock)
         transfer: tuple[TransferComparison, ...] = ()
         if case.run.transfer is not None:
             transfer = compare_transfer(problem, pools, own.ports, progress=clock)
@@ -123,7 +139,8 @@ def run_impact(
             results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
             sections = _sections(problem, run)
     # the best of what was run; the lumped model is nobody's reference
-    reference = next((name for name in ("full", "reduced") if name in results), next(iter(results)))
+    best = (name for name in ("full", "interface", "reduced") if name in results)
+    reference = next(best, next(iter(results)))
     return ImpactStudy(
         case=case.name,
         title=case.title,
@@ -145,6 +162,8 @@ def run_impact(
         transfer=transfer,
         sections=sections,
         warnings=tuple(notes),
+        estimates=estimates,
+        estimate_basis=basis,
     )
 
 
@@ -157,6 +176,38 @@ def _require_time_to_touch(case: Case) -> None:
             expected="a time that holds the impact",
             hint="enlarge run.duration or make contact.gap smaller.",
         )
+
+
+def _run_interface(
+    problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair, clock: StageClock
+) -> LevelResult:
+    clock("interface", 0.0)
+    model = build_interface(problem, pools, ports=own.ports)
+    guide = build_guide(problem, model, pools, ports=own.ports)
+    setup = clock.spent((*_SET_UP[:-1], "interface"))
+    result = run_interface(problem, model, guide, setup_time=setup)
+    clock("interface", 1.0)
+    return result
+
+
+def _certificate(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    results: Mapping[str, LevelResult],
+    clock: StageClock,
+) -> tuple[dict[str, Deviation], str]:
+    """Deviation of every reduced level from one interface-level run, and what that was."""
+    reduced = [name for name in results if name.startswith("reduced")]
+    if not reduced:
+        return {}, ""
+    clock("estimate of the error", 0.0)
+    model = build_interface(problem, pools, count=certificate_modes(problem.case))
+    history = simulate_case(problem.case, model).history
+    elastic = model.omega > 0
+    counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
+    clock("estimate of the error", 1.0)
+    basis = f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points"
+    return {name: compare_histories(history, results[name].history) for name in reduced}, basis
 
 
 def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) -> ReducedPair:

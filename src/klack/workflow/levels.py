@@ -41,9 +41,10 @@ from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
+from klack.workflow.pressure import pressure_record
 from klack.workflow.problem import ContactProblem
 from klack.workflow.progress import Progress
-from klack.workflow.study import LevelResult, ModalEnergy
+from klack.workflow.study import LevelResult, ModalEnergy, PressureRecord
 
 __all__ = [
     "PARTICIPATION_POOL",
@@ -53,6 +54,7 @@ __all__ = [
     "damping_of",
     "elastic_count",
     "first_stiffness",
+    "level_result",
     "mode_pool",
     "mode_pools",
     "own_pair",
@@ -299,7 +301,7 @@ def run_reduced(
     begin = perf_counter()
     history = _simulate(case, pair)
     wall_time = perf_counter() - begin
-    return _level(
+    return level_result(
         history,
         level=level,
         label=label,
@@ -366,7 +368,7 @@ def run_lumped(problem: ContactProblem) -> LevelResult:
         law = HuntCrossley(LinearLaw(case.lumped.stiffness), alpha / case.motion.speed)
     begin = perf_counter()
     history = _simulate_bodies(case, bodies[0], bodies[1], law)
-    return _level(
+    return level_result(
         history,
         level="lumped",
         label=f"lumped: rigid masses, {case.lumped.stiffness / 1e6:.4g} N/um",
@@ -413,7 +415,7 @@ def run_full(
         ),
     )
     statistics = result.statistics
-    level = _level(
+    level = level_result(
         history,
         level="full",
         label=f"full order, {statistics.degrees_of_freedom} degrees of freedom",
@@ -421,6 +423,9 @@ def run_full(
         step=case.run.full_step,
         wall_time=statistics.loop_time,
         setup_time=statistics.set_up_time,
+        pressure=pressure_record(
+            history, result.point_force, problem.space.points, problem.space.area
+        ),
     )
     return level, result
 
@@ -443,7 +448,7 @@ def _with_modes(
     )
 
 
-def _level(
+def level_result(
     history: ImpactHistory,
     *,
     level: str,
@@ -452,7 +457,9 @@ def _level(
     step: float,
     wall_time: float,
     setup_time: float,
+    pressure: PressureRecord | None = None,
 ) -> LevelResult:
+    """Measures and energies of one computed impact."""
     ledger = history.ledger
     return LevelResult(
         level=level,
@@ -471,6 +478,7 @@ def _level(
             for body in ledger.bodies
             if len(body.modal)
         ),
+        pressure=pressure,
     )
 
 

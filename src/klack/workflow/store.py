@@ -28,6 +28,7 @@ _UNITS = {
     "energy": "J",
     "modal": "J",
     "points": "m",
+    "point_force": "N",
     "displacement": "m",
     "magnitude": "m",
     "share": "1",

@@ -21,6 +21,7 @@ __all__ = [
     "LawSummary",
     "LevelResult",
     "ModalEnergy",
+    "PressureRecord",
     "SectionPicture",
 ]
 
@@ -121,6 +122,27 @@ class ModalEnergy:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class PressureRecord:
+    """Forces of all contact points during the first impact.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Middle of each recorded step.
+    points : array, shape (nc, dimension) [m]
+        Where the contact points are.
+    area : array, shape (nc,) [m^2]
+        The pressure of a point is its force over its area.
+    point_force : float32 array, shape (n, nc) [N]
+    """
+
+    time: NDArray[np.float64]
+    points: NDArray[np.float64]
+    area: NDArray[np.float64]
+    point_force: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LevelResult:
     """One computed impact.
 
@@ -128,7 +150,7 @@ class LevelResult:
     ----------
     level : str
         ``lumped``, ``reduced``, ``reduced-attachment``, ``reduced-none``,
-        ``reduced-participation`` or ``full``.
+        ``reduced-participation``, ``interface`` or ``full``.
     label : str
         What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
     degrees_of_freedom, steps : int
@@ -143,6 +165,8 @@ class LevelResult:
     energy_residual : float [-]
         Ledger residual over the initial kinetic energy.
     modal_energy : tuple of ModalEnergy
+    pressure : PressureRecord or None
+        Of levels that resolve the contact point by point.
     """
 
     level: str
@@ -157,6 +181,7 @@ class LevelResult:
     energies: Mapping[str, float]
     energy_residual: float
     modal_energy: tuple[ModalEnergy, ...] = ()
+    pressure: PressureRecord | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,6 +234,10 @@ class ImpactStudy:
     reference : str
         Level that the deviations refer to (``"full"`` when it was run).
     deviations : mapping of level to Deviation
+    estimates : mapping of level to Deviation
+        Estimated error of reduced levels: their deviation from one interface-level run.
+    estimate_basis : str
+        What that run was, in words; empty without one.
     transfer : tuple of TransferComparison
     sections : tuple of SectionPicture
     warnings : tuple of str
@@ -234,6 +263,8 @@ class ImpactStudy:
     transfer: tuple[TransferComparison, ...] = ()
     sections: tuple[SectionPicture, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    estimates: Mapping[str, Deviation] = field(default_factory=dict)
+    estimate_basis: str = ""
 
     @property
     def ordered(self) -> tuple[LevelResult, ...]:

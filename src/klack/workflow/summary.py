@@ -5,7 +5,7 @@ from typing import Any
 from klack.contact.restitution import Deviation
 from klack.workflow.study import ImpactStudy, LevelResult
 
-__all__ = ["SUMMARY_COLUMNS", "study_to_json", "summary_rows"]
+__all__ = ["SUMMARY_COLUMNS", "estimate_lines", "study_to_json", "summary_rows"]
 
 SUMMARY_COLUMNS = (
     "level",
@@ -27,7 +27,8 @@ def study_to_json(study: ImpactStudy) -> dict[str, Any]:
     dict
         ``case``; ``levels``: per level the numbers of the impact; ``deviation``: of ``reduced``
         against the reference, None when there is nothing to compare; ``deviations``: of every level
-        that is not the reference.  Numbers that do not exist (nan) are None.
+        that is not the reference; ``estimated_error``: of every reduced level, by an
+        interface-level run.  Numbers that do not exist (nan) are None.
     """
     deviations = {name: _deviation(item) for name, item in study.deviations.items()}
     return {
@@ -35,7 +36,31 @@ def study_to_json(study: ImpactStudy) -> dict[str, Any]:
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
         "deviations": deviations,
+        "estimated_error": {name: _deviation(item) for name, item in study.estimates.items()},
     }
+
+
+def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
+    """Say how good every reduced level is, one line each."""
+    return tuple(
+        f"Estimated error of '{name}': peak force {_percent(item.peak_force)}, contact time "
+        f"{_percent(item.contact_time)}, impulse {_percent(item.impulse)}, restitution "
+        f"{_signed(item.restitution, 4)} (against the {study.estimate_basis})."
+        for name, item in study.estimates.items()
+    )
+
+
+def _percent(value: float) -> str:
+    """Two significant digits, but nothing below a hundredth of a per cent."""
+    if not abs(value) < float("inf"):
+        return "unknown"
+    size = abs(100.0 * value)
+    digits = 2 if size < 1.0 else 1 if size < 10.0 else 0
+    return _signed(100.0 * value, digits) + " %"
+
+
+def _signed(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}" if abs(value) < float("inf") else "unknown"
 
 
 def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:

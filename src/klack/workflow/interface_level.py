@@ -1,0 +1,211 @@
+"""The interface level of a case: both bodies as modes, the contact point by point."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.schema import Case
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.reduction.ports import Port
+from klack.reduction.selection import ByCount, ModeSelection, select
+from klack.transient.guide import Guide, guide_of_shaft
+from klack.transient.interface_model import (
+    InterfaceBody,
+    InterfaceContact,
+    InterfaceModel,
+    interface_model,
+)
+from klack.transient.interface_result import InterfaceResult
+from klack.transient.interface_run import simulate_interface
+from klack.workflow.levels import damping_of, level_result, selection_of
+from klack.workflow.pressure import pressure_record
+from klack.workflow.problem import ContactProblem
+from klack.workflow.study import LevelResult
+
+__all__ = [
+    "CONTACT",
+    "build_guide",
+    "build_interface",
+    "certificate_modes",
+    "run_interface",
+    "simulate_case",
+]
+
+CONTACT = "contact"
+"""Name of the only contact of a case of two bodies."""
+
+_FEWEST = 30
+_RICHER = 2.0
+_MOST_RECORDS = 30_000_000
+
+
+def certificate_modes(case: Case) -> int:
+    """Modes of each body that the estimate of the error takes: twice those kept, 30 or more."""
+    kept = [_FEWEST / _RICHER]
+    for body in case.bodies:
+        choice = selection_of(case.reduction.choice(body))
+        if isinstance(choice, ByCount):
+            kept.append(choice.count)
+    return round(_RICHER * max(kept))
+
+
+def build_interface(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+) -> InterfaceModel:
+    """Interface-level model of a case.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        With its factorisations still there.
+    pools : mapping of body name to Modes
+    ports : pair of Port, optional
+        Contact ports of both bodies: needed when modes are chosen by participation.
+    count : int, optional
+        Take so many modes of each body, as far as the pool goes, instead of those of the case.
+    """
+    bodies = [
+        InterfaceBody(
+            body=body,
+            flexibility=flexibility,
+            modes=(modes := _kept(problem, body, pools[body.name], ports, count)),
+            damping=damping_of(problem.case.bodies[body.name].damping).ratios(modes.omega),
+        )
+        for body, flexibility in _sides(problem)
+    ]
+    contact = InterfaceContact(
+        name=CONTACT,
+        upper=problem.pair.upper.name,
+        lower=problem.pair.lower.name,
+        space=problem.space,
+        compliance=problem.static.compliance,
+    )
+    return interface_model(bodies, [contact])
+
+
+def _sides(problem: ContactProblem) -> tuple[tuple[ElasticBody, Flexibility], ...]:
+    return (
+        (problem.pair.upper, problem.flexibility_upper),
+        (problem.pair.lower, problem.flexibility_lower),
+    )
+
+
+def _kept(
+    problem: ContactProblem,
+    body: ElasticBody,
+    pool: Modes,
+    ports: tuple[Port, Port] | None,
+    count: int | None,
+) -> Modes:
+    choice: ModeSelection = selection_of(problem.case.reduction.choice(body.name))
+    if count is not None:
+        choice = ByCount(min(count, len(pool.omega)))
+    load = _load(problem, body, ports)
+    chosen = select(choice, pool.omega, pool.shapes.T @ load)
+    return Modes(pool.omega[chosen], pool.shapes[:, chosen])
+
+
+def _load(
+    problem: ContactProblem, body: ElasticBody, ports: tuple[Port, Port] | None
+) -> NDArray[np.float64]:
+    """Load pattern of a contact port, shape (n_dof, 1)."""
+    side = 0 if body.name == problem.pair.upper.name else 1
+    if ports is not None:
+        return ports[side].pattern[:, None]
+    return problem.static.load_patterns(0.7 * problem.static.max_force)[side][:, None]
+
+
+def build_guide(
+    problem: ContactProblem,
+    model: InterfaceModel,
+    pools: Mapping[str, Modes],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+) -> Guide | None:
+    """Guide of a case for its interface model, None without one.
+
+    Parameters
+    ----------
+    problem, pools, ports, count
+        As given to :func:`build_interface`.
+    model : InterfaceModel
+        What that returned.
+    """
+    asked: CaseGuide | None = problem.case.guide
+    if asked is None:
+        return None
+    body = problem.pair.upper
+    modes = _kept(problem, body, pools[body.name], ports, count)
+    law = asked.law
+    return guide_of_shaft(
+        model,
+        body,
+        np.hstack([body.rigid_modes, modes.shapes]),
+        problem.flexibility_upper,
+        surface=asked.surface,
+        heights=[height + problem.pair.shift for height in asked.heights],
+        clearance=asked.clearance,
+        stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
+        consistent=not isinstance(law, LinearGuideLaw),
+        friction=asked.friction,
+        viscous=asked.viscous,
+    )
+
+
+def simulate_case(
+    case: Case, model: InterfaceModel, guide: Guide | None = None, *, step: float | None = None
+) -> InterfaceResult:
+    """Run the motion of a case once, without jumps."""
+    spring = case.motion.spring
+    gap = case.contact.gap or 0.0
+    step = case.run.interface_step if step is None else step
+    force = case.motion.force
+    if spring is not None:  # the preload is the force at first touch, a gap below the start
+        force += spring.preload - spring.stiffness * gap
+    return simulate_interface(
+        model,
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=step,
+        force=force,
+        spring_stiffness=0.0 if spring is None else spring.stiffness,
+        guide=guide,
+        points=model.count * case.run.duration / step <= _MOST_RECORDS,
+    )
+
+
+def run_interface(
+    problem: ContactProblem,
+    model: InterfaceModel,
+    guide: Guide | None,
+    *,
+    setup_time: float,
+) -> LevelResult:
+    """One impact at the interface level."""
+    case = problem.case
+    simulate_case(case, model, guide, step=case.run.duration / 20)  # compiles
+    result = simulate_case(case, model, guide)
+    elastic = model.omega > 0
+    counts = [int(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
+    guided = "" if guide is None else ", guided"
+    return level_result(
+        result.history,
+        level="interface",
+        label=f"interface, {counts[0]} + {counts[1]} modes, {model.count} contact points{guided}",
+        dofs=model.mode_count,
+        step=case.run.interface_step,
+        wall_time=result.wall_time,
+        setup_time=setup_time,
+        pressure=pressure_record(
+            result.history, result.impacts[0].point_force, model.points, model.area
+        ),
+    )
