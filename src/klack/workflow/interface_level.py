@@ -11,7 +11,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.reduction.ports import Port
-from klack.reduction.selection import ByCount, ModeSelection, select
+from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.transient.guide import Guide, guide_of_shaft
 from klack.transient.interface_model import (
     InterfaceBody,
@@ -44,12 +44,17 @@ _MOST_RECORDS = 30_000_000
 
 
 def certificate_modes(case: Case) -> int:
-    """Modes of each body that the estimate of the error takes: twice those kept, 30 or more."""
+    """Modes of each body that the estimate of the error takes: twice those kept, or their pool.
+
+    Thirty at least.
+    """
     kept = [_FEWEST / _RICHER]
     for body in case.bodies:
         choice = selection_of(case.reduction.choice(body))
         if isinstance(choice, ByCount):
             kept.append(choice.count)
+        elif isinstance(choice, ByParticipation):
+            kept.append(choice.pool / _RICHER)
     return round(_RICHER * max(kept))
 
 

@@ -15,6 +15,7 @@ from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.reduction.transfer import TransferComparison
 
 __all__ = [
+    "SETTLED",
     "BodySummary",
     "ContactSummary",
     "ImpactStudy",
@@ -24,6 +25,10 @@ __all__ = [
     "PressureRecord",
     "SectionPicture",
 ]
+
+
+SETTLED = 0.02
+"""Largest spread of the force history [-] of a run that others may be measured by."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -238,6 +243,9 @@ class ImpactStudy:
         Estimated error of reduced levels: their deviation from one interface-level run.
     estimate_basis : str
         What that run was, in words; empty without one.
+    estimate_spread : float [-]
+        Difference of its force history (as ``history_l2``) from a run with half as many modes.
+        Above :data:`SETTLED` the run is no reference, and the estimates say little.
     transfer : tuple of TransferComparison
     sections : tuple of SectionPicture
     warnings : tuple of str
@@ -265,6 +273,12 @@ class ImpactStudy:
     warnings: tuple[str, ...] = field(default=())
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     estimate_basis: str = ""
+    estimate_spread: float = 0.0
+
+    @property
+    def estimates_settled(self) -> bool:
+        """Tell whether the estimates can be trusted."""
+        return self.estimate_spread <= SETTLED
 
     @property
     def ordered(self) -> tuple[LevelResult, ...]:

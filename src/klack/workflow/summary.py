@@ -28,7 +28,8 @@ def study_to_json(study: ImpactStudy) -> dict[str, Any]:
         ``case``; ``levels``: per level the numbers of the impact; ``deviation``: of ``reduced``
         against the reference, None when there is nothing to compare; ``deviations``: of every level
         that is not the reference; ``estimated_error``: of every reduced level, by an
-        interface-level run.  Numbers that do not exist (nan) are None.
+        interface-level run, None where that is no reference.  Numbers that do not exist (nan) are
+        None.
     """
     deviations = {name: _deviation(item) for name, item in study.deviations.items()}
     return {
@@ -36,12 +37,21 @@ def study_to_json(study: ImpactStudy) -> dict[str, Any]:
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
         "deviations": deviations,
-        "estimated_error": {name: _deviation(item) for name, item in study.estimates.items()},
+        "estimated_error": {
+            name: _deviation(item) if study.estimates_settled else None
+            for name, item in study.estimates.items()
+        },
     }
 
 
 def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
     """Say how good every reduced level is, one line each."""
+    if study.estimates and not study.estimates_settled:
+        return (
+            "No estimate of the error: the interface level itself has not settled (its force "
+            f"history changes by {100 * study.estimate_spread:.0f} % when the modes are doubled), "
+            "as when flat faces meet all at once. Compare with --level full.",
+        )
     return tuple(
         f"Estimated error of '{name}': peak force {_percent(item.peak_force)}, contact time "
         f"{_percent(item.contact_time)}, impulse {_percent(item.impulse)}, restitution "
