@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from klack.contact.pairing import (
+    FaceGeometry,
     Projection,
     axial_distance,
     face_gaps,
@@ -41,7 +42,15 @@ from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import ConvergenceError, InputError
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["ContactSpace", "check_initial_gap", "contact_space", "touching_shift"]
+__all__ = [
+    "COVERED",
+    "ContactSpace",
+    "HatQuadrature",
+    "check_initial_gap",
+    "contact_space",
+    "hat_quadrature",
+    "touching_shift",
+]
 
 _POINTS_BY_COST = {2: 400, 3: 1000}
 """Number of contact points that an automatic reach aims at, by dimension."""
@@ -49,7 +58,7 @@ _POINTS_BY_COST = {2: 400, 3: 1000}
 _LOWEST = 32
 """Hats that tell how much the mean gap over a hat exceeds the gap at its node."""
 
-_COVERED = 0.05
+COVERED = 0.05
 """Least share of a hat's area that has to face the master."""
 
 
@@ -369,14 +378,11 @@ def _integrate(
     other_surface: Surface,
 ) -> None:
     """Add the integrals of one piece of every face."""
-    at = face_geometry(mesh.points, faces, piece.xi)
+    at, hats, share = _shares(mesh, faces, piece)
     f, q, d = at.position.shape
-    weight = at.stretch * piece.weight  # dA
     met = project_to_surface(
         at.position.reshape(f * q, d), at.normal.reshape(f * q, d), other_mesh, other_surface
     )
-    hats = faces.connectivity[:, piece.nodes]
-    share = weight[:, :, None] * piece.hats  # psi_k dA, (f, q, hats)
     np.add.at(sums.full, hats, share.sum(axis=1))
     share = np.where(met.met.reshape(f, q, 1), share, 0.0)
     np.add.at(sums.covered, hats, share.sum(axis=1))
@@ -395,6 +401,60 @@ def _integrate(
     rows = np.repeat(hats, q, axis=0)
     flat = share.reshape(f * q, -1)
     _integrate_master(sums, rows, flat, normal, met, other_surface)
+
+
+def _shares(
+    mesh: Mesh, faces: FaceBlock, piece: _Piece
+) -> tuple[FaceGeometry, NDArray[np.int64], NDArray[np.float64]]:
+    """Integration points of one piece of every face, its hats (f, hats), psi_k dA (f, q, hats)."""
+    at = face_geometry(mesh.points, faces, piece.xi)
+    weight = at.stretch * piece.weight  # dA
+    return at, faces.connectivity[:, piece.nodes], weight[:, :, None] * piece.hats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HatQuadrature:
+    r"""Integration points of all hats of a contact space, on the slave side.
+
+    .. math:: A_k = \sum_p W_{kp}, \qquad g_k = \frac{1}{A_k} \sum_p W_{kp}\, g_p
+
+    if every point meets the master; points that meet nothing are left out of both sums.
+
+    Parameters
+    ----------
+    position, normal : array, shape (p, d) [m], [-]
+        Points of the slave faces and their outward normals.
+    weight : sparse array, shape (nc, p) [m^2]
+        Hat times area, W.
+    """
+
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    weight: csr_array
+
+
+def hat_quadrature(space: ContactSpace, mesh: Mesh, surface: Surface) -> HatQuadrature:
+    """Integration points of the hats of ``space``; mesh and surface are those of its slave side."""
+    number = np.full(mesh.node_count, -1)
+    number[space.nodes] = np.arange(space.count)
+    positions, normals, entries, count = [], [], [], 0
+    for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
+        for piece in _pieces(block.family):
+            at, hats, share = _shares(mesh, block, piece)
+            f, q, d = at.position.shape
+            positions.append(at.position.reshape(f * q, d))
+            normals.append(at.normal.reshape(f * q, d))
+            column = (count + np.arange(f * q)).reshape(f, q, 1)
+            row, column, _ = np.broadcast_arrays(number[hats][:, None], column, share)
+            kept = row >= 0
+            entries.append((row[kept], column[kept], share[kept]))
+            count += f * q
+    row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return HatQuadrature(
+        position=np.concatenate(positions),
+        normal=np.concatenate(normals),
+        weight=coo_array((value, (row, column)), shape=(space.count, count)).tocsr(),
+    )
 
 
 def _integrate_master(
@@ -439,7 +499,7 @@ def _assemble(
     """Choose the hats and divide their sums by their areas."""
     mesh, surface = sides[slave]
     full = np.where(sums.full > 0, sums.full, 1.0)
-    facing = sums.covered > _COVERED * full
+    facing = sums.covered > COVERED * full
     gap = sums.gap / np.where(facing, sums.covered, 1.0)
     inside = np.zeros(mesh.node_count, dtype=bool)
     inside[inner] = True

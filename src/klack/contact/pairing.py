@@ -7,35 +7,40 @@ From a point of the slave surface a straight line along the outward normal **n**
 
 by Newton's method in :math:`(\xi, g)`.  Straight facets instead of the curved faces would leave
 wrong gaps of micrometres between surfaces that do not match, and a negative wrong gap is a source
-of energy.  Every master face whose bounding ball the line meets is tried; among several cuts with
+of energy.  Every master face whose bounding box the line meets is tried; among several cuts with
 opposed normals the nearest counts.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.ray_cutting import cut_nearest, face_polynomials
+from klack.contact.ray_cutting import cut_nearest, face_boxes, face_polynomials
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = [
+    "INSIDE",
+    "OPPOSED",
+    "CurvedFaces",
     "FaceGeometry",
     "Projection",
     "axial_distance",
+    "curved_faces",
     "face_gaps",
     "face_geometry",
     "face_thickness",
     "project_to_surface",
 ]
 
-_INSIDE = 1e-8
+INSIDE = 1e-8
 """Reference coordinate by which a cut may lie outside a face (faces share their edges)."""
 
-_OPPOSED = -0.1
+OPPOSED = -0.1
 """Largest cosine between the normals of two points that face each other."""
 
 _DEPTH = 0.1
@@ -166,27 +171,62 @@ def project_to_surface(
         Deepest penetration that counts as one; a tenth of the extent of the master surface unless
         given, since a line that starts beside a ring-shaped seat may meet its far side backwards.
     """
-    count, d = points.shape
-    block_of = np.full(count, -1, dtype=np.int64)
-    face_of = np.full(count, -1, dtype=np.int64)
-    xi_of = np.zeros((count, d - 1))
-    gap_of = np.full(count, np.nan)
-    if deepest is None:
-        deepest = _DEPTH * float(np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0)))
-    x, n = _in_space(points), _in_space(normals)
-    for number, block in enumerate(surface.blocks):
-        corner = _in_space(mesh.points[block.connectivity])
-        centre = corner.mean(axis=1)
-        # a quarter more than the nodes span, for the bulge of a curved face
-        radius = 1.25 * np.linalg.norm(corner - centre[:, None], axis=2).max(axis=1)
-        face, xi, gap = cut_nearest(
-            *(x, n, face_polynomials(mesh.points, block.family, block.connectivity)),
-            *(centre, radius, block.family.startswith("tri"), _INSIDE, _OPPOSED, deepest),
-        )
-        nearer = (face >= 0) & ~(np.abs(gap_of) <= np.abs(gap))
-        block_of[nearer], face_of[nearer] = number, face[nearer]
-        xi_of[nearer], gap_of[nearer] = xi[nearer, : d - 1], gap[nearer]
-    return Projection(block_of, face_of, xi_of, gap_of)
+    d = points.shape[1]
+    faces = curved_faces(mesh, surface)
+    face, xi, gap = cut_nearest(
+        *(_in_space(points), _in_space(normals), *faces.arrays),
+        *(INSIDE, OPPOSED, faces.deepest if deepest is None else deepest),
+    )
+    start = np.cumsum([0, *(len(block.connectivity) for block in surface.blocks)])
+    block = np.where(face >= 0, np.searchsorted(start, face, side="right") - 1, -1)
+    return Projection(block, np.where(face >= 0, face - start[block], -1), xi[:, : d - 1], gap)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurvedFaces:
+    """Faces of a master surface, ready to be cut by lines.
+
+    Parameters
+    ----------
+    coefficients : array, shape (f, 8, 3)
+        See :mod:`klack.contact.ray_cutting`; all blocks of the surface in turn.
+    centre, axes, half : array, shape (f, 3), (f, 3, 3), (f, 3) [m], [-], [m]
+        Box around each face: its middle, its directions in rows, its half widths.
+    triangle : bool array, shape (f,)
+    deepest : float [m]
+        Deepest penetration that counts as one.
+    """
+
+    coefficients: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    half: NDArray[np.float64]
+    triangle: NDArray[np.bool_]
+    deepest: float
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """All but ``deepest``, in the order in which the compiled cuts take them."""
+        return self.coefficients, self.centre, self.axes, self.half, self.triangle
+
+
+def curved_faces(mesh: Mesh, surface: Surface) -> CurvedFaces:
+    """Prepare the faces of a surface for :func:`project_to_surface` and the like."""
+    parts, kinds = [], []
+    for block in surface.blocks:
+        parts.append(face_polynomials(mesh.points, block.family, block.connectivity))
+        kinds.append(np.full(len(block.connectivity), block.family.startswith("tri")))
+    coefficients, triangle = np.concatenate(parts), np.concatenate(kinds)
+    centre, axes, half = face_boxes(coefficients, triangle)
+    extent = float(np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0)))
+    return CurvedFaces(
+        coefficients=coefficients,
+        centre=centre,
+        axes=axes,
+        half=half,
+        triangle=triangle,
+        deepest=_DEPTH * extent,
+    )
 
 
 def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:

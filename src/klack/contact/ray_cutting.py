@@ -11,10 +11,20 @@ from numpy.typing import NDArray
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.mesh.families import FAMILIES
 
-__all__ = ["MONOMIALS", "cut_nearest", "face_polynomials"]
+__all__ = [
+    "MONOMIALS",
+    "cut_face",
+    "cut_listed",
+    "cut_nearest",
+    "face_boxes",
+    "face_polynomials",
+    "list_near",
+]
 
 MONOMIALS = 8
 """1, x, y, x^2, x y, y^2, x^2 y, x y^2."""
+
+_BOX_SAMPLES = 5  # along an edge, at which a face is sampled for its box
 
 
 def face_polynomials(
@@ -32,6 +42,44 @@ def face_polynomials(
     return coefficients
 
 
+def face_boxes(
+    coefficients: NDArray[np.float64], triangle: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Box around every face: middle (f, 3), directions in rows (f, 3, 3), half widths (f, 3).
+
+    The first direction is the longest of the face, the last one its normal.  Between the samples
+    of a face that is a quadratic along each line, its extent can exceed theirs by 1/16 of the
+    bulge; the box has a tenth more than the samples span.
+    """
+    s = np.linspace(0.0, 1.0, _BOX_SAMPLES)
+    square = np.stack(np.meshgrid(2.0 * s - 1.0, 2.0 * s - 1.0), axis=-1).reshape(-1, 2)
+    corner = np.stack(np.meshgrid(s, s), axis=-1).reshape(-1, 2)
+    corner = corner[corner.sum(axis=1) <= 1.0 + 1e-12]
+    count = len(triangle)
+    centre, axes, half = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
+    for kind, xi in ((False, square), (True, corner)):
+        chosen = triangle == kind
+        if not np.any(chosen):
+            continue
+        x = np.einsum("qm,fmd->fqd", _monomials(xi), coefficients[chosen])
+        middle = x.mean(axis=1, keepdims=True)
+        _, vectors = np.linalg.eigh(np.matmul((x - middle).transpose(0, 2, 1), x - middle))
+        directions = vectors.transpose(0, 2, 1)[:, ::-1]
+        local = np.einsum("fqd,fkd->fqk", x - middle, directions)
+        low, high = local.min(axis=1), local.max(axis=1)
+        extent = (high - low) / 2.0
+        axes[chosen] = directions
+        centre[chosen] = middle[:, 0] + np.einsum("fk,fkd->fd", (low + high) / 2.0, directions)
+        half[chosen] = 1.1 * extent + 1e-3 * extent.max(axis=1, keepdims=True)
+    return centre, axes, half
+
+
+def _monomials(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of the monomials at reference points, shape (q, 8)."""
+    x, y = xi.T
+    return np.stack([np.ones_like(x), x, y, x**2, x * y, y**2, x**2 * y, x * y**2], axis=1)
+
+
 def _monomial_factors(family: str) -> NDArray[np.float64]:
     """Shape function n as sum of monomials m, shape (n, 8)."""
     flat = FAMILIES[family].dimension == 1
@@ -44,8 +92,7 @@ def _monomial_factors(family: str) -> NDArray[np.float64]:
         used = [0, 1, 2, 3, 4, 5]
     else:
         used = [0, 1, 3] if flat else list(range(MONOMIALS))
-    x, y = grid.T
-    table = np.stack([np.ones_like(x), x, y, x**2, x * y, y**2, x**2 * y, x * y**2], axis=1)
+    table = _monomials(grid)
     factors = np.zeros((count, MONOMIALS))
     factors[:, used] = np.linalg.lstsq(table[:, used], values, rcond=None)[0].T
     return np.round(4.0 * factors) / 4.0  # all are quarters
@@ -53,17 +100,17 @@ def _monomial_factors(family: str) -> NDArray[np.float64]:
 
 @numba.njit(cache=True)
 def cut_nearest(  # type: ignore[no-untyped-def]
-    points, normals, coefficients, centre, radius, triangle, inside, opposed, deepest
+    points, normals, coefficients, centre, axes, half, triangle, inside, opposed, deepest
 ):
-    """Nearest valid cut of every line.
+    """Nearest valid cut of every line with any of the faces.
 
     Parameters
     ----------
     points, normals : array, shape (p, 3)
     coefficients : array, shape (f, 8, 3)
-    centre, radius : array, shape (f, 3), (f,)
-        Ball around each face.
-    triangle : bool
+    centre, axes, half : array, shape (f, 3), (f, 3, 3), (f, 3)
+        Box around each face: its middle, its directions in rows, its half widths.
+    triangle : bool array, shape (f,)
         Reference domain: triangle, or square [-1, 1]^2.
     inside, opposed, deepest : float
         Slack of the domain, largest cosine of the normals, deepest penetration [m].
@@ -79,61 +126,156 @@ def cut_nearest(  # type: ignore[no-untyped-def]
     face = np.full(count, -1, dtype=np.int64)
     xi = np.zeros((count, 2))
     gap = np.full(count, np.nan)
-    start = 1.0 / 3.0 if triangle else 0.0
+    every = np.arange(len(coefficients))
     for p in range(count):
-        x0, x1, x2 = points[p]
-        n0, n1, n2 = normals[p]
-        best = np.inf
-        for f in range(len(coefficients)):
-            d0, d1, d2 = centre[f, 0] - x0, centre[f, 1] - x1, centre[f, 2] - x2
-            along = d0 * n0 + d1 * n1 + d2 * n2
-            r = radius[f]
-            if d0 * d0 + d1 * d1 + d2 * d2 - along * along > r * r:
-                continue
-            if along < -deepest - r or abs(along) - r > best:
-                continue
-            u, v, g, cosine, settled = _newton(
-                coefficients[f], x0, x1, x2, n0, n1, n2, start, along
-            )
-            if not settled or cosine > opposed or g < -deepest or abs(g) >= best:
-                continue
-            if triangle:
-                within = u >= -inside and v >= -inside and u + v <= 1.0 + inside
-            else:
-                within = abs(u) <= 1.0 + inside and abs(v) <= 1.0 + inside
-            if within:
-                best = abs(g)
-                face[p] = f
-                xi[p, 0], xi[p, 1] = u, v
-                gap[p] = g
+        face[p], xi[p, 0], xi[p, 1], gap[p] = _nearest_of(
+            *(every, points[p], normals[p], coefficients, centre, axes, half, triangle),
+            *(inside, opposed, deepest),
+        )
     return face, xi, gap
 
 
 @numba.njit(cache=True)
-def _newton(c, x0, x1, x2, n0, n1, n2, start, distance):  # type: ignore[no-untyped-def]
-    """Solve x + g n = face(u, v); returns u, v, g, cosine between the normals, settled."""
-    u, v, g = start, start, distance
-    for _ in range(25):
-        r0, r1, r2 = x0 + g * n0, x1 + g * n1, x2 + g * n2
-        a = np.empty(3)
-        b = np.empty(3)
-        for k in range(3):
-            value = (
-                c[0, k]
-                + u * (c[1, k] + u * c[3, k] + v * (c[4, k] + u * c[6, k] + v * c[7, k]))
-                + v * (c[2, k] + v * c[5, k])
+def cut_listed(  # type: ignore[no-untyped-def]
+    first,
+    listed,
+    points,
+    normals,
+    coefficients,
+    centre,
+    axes,
+    half,
+    triangle,
+    inside,
+    opposed,
+    deepest,
+):
+    """Nearest valid cut of every line, looked for among a few faces first.
+
+    Line p tries the faces ``listed[first[p]:first[p + 1]]``, and all others if none of these is
+    cut.  Everything else is as in :func:`cut_nearest`.
+
+    Returns
+    -------
+    gap : array, shape (p,)
+        nan where nothing is cut.
+    """
+    gap = np.full(len(points), np.nan)
+    every = np.arange(len(coefficients))
+    for p in range(len(points)):
+        for faces in (listed[first[p] : first[p + 1]], every):
+            face, _, _, gap[p] = _nearest_of(
+                *(faces, points[p], normals[p], coefficients, centre, axes, half, triangle),
+                *(inside, opposed, deepest),
             )
-            a[k] = c[1, k] + 2 * u * c[3, k] + v * (c[4, k] + 2 * u * c[6, k] + v * c[7, k])
-            b[k] = c[2, k] + 2 * v * c[5, k] + u * (c[4, k] + u * c[6, k] + 2 * v * c[7, k])
-            if k == 0:
-                r0 -= value
-            elif k == 1:
-                r1 -= value
-            else:
-                r2 -= value
-        m0 = a[1] * b[2] - a[2] * b[1]
-        m1 = a[2] * b[0] - a[0] * b[2]
-        m2 = a[0] * b[1] - a[1] * b[0]
+            if face >= 0:
+                break
+    return gap
+
+
+@numba.njit(cache=True)
+def list_near(points, normals, centre, axes, half, within):  # type: ignore[no-untyped-def]
+    """Faces whose boxes, larger by ``within`` [m] on all sides, each line meets.
+
+    Returns
+    -------
+    first : int array, shape (p + 1,)
+    listed : int array
+        Faces ``listed[first[p]:first[p + 1]]`` are near line p.
+    """
+    first = np.zeros(len(points) + 1, dtype=np.int64)
+    for fill in (False, True):
+        listed = np.empty(first[-1], dtype=np.int64)
+        count = 0
+        for p in range(len(points)):
+            for f in range(len(centre)):
+                if _meets_box(
+                    *(centre[f] - points[p], normals[p], axes[f], half[f], within),
+                ):
+                    if fill:
+                        listed[count] = f
+                    count += 1
+            first[p + 1] = count
+    return first, listed
+
+
+@numba.njit(cache=True)
+def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
+    """Tell whether a line along n meets a box whose middle is at d from a point of the line."""
+    x = d[0] * axes[0, 0] + d[1] * axes[0, 1] + d[2] * axes[0, 2]
+    y = d[0] * axes[1, 0] + d[1] * axes[1, 1] + d[2] * axes[1, 2]
+    z = d[0] * axes[2, 0] + d[1] * axes[2, 1] + d[2] * axes[2, 2]
+    a = n[0] * axes[0, 0] + n[1] * axes[0, 1] + n[2] * axes[0, 2]
+    b = n[0] * axes[1, 0] + n[1] * axes[1, 1] + n[2] * axes[1, 2]
+    c = n[0] * axes[2, 0] + n[1] * axes[2, 1] + n[2] * axes[2, 2]
+    h0, h1, h2 = half[0] + within, half[1] + within, half[2] + within
+    # no plane along the line separates it from the box (Gottschalk et al. 1996)
+    return (
+        abs(x * b - y * a) <= h0 * abs(b) + h1 * abs(a)
+        and abs(y * c - z * b) <= h1 * abs(c) + h2 * abs(b)
+        and abs(z * a - x * c) <= h2 * abs(a) + h0 * abs(c)
+    )
+
+
+@numba.njit(cache=True)
+def _nearest_of(  # type: ignore[no-untyped-def]
+    faces, x, n, coefficients, centre, axes, half, triangle, inside, opposed, deepest
+):
+    """Nearest valid cut of one line with some faces; returns face, u, v, gap."""
+    x0, x1, x2 = x
+    n0, n1, n2 = n
+    best, found, at_u, at_v, gap = np.inf, -1, 0.0, 0.0, np.nan
+    for f in faces:
+        d = (centre[f, 0] - x0, centre[f, 1] - x1, centre[f, 2] - x2)
+        h0, h1, h2 = half[f]
+        along = d[0] * n0 + d[1] * n1 + d[2] * n2
+        square = h0 * h0 + h1 * h1 + h2 * h2  # of the ball around the box
+        if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along > square:
+            continue
+        if not _meets_box(d, n, axes[f], half[f], 0.0):
+            continue
+        r = np.sqrt(square)
+        if along < -deepest - r or abs(along) - r > best:
+            continue
+        start = 1.0 / 3.0 if triangle[f] else 0.0
+        u, v, g, cosine, settled = cut_face(
+            coefficients[f], x0, x1, x2, n0, n1, n2, start, start, along
+        )
+        if not settled or cosine > opposed or g < -deepest or abs(g) >= best:
+            continue
+        if triangle[f]:
+            within = u >= -inside and v >= -inside and u + v <= 1.0 + inside
+        else:
+            within = abs(u) <= 1.0 + inside and abs(v) <= 1.0 + inside
+        if within:
+            best, found, at_u, at_v, gap = abs(g), f, u, v, g
+    return found, at_u, at_v, gap
+
+
+@numba.njit(cache=True, inline="always")
+def _component(c, k, u, v):  # type: ignore[no-untyped-def]
+    """Coordinate k of a face at (u, v) and its two slopes."""
+    value = (
+        c[0, k]
+        + u * (c[1, k] + u * c[3, k] + v * (c[4, k] + u * c[6, k] + v * c[7, k]))
+        + v * (c[2, k] + v * c[5, k])
+    )
+    along_u = c[1, k] + 2 * u * c[3, k] + v * (c[4, k] + 2 * u * c[6, k] + v * c[7, k])
+    along_v = c[2, k] + 2 * v * c[5, k] + u * (c[4, k] + u * c[6, k] + 2 * v * c[7, k])
+    return value, along_u, along_v
+
+
+@numba.njit(cache=True)
+def cut_face(c, x0, x1, x2, n0, n1, n2, u, v, g):  # type: ignore[no-untyped-def]
+    """Solve x + g n = face(u, v) from a guess; returns u, v, g, cosine of the normals, settled."""
+    for _ in range(25):
+        p0, a0, b0 = _component(c, 0, u, v)
+        p1, a1, b1 = _component(c, 1, u, v)
+        p2, a2, b2 = _component(c, 2, u, v)
+        r0, r1, r2 = x0 + g * n0 - p0, x1 + g * n1 - p1, x2 + g * n2 - p2
+        m0 = a1 * b2 - a2 * b1
+        m1 = a2 * b0 - a0 * b2
+        m2 = a0 * b1 - a1 * b0
         length = np.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
         slope = m0 * n0 + m1 * n1 + m2 * n2
         if not abs(slope) > 1e-3 * length:  # a line that grazes the face meets nothing
@@ -141,11 +283,11 @@ def _newton(c, x0, x1, x2, n0, n1, n2, start, distance):  # type: ignore[no-unty
         # residual + dg n - du a - dv b = 0
         dg = -(r0 * m0 + r1 * m1 + r2 * m2) / slope
         r0, r1, r2 = r0 + dg * n0, r1 + dg * n1, r2 + dg * n2
-        aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-        bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
-        ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-        ra = r0 * a[0] + r1 * a[1] + r2 * a[2]
-        rb = r0 * b[0] + r1 * b[1] + r2 * b[2]
+        aa = a0 * a0 + a1 * a1 + a2 * a2
+        bb = b0 * b0 + b1 * b1 + b2 * b2
+        ab = a0 * b0 + a1 * b1 + a2 * b2
+        ra = r0 * a0 + r1 * a1 + r2 * a2
+        rb = r0 * b0 + r1 * b1 + r2 * b2
         det = aa * bb - ab * ab
         du, dv = (ra * bb - rb * ab) / det, (rb * aa - ra * ab) / det
         move = max(abs(du), abs(dv))

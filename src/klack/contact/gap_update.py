@@ -1,0 +1,159 @@
+r"""Gaps of the same contact points after one body has been moved rigidly, on the curved faces.
+
+The hats keep their points and weights W; only where the normals of the slave meet the master
+changes.  A gap does not notice a motion of both bodies together, so the lines are carried into the
+frame of the unmoved master:
+
+.. math:: x' = R (x - c) + c + t \;\;(\text{slave moves}), \qquad
+    x' = R^T (x - c - t) + c \;\;(\text{master moves}), \qquad
+    g_k = \frac{\sum_p W_{kp}\, g(x'_p, n'_p)}{\sum_p W_{kp}} .
+
+To first order this is :math:`g_0 + G_a u_a`.  The difference is of the second order in the motion
+over the radius of curvature: a body that comes back one micrometre aside of where it left meets
+gaps that are wrong by a nanometre in first order, one that comes back ten aside by a hundred.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.contact.mortar import COVERED, ContactSpace, hat_quadrature
+from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
+from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
+from klack.errors import InputError
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.rigid import rotation_matrix
+
+__all__ = ["RigidGaps"]
+
+_LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RigidGaps:
+    """Gaps of a contact space as a function of the rigid placement of body a.
+
+    Made by :meth:`of`; plain arrays, cheap to send to other processes.
+
+    Parameters
+    ----------
+    position, normal : array, shape (p, 3) [m], [-]
+        Integration points of the slave side.
+    weight : sparse array, shape (nc, p) [m^2]
+    faces : CurvedFaces
+        Of the master side.
+    first, listed : int array
+        Faces near each line, up to a motion of ``within`` [m].
+    within : float [m]
+    centre : array, shape (3,) [m]
+        Point that a rotation leaves in place.
+    slave_moves : bool
+        True if body a carries the hats.
+    away : float [m]
+        Gap of a hat that no longer faces the master: the extent of both surfaces.
+    """
+
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    weight: csr_array
+    faces: CurvedFaces
+    first: NDArray[np.int64]
+    listed: NDArray[np.int64]
+    within: float
+    centre: NDArray[np.float64]
+    slave_moves: bool
+    away: float
+
+    @classmethod
+    def of(
+        cls,
+        space: ContactSpace,
+        mesh_a: Mesh,
+        surface_a: Surface,
+        mesh_b: Mesh,
+        surface_b: Surface,
+        *,
+        centre: NDArray[np.float64],
+    ) -> Self:
+        """Prepare the contact points of ``space``, built from these meshes and surfaces.
+
+        Parameters
+        ----------
+        space : ContactSpace
+        mesh_a, surface_a : the body that will be moved
+        mesh_b, surface_b : the other one
+        centre : array, shape (3,) [m]
+            Point that a rotation leaves in place, usually the centre of mass of a.
+
+        Raises
+        ------
+        InputError
+            For axisymmetric bodies, which cannot leave their axis.
+        """
+        if space.dimension != 3:
+            raise InputError(
+                "contact: gaps after a rigid motion",
+                got="axisymmetric bodies",
+                expected="solids",
+                hint="a motion along the axis is ContactSpace.shifted; take 'model: swept' else.",
+            )
+        moves = space.slave == "a"
+        slave, master = (mesh_a, surface_a), (mesh_b, surface_b)
+        if not moves:
+            slave, master = master, slave
+        hats = hat_quadrature(space, *slave)
+        faces = curved_faces(*master)
+        within = _LISTED_WITHIN * space.reach
+        first, listed = list_near(
+            hats.position, hats.normal, faces.centre, faces.axes, faces.half, within
+        )
+        extents = [
+            np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
+            for mesh, surface in (slave, master)
+        ]
+        return cls(
+            position=hats.position,
+            normal=hats.normal,
+            weight=hats.weight,
+            faces=faces,
+            first=first,
+            listed=listed,
+            within=within,
+            centre=np.array(centre, dtype=float),
+            slave_moves=moves,
+            away=float(sum(extents)),
+        )
+
+    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps at a rigid placement of body a.
+
+        Parameters
+        ----------
+        placement : array, shape (6,) [m], [rad]
+            Translation of ``centre`` and rotation vector, from where the space was built.
+
+        Returns
+        -------
+        array, shape (nc,) [m]
+        """
+        shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
+        arm = self.position - self.centre
+        if self.slave_moves:
+            position, normal = arm @ R.T + self.centre + shift, self.normal @ R.T
+        else:
+            position, normal = (arm - shift) @ R + self.centre, self.normal @ R
+        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
+        moved = float(np.max(np.linalg.norm(position - self.position, axis=1)))
+        if moved <= self.within:
+            gap = cut_listed(self.first, self.listed, position, normal, *master, *limits)
+        else:
+            _, _, gap = cut_nearest(position, normal, *master, *limits)
+        met = np.isfinite(gap)
+        covered = self.weight @ met.astype(float)
+        full = self.weight @ np.ones(len(gap))
+        facing = covered > COVERED * full
+        mean = self.weight @ np.where(met, gap, 0.0) / np.where(facing, covered, 1.0)
+        return np.where(facing, mean, self.away)
