@@ -1,0 +1,78 @@
+"""The impact of a case as CalculiX shall compute it."""
+
+from klack.case.schema import Case
+from klack.errors import InputError
+from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
+from klack.workflow.bodies import build_bodies
+from klack.workflow.progress import Progress
+
+__all__ = ["calculix_impact", "calculix_settings"]
+
+
+def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
+    """Mesh and place the bodies of a case, with the forces that the full order applies.
+
+    A closing spring pushes with its preload, as in the full order.
+
+    Raises
+    ------
+    InputError
+        For axisymmetric bodies, before anything is meshed, and for a guide, which only the
+        interface level knows.
+    """
+    if case.dimension != 3:
+        raise InputError(
+            f"{case.path or 'case'}: bodies",
+            got="axisymmetric bodies",
+            expected="solids: CalculiX would turn axisymmetric elements into wedges of one layer, "
+            "whose contact is another problem",
+            hint="say 'model: swept' (with layers) or 'model: solid' in both geometries.",
+        )
+    if case.guide is not None:
+        raise InputError(
+            f"{case.path or 'case'}: guide",
+            got="a guide of the moving body",
+            expected="a body that flies freely, as in the full order",
+            hint="take the guide out of a copy of the case.",
+        )
+    pair = build_bodies(case, progress)
+    return CalculixImpact(
+        title=case.title,
+        upper=pair.upper,
+        lower=pair.lower,
+        upper_surface=pair.upper_surface,
+        lower_surface=pair.lower_surface,
+        materials={
+            body.name: case.materials_of(body.name, body.mesh.solids)
+            for body in (pair.upper, pair.lower)
+        },
+        speed=case.motion.speed,
+        closing_force=case.motion.closing_force,
+    )
+
+
+def calculix_settings(
+    case: Case,
+    impact: CalculixImpact,
+    *,
+    step: float | None = None,
+    duration: float | None = None,
+    penalty: float | None = None,
+) -> CalculixSettings:
+    """Settings of a run, from the case where they are not given.
+
+    Parameters
+    ----------
+    case : Case
+    impact : CalculixImpact
+    step : float, optional [s]
+        That of the full order without.
+    duration : float, optional [s]
+        That of the case without.
+    penalty : float, optional [Pa/m]
+    """
+    return CalculixSettings(
+        step=case.run.full_step if step is None else step,
+        duration=case.run.duration if duration is None else duration,
+        penalty=default_penalty(impact) if penalty is None else penalty,
+    )

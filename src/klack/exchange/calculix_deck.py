@@ -1,0 +1,345 @@
+r"""An impact as an input deck of CalculiX (ccx), a witness that shares no code with klack.
+
+Both bodies go out on their own mesh, element by element: C3D4, C3D6, C3D8, C3D10, C3D15, C3D20 have
+the node order and the face numbers of :mod:`klack.mesh.families`.  The contact is ccx's
+face-to-face penalty: at every integration point of the upper (slave) surface the pressure is
+
+.. math:: p = K \max(0, -g)
+
+with the overclosure :math:`-g` on the curved faces.  The Hilber-Hughes-Taylor rule of ccx takes
+fixed steps (``DIRECT``): its automatic steps would also cut at impacts, but no two runs could then
+be compared step by step.
+
+Units of the deck are mm, t, s, N, MPa, mJ: ccx holds some absolute tolerances that suit them.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.pairing import axial_distance, face_thickness
+from klack.elasticity.body import ElasticBody
+from klack.errors import InputError, require_positive
+from klack.materials import Material
+from klack.mesh.boundary import FaceTable
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import Mesh, Surface
+
+__all__ = [
+    "LOWER",
+    "UPPER",
+    "CalculixImpact",
+    "CalculixSettings",
+    "CalculixSolver",
+    "deck_lines",
+    "default_penalty",
+    "start_of_flight",
+    "write_deck",
+]
+
+CalculixSolver = Literal["ITERATIVE SCALING", "ITERATIVE CHOLESKY", "SPOOLES", "PARDISO", "PASTIX"]
+
+UPPER, LOWER = "UPPER", "LOWER"
+"""Names of the element sets of the two bodies; node sets and surfaces start with them."""
+
+_TYPES = {
+    **{"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20"},
+    **{"wedge6": "C3D6", "wedge15": "C3D15"},
+}
+_MM, _MPA, _TONNE_PER_MM3 = 1e-3, 1e6, 1e12
+_PER_LINE = 10  # entries of a data line; ccx reads 16 at most
+_FLIGHT_STEPS = 2.0
+_PENALTY_FACTOR = 300.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CalculixImpact:
+    """Two solids and their motion.
+
+    Parameters
+    ----------
+    title : str
+    upper, lower : ElasticBody
+        Placed for the start; the upper one flies in -z.
+    upper_surface, lower_surface : Surface
+        Where they meet.
+    materials : mapping of body name to mapping of solid to Material
+    speed : float [m/s]
+        Of the upper body at the place where it is.
+    closing_force : float [N]
+        Constant force on the upper body, positive in -z, spread over it like its weight.
+    """
+
+    title: str
+    upper: ElasticBody
+    lower: ElasticBody
+    upper_surface: Surface
+    lower_surface: Surface
+    materials: Mapping[str, Mapping[str, Material]]
+    speed: float
+    closing_force: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalculixSettings:
+    """How ccx computes an impact.
+
+    Parameters
+    ----------
+    step, duration : float [s]
+        Fixed time increment, and time from the start.
+    penalty : float [Pa/m]
+        Pressure per overclosure; :func:`default_penalty` proposes one.
+    alpha : float [-]
+        Of Hilber, Hughes & Taylor (1977), -1/3 to 0: 0 is the trapezoidal rule without any
+        numerical damping, -0.05 the default of ccx.
+    solver : str
+        Equation solver.  At time steps that resolve an impact the mass dominates: ``ITERATIVE
+        SCALING`` gave the printed digits of SPOOLES in a third of the time.
+    """
+
+    step: float
+    duration: float
+    penalty: float
+    alpha: float = -0.05
+    solver: CalculixSolver = "ITERATIVE SCALING"
+
+    def __post_init__(self) -> None:
+        require_positive("CalculiX: step", self.step, "s")
+        require_positive("CalculiX: penalty", self.penalty, "Pa/m")
+        if not self.duration >= self.step:
+            raise InputError(
+                "CalculiX: duration",
+                got=f"{self.duration:g} s",
+                expected=f"the time of one step ({self.step:g} s) or more",
+                hint="check the units; an impact of steel parts lasts 5 to 50 us.",
+            )
+        if not -1.0 / 3.0 <= self.alpha <= 0.0:
+            raise InputError(
+                "CalculiX: alpha",
+                got=f"{self.alpha:g}",
+                expected="a value from -1/3 to 0",
+                hint="0 for no numerical damping, -0.05 is the default of CalculiX.",
+            )
+
+
+def default_penalty(impact: CalculixImpact) -> float:
+    r"""Penalty [Pa/m] that adds little to the approach of the bodies.
+
+    .. math:: K = 300\, E^* / h
+
+    with the contact modulus :math:`1 / E^* = \sum (1 - \nu^2) / E` of the softest solids and the
+    smallest element *h* of the two surfaces, which a sound mesh keeps below the half width *b* of
+    the contact.  A layer of stiffness K adds :math:`p / K`, the bodies give way by some
+    :math:`p\, b / E^*`: less than 1/300 comes from the penalty.
+    """
+    inverse = sum(
+        1.0
+        / min(material.plane_strain_modulus for material in impact.materials[body.name].values())
+        for body in (impact.upper, impact.lower)
+    )
+    size = min(
+        float(np.min(face_thickness(body.mesh, surface)))
+        for body, surface in (
+            (impact.upper, impact.upper_surface),
+            (impact.lower, impact.lower_surface),
+        )
+    )
+    return _PENALTY_FACTOR / inverse / size
+
+
+def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
+    """Where and how fast the upper body starts: its shift along +z [m] and its speed [m/s].
+
+    A penalty would turn an overlap into energy, and klack's placement lets curved faces overlap by
+    some nanometres where their weighted gap is zero.  So the upper body starts two steps of flight
+    before the surfaces themselves touch.  Without outside force it is brought there from any
+    distance; with one it is only moved back if it is nearer than that, and its speed is what the
+    force has left of the given one on the way back.
+
+    Raises
+    ------
+    InputError
+        If the surfaces do not face each other, or the force alone would already stop the flight.
+    """
+    distance = axial_distance(
+        impact.upper.mesh, impact.upper_surface, impact.lower.mesh, impact.lower_surface
+    )
+    if not np.isfinite(distance):
+        raise InputError(
+            f"contact of '{impact.upper_surface.name}' with '{impact.lower_surface.name}'",
+            got="no line along z that meets both surfaces",
+            expected="surfaces that face each other along the axis of motion z",
+            hint="check which faces are named in contact.between.",
+        )
+    least = _FLIGHT_STEPS * step * impact.speed
+    if impact.closing_force == 0.0:
+        return least - distance, impact.speed
+    back = max(least - distance, 0.0)
+    square = impact.speed**2 - 2.0 * impact.closing_force / impact.upper.mass * back
+    if not square > 0:
+        raise InputError(
+            "CalculiX: step",
+            got=f"{step:g} s: two steps of flight need more speed than there is",
+            expected="a step that is short against the time in which the force stops the body",
+            hint="take a shorter step.",
+        )
+    return back, sqrt(square)
+
+
+def write_deck(impact: CalculixImpact, settings: CalculixSettings, path: Path) -> None:
+    """Write the deck; ``ccx`` is started with its name without ``.inp``."""
+    with path.open("w", encoding="ascii", newline="\n") as stream:
+        stream.writelines(f"{line}\n" for line in deck_lines(impact, settings))
+
+
+def deck_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[str]:
+    """Lines of the deck, in the order in which ccx wants them.
+
+    Raises
+    ------
+    InputError
+        For bodies of revolution, a body a that is held, and what :func:`start_of_flight` refuses.
+    """
+    _require_solids(impact)
+    shift, speed = start_of_flight(impact, settings.step)
+    yield from _heading(impact, settings, shift)
+    node = element = 0
+    for role, body, surface, lift in (
+        (UPPER, impact.upper, impact.upper_surface, shift),
+        (LOWER, impact.lower, impact.lower_surface, 0.0),
+    ):
+        mesh = body.mesh.moved(np.array([0.0, 0.0, lift]))
+        yield from _body_lines(role, mesh, surface, body.fixed, node, element)
+        yield from _section_lines(role, mesh, impact.materials[body.name])
+        node += mesh.node_count
+        element += mesh.element_count
+    yield from _contact_lines(settings)
+    for role, body in ((UPPER, impact.upper), (LOWER, impact.lower)):
+        if len(body.fixed):
+            yield from ("*BOUNDARY", f"{role}_FIXED, 1, 3")
+    yield from ("*INITIAL CONDITIONS, TYPE=VELOCITY", f"{UPPER}_NODES, 3, {-speed / _MM:.12g}")
+    yield from _step_lines(impact, settings)
+
+
+def _require_solids(impact: CalculixImpact) -> None:
+    for body in (impact.upper, impact.lower):
+        if body.dimension != 3:
+            raise InputError(
+                f"body '{body.name}'",
+                got="a body of revolution",
+                expected="a solid: CalculiX turns axisymmetric elements into wedges of one layer, "
+                "whose contact is another problem",
+                hint="say 'model: swept' (with layers) or 'model: solid' in the geometry.",
+            )
+    if len(impact.upper.fixed):
+        raise InputError(
+            f"body '{impact.upper.name}'",
+            got="an upper body that is held",
+            expected="one that is free to fly in -z",
+            hint="take its supports out of the case, or swap the bodies.",
+        )
+
+
+def _heading(impact: CalculixImpact, settings: CalculixSettings, shift: float) -> Iterator[str]:
+    title = impact.title.encode("ascii", "replace").decode().replace("\n", " ")
+    yield "*HEADING"
+    yield title[:72]
+    yield "** written by klack; units: mm, t, s, N, MPa, mJ; axis of motion: z"
+    yield f"** {UPPER} = {_plain(impact.upper.name)}, moved by {shift / _MM:.9g} mm along z from"
+    yield f"** where the case puts it; {LOWER} = {_plain(impact.lower.name)}"
+    yield f"** step {settings.step:g} s, penalty {settings.penalty * _MM / _MPA:g} MPa/mm"
+
+
+def _body_lines(
+    role: str,
+    mesh: Mesh,
+    surface: Surface,
+    fixed: NDArray[np.int64],
+    first_node: int,
+    first_element: int,
+) -> Iterator[str]:
+    """Nodes, elements, contact faces and held nodes of one body."""
+    yield f"*NODE, NSET={role}_NODES"
+    for i, (x, y, z) in enumerate((mesh.points / _MM).tolist(), start=first_node + 1):
+        yield f"{i}, {x:.12e}, {y:.12e}, {z:.12e}"
+    number = first_element
+    for block in mesh.blocks:
+        yield f"*ELEMENT, TYPE={_TYPES[block.family]}, ELSET={_solid_set(role, mesh, block.solid)}"
+        for nodes in (block.connectivity + first_node + 1).tolist():
+            number += 1
+            yield from _wrapped([number, *nodes])
+    yield f"*ELSET, ELSET={role}"
+    for solid in mesh.solids:
+        yield f"{_solid_set(role, mesh, solid)},"
+    yield f"*SURFACE, NAME={role}_CONTACT, TYPE=ELEMENT"
+    for element, side in _faces(mesh, surface):
+        yield f"{first_element + element + 1}, S{side + 1}"
+    held = np.unique(fixed // 3)
+    if len(held):
+        yield f"*NSET, NSET={role}_FIXED"
+        yield from (f"{i}," for i in (held + first_node + 1).tolist())
+
+
+def _wrapped(numbers: list[int]) -> Iterator[str]:
+    """Data line, continued where it is long."""
+    for start in range(0, len(numbers), _PER_LINE):
+        part = ", ".join(map(str, numbers[start : start + _PER_LINE]))
+        yield part + ("," if start + _PER_LINE < len(numbers) else "")
+
+
+def _faces(mesh: Mesh, surface: Surface) -> Iterator[tuple[int, int]]:
+    """Element (in the order of all blocks) and side of every face of a surface."""
+    table = FaceTable.of(mesh.blocks)
+    first = np.cumsum([0, *(len(block.connectivity) for block in mesh.blocks)])
+    for block in surface.blocks:
+        rows = table.find(block.connectivity[:, : FAMILIES[block.family].corners])
+        for row in rows.tolist():
+            yield int(first[table.block[row]] + table.element[row]), int(table.side[row])
+
+
+def _section_lines(role: str, mesh: Mesh, materials: Mapping[str, Material]) -> Iterator[str]:
+    """One material and one section per solid."""
+    for solid in mesh.solids:
+        material, name = materials[solid], _solid_set(role, mesh, solid)
+        yield from (f"** {_plain(material.name)}", f"*MATERIAL, NAME={name}")
+        yield from ("*ELASTIC", f"{material.young / _MPA:.12g}, {material.poisson:.12g}")
+        yield from ("*DENSITY", f"{material.density / _TONNE_PER_MM3:.12g},")
+        yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"
+
+
+def _contact_lines(settings: CalculixSettings) -> Iterator[str]:
+    yield "*SURFACE INTERACTION, NAME=CONTACT"
+    yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
+    yield f"{settings.penalty * _MM / _MPA:.12g},"
+    yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
+    yield f"{UPPER}_CONTACT, {LOWER}_CONTACT"
+
+
+def _step_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[str]:
+    increments = int(np.ceil(settings.duration / settings.step * (1.0 - 1e-9)))
+    yield f"*STEP, INC={10 * increments + 100}"
+    yield f"*DYNAMIC, DIRECT, ALPHA={settings.alpha:g}, SOLVER={settings.solver}"
+    yield f"{settings.step:.9g}, {increments * settings.step:.9g}"
+    if impact.closing_force != 0.0:
+        acceleration = impact.closing_force / impact.upper.mass / _MM
+        yield from ("*DLOAD", f"{UPPER}, GRAV, {acceleration:.12g}, 0., 0., -1.")
+    yield from (f"*CONTACT PRINT, SLAVE={UPPER}_CONTACT, MASTER={LOWER}_CONTACT", "CF")
+    yield from ("*CONTACT PRINT, TOTALS=ONLY", "CELS")
+    for role in (UPPER, LOWER):
+        yield from (f"*EL PRINT, ELSET={role}, TOTALS=ONLY", "ELSE, ELKE")
+    yield "*END STEP"
+
+
+def _solid_set(role: str, mesh: Mesh, solid: str) -> str:
+    """Name of the element set of a solid; names of solids may hold signs that ccx does not take."""
+    return f"{role}_{mesh.solids.index(solid) + 1}"
+
+
+def _plain(name: str) -> str:
+    return name.encode("ascii", "replace").decode().replace("\n", " ")[:60]
