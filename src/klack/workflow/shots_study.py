@@ -146,7 +146,7 @@ class ShotTraces:
 
 @dataclass(frozen=True, kw_only=True)
 class RuleVerdict:
-    """Is the highest rebound of all shots the one of a centred impact?
+    """Whether the highest rebound of all shots is the one of a centred impact.
 
     Parameters
     ----------
