@@ -26,6 +26,7 @@ def check_consistency(case: "Case") -> None:
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_local_law(case)
+    _check_opposite(case)
     _check_solid_only(case)
     _check_guide(case)
     _check_shots(case)
@@ -54,12 +55,13 @@ def require_known(
 
 
 def _check_bodies(case: "Case") -> None:
-    if len(case.bodies) != 2:
+    count, words = (2, "two") if case.opposite is None else (3, "three")
+    if len(case.bodies) != count:
         raise CaseProblem(
             ("bodies",),
             got=f"{len(case.bodies)} bodies ({one_of(case.bodies)})",
-            expected="exactly two",
-            hint="one that moves and one that it hits.",
+            expected=f"exactly {words}",
+            hint="one that moves and one that it hits; with 'opposite' also the stop above.",
         )
 
 
@@ -156,6 +158,29 @@ def _check_local_law(case: "Case") -> None:
             expected="a local law of the kind linear, hertz or submodel",
             hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or take the correction "
             "'consistent'.",
+        )
+
+
+def _check_opposite(case: "Case") -> None:
+    if case.opposite is None:
+        return
+    for i, surface in enumerate(case.opposite.between):
+        check_surface(case, ("opposite", "between", i), surface)
+    stop, moving = case.opposite.between
+    between = [surface.body for surface in case.contact.between]
+    if moving.body != between[0] or stop.body in between:
+        raise CaseProblem(
+            ("opposite", "between"),
+            got=f"{stop} and {moving}",
+            expected=f"a surface of the third body, then one of '{between[0]}', which moves",
+            hint="the stop above is a body of its own.",
+        )
+    if case.bodies[stop.body].geometry.dimension != case.dimension:
+        raise CaseProblem(
+            ("bodies", stop.body, "geometry", "model"),
+            got=f"'{stop.body}' of another dimension than the moving body",
+            expected="all bodies axisymmetric or all three-dimensional",
+            hint="take 'model: swept' with 'layers: 18'.",
         )
 
 

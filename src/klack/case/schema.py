@@ -22,6 +22,7 @@ from klack.case.bodies import (
 )
 from klack.case.consistency import check_consistency
 from klack.case.guide import CaseGuide
+from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
 from klack.errors import InputError
@@ -37,6 +38,7 @@ __all__ = [
     "CaseContact",
     "CaseGuide",
     "CaseMaterial",
+    "CaseOpposite",
     "ConsistentLocalLaw",
     "HertzLocalLaw",
     "Level",
@@ -248,6 +250,9 @@ class Case(CaseFile):
     contact: CaseContact = Field(description="Which surfaces meet.")
     motion: Motion = Field(description="How the moving body arrives.")
     guide: CaseGuide | None = Field(default=None, description="Guide of the moving body.")
+    opposite: CaseOpposite | None = Field(
+        default=None, description="Stop above, a third body, for bounces between both ends."
+    )
     reduction: Reduction = Field(
         default=Reduction(), description="Kept modes and their correction."
     )

@@ -218,6 +218,7 @@ def contact_space(
         limit = floor + reach
     if slave is None:
         slave = _finer(sides, gaps, limit)
+    limit = max(limit, float(np.nanmin(gaps[slave])))  # a coarse side may be sampled farther away
     near = np.isfinite(gaps[slave]) & (gaps[slave] <= limit)
     return _build(sides, slave, near, limit, limit - floor)
 

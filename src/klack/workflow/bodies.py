@@ -70,7 +70,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     progress("mesh", 0.0)
     moving, stop = case.contact.moving, case.contact.stop
     touch = find_touch(case.bodies, moving, stop)
-    upper = mesh_body(case.moving_body, moving.body, touch.upper if touch else ())
+    upper = mesh_body(case.moving_body, moving.body, _places_of_moving_body(case, touch))
     lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
@@ -90,6 +90,15 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         lower_surface=lower_surface,
         pose=pose,
     )
+
+
+def _places_of_moving_body(case: Case, touch: Touch | None) -> tuple[tuple[float, ...], ...]:
+    """Where the moving body first touches either stop, as drawn."""
+    places = touch.upper if touch else ()
+    if case.opposite is not None:
+        above = find_touch(case.bodies, case.opposite.stop, case.opposite.moving)
+        places += above.lower if above else ()
+    return places
 
 
 def find_touch(

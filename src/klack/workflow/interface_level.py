@@ -1,15 +1,18 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
+from klack.contact.gap_update import RigidGaps
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
+from klack.mesh.rigid import rotation_matrix
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.transient.guide import Guide, guide_of_shaft
@@ -28,15 +31,18 @@ from klack.workflow.study import LevelResult
 
 __all__ = [
     "CONTACT",
+    "OPPOSITE",
+    "ExactGaps",
     "build_guide",
     "build_interface",
     "certificate_modes",
+    "exact_gaps",
     "run_interface",
     "simulate_case",
 ]
 
-CONTACT = "contact"
-"""Name of the only contact of a case of two bodies."""
+CONTACT, OPPOSITE = "contact", "opposite"
+"""Names of the contact of a case and of that with the stop above."""
 
 _FEWEST = 30
 _RICHER = 2.0
@@ -86,21 +92,81 @@ def build_interface(
         )
         for body, flexibility in _sides(problem)
     ]
-    contact = InterfaceContact(
-        name=CONTACT,
-        upper=problem.pair.upper.name,
-        lower=problem.pair.lower.name,
-        space=problem.space,
-        compliance=problem.static.compliance,
-    )
-    return interface_model(bodies, [contact])
+    moving, above = problem.pair.upper.name, problem.opposite
+    contacts = [
+        InterfaceContact(
+            name=CONTACT,
+            upper=moving,
+            lower=problem.pair.lower.name,
+            space=problem.space,
+            compliance=problem.static.compliance,
+        )
+    ]
+    if above is not None:
+        contacts.append(
+            InterfaceContact(
+                name=OPPOSITE,
+                upper=above.body.name,
+                lower=moving,
+                space=above.space,
+                compliance=above.static.compliance,
+            )
+        )
+    return interface_model(bodies, contacts)
 
 
-def _sides(problem: ContactProblem) -> tuple[tuple[ElasticBody, Flexibility], ...]:
-    return (
+def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:
+    sides = [
         (problem.pair.upper, problem.flexibility_upper),
         (problem.pair.lower, problem.flexibility_lower),
-    )
+    ]
+    if problem.opposite is not None:
+        sides.append((problem.opposite.body, problem.opposite.flexibility))
+    return sides
+
+
+def exact_gaps(problem: ContactProblem) -> "ExactGaps":
+    """Gaps of all contact points on the curved faces, at any rigid placement of the moving body.
+
+    Raises
+    ------
+    InputError
+        For axisymmetric bodies.
+    """
+    pair, above = problem.pair, problem.opposite
+    centre = pair.upper.centre_of_mass
+    here = (pair.upper.mesh, pair.upper_surface)
+    seat = RigidGaps.of(problem.space, *here, pair.lower.mesh, pair.lower_surface, centre=centre)
+    if above is None:
+        return ExactGaps(seat=seat)
+    there = (above.body.mesh, above.surface)
+    stop = RigidGaps.of(above.space, *there, pair.upper.mesh, above.moving_surface, centre=centre)
+    return ExactGaps(seat=seat, stop=stop)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExactGaps:
+    """Gaps at a rigid placement of the moving body; see :func:`exact_gaps`.
+
+    Parameters
+    ----------
+    seat : RigidGaps
+        The moving body is body a.
+    stop : RigidGaps or None
+        Stop above: the moving body is body b, so body a is moved the opposite way.
+    """
+
+    seat: RigidGaps
+    stop: RigidGaps | None = None
+
+    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps, shape (nc,) [m], at a placement, shape (6,) [m], [rad]."""
+        gaps = self.seat(placement)
+        if self.stop is None:
+            return gaps
+        shift, rotation = placement[:3], placement[3:]
+        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+        return np.concatenate([gaps, self.stop(back)])
 
 
 def _kept(
@@ -122,6 +188,9 @@ def _load(
     problem: ContactProblem, body: ElasticBody, ports: tuple[Port, Port] | None
 ) -> NDArray[np.float64]:
     """Load pattern of a contact port, shape (n_dof, 1)."""
+    if problem.opposite is not None and body.name == problem.opposite.body.name:
+        static = problem.opposite.static
+        return static.load_patterns(0.7 * static.max_force)[0][:, None]
     side = 0 if body.name == problem.pair.upper.name else 1
     if ports is not None:
         return ports[side].pattern[:, None]
@@ -200,12 +269,12 @@ def run_interface(
     simulate_case(case, model, guide, step=case.run.duration / 20)  # compiles
     result = simulate_case(case, model, guide)
     elastic = model.omega > 0
-    counts = [int(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
+    counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
     return level_result(
         result.history,
         level="interface",
-        label=f"interface, {counts[0]} + {counts[1]} modes, {model.count} contact points{guided}",
+        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}",
         dofs=model.mode_count,
         step=case.run.interface_step,
         wall_time=result.wall_time,

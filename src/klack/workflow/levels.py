@@ -115,9 +115,12 @@ def selection_of(choice: ModeChoice) -> ModeSelection:
 def mode_pools(
     problem: ContactProblem, *, at_least: int, progress: Progress
 ) -> Mapping[str, Modes]:
-    """Elastic modes of both bodies: as many as the case needs, and no fewer than ``at_least``."""
-    bodies = (problem.pair.upper, problem.pair.lower)
-    flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
+    """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``."""
+    bodies = [problem.pair.upper, problem.pair.lower]
+    flexibilities = [problem.flexibility_upper, problem.flexibility_lower]
+    if problem.opposite is not None:
+        bodies.append(problem.opposite.body)
+        flexibilities.append(problem.opposite.flexibility)
     progress("modes", 0.0)
     # the triangular solves run outside of the interpreter: two bodies keep two cores busy
     with ThreadPoolExecutor(max_workers=len(bodies)) as workers:

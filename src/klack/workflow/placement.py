@@ -22,7 +22,7 @@ _SECTORS = 48
 _LATTICE = 8
 # Radii whose clearance exceeds the least one by less than this share of the common range belong to
 # the same touch: flat on flat gives a whole zone, curved on curved a ring.
-_FLAT = 1e-6
+_FLAT = 1e-8
 
 
 @dataclass(frozen=True, slots=True)

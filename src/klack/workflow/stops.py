@@ -27,8 +27,8 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact import simulate
 from klack.simulation.system import ContactPair, ReducedSystem
 from klack.workflow.bodies import BodyPair
+from klack.workflow.ladder import effective_mass, static_ladder
 from klack.workflow.levels import damping_of, selection_of
-from klack.workflow.problem import effective_mass, static_ladder
 from klack.workflow.progress import Progress
 
 __all__ = ["StopContact", "build_stop", "split_law", "stop_law"]
