@@ -4,7 +4,7 @@ With the exact modal propagator over one step *h* under a constant mean force (A
 :mod:`klack.simulation.propagator`), and contact forces :math:`\lambda_0, \lambda_1` at its ends,
 
 .. math::
-    \bar\lambda &= (\tfrac12 + \varepsilon) \lambda_0 + \tfrac12 \lambda_1, \qquad
+    \bar\lambda &= \tfrac12 (1 + \varepsilon) (\lambda_0 + \lambda_1), \qquad
     q_1 = A_{11} q_0 + A_{12} v_0 + B_1 (f + \Phi^T \bar\lambda), \qquad
     v_1 = A_{21} q_0 + A_{22} v_0 + B_2 (f + \Phi^T \bar\lambda) \\
     0 &\le \lambda_1 \perp g_0 + \Phi q_1 + C_l \lambda_1 \ge 0 .
@@ -13,8 +13,10 @@ The complementarity problem has the constant matrix :math:`C_l + \tfrac12 \Phi B
 
 Energy: the massless contact has the potential :math:`U = \tfrac12 \lambda^T C_l \lambda`, and with
 :math:`\varepsilon = 0` a step misses it by :math:`\tfrac12 (\lambda_0^T g_1 - \lambda_1^T g_0)`,
-which only points that close or open within the step feel.  This debt is paid back in the next
-step by :math:`\varepsilon`, of some 1e-6, so that it never adds up.
+which only points that close or open within the step feel.  :math:`\varepsilon` pays that back in
+the same step: some 1e-6 of the force, at most 1e-3, and as much as it takes in the first and the
+last step of a contact, which are closed for a part only.  What is left is owed to the next step
+and never adds up.
 
 The inverse of the active block of that matrix is carried along: a point that closes borders it, a
 point that opens takes a row out, each at the cost of one product with it.
@@ -254,6 +256,26 @@ def safe_flight(
 
 
 @njit(cache=True)
+def _work(
+    gap0: NDArray, traces: NDArray, lam: NDArray, new: NDArray, before: NDArray, after: NDArray
+) -> tuple[float, float]:
+    """Work of the mean contact forces over a step, and the potential at its end [J]."""
+    n, modes = traces.shape
+    work = 0.0
+    stored = 0.0
+    for k in range(n):
+        if lam[k] > 0.0 or new[k] > 0.0:
+            travel = 0.0
+            end = gap0[k]
+            for i in range(modes):
+                travel += traces[k, i] * (after[i] - before[i])
+                end += traces[k, i] * after[i]
+            work += 0.5 * (lam[k] + new[k]) * travel
+            stored -= 0.5 * new[k] * end
+    return work, stored
+
+
+@njit(cache=True)
 def march(
     steps: int,
     wait: int,
@@ -330,11 +352,10 @@ def march(
         Of :func:`solve_active`.
     guide_force : array, shape (k, 2) [N]
         On the shaft, at the start of the next step.
-    books : array, shape (9,)
+    books : array, shape (8,)
         0 damping loss, 1 work of the constant force, 2 guide (friction and its numerical part),
-        3 energy debt of the contact, 4 power that the next payment is spread over, 5 steps since
-        the last contact (-1 before the first), 6 LCP rounds, 7 steps with contact, 8 strain energy
-        of the guides.
+        3 energy debt of the contact, 4 strain energy of the guides, 5 steps since the last contact
+        (-1 before the first), 6 LCP rounds, 7 steps with contact.
     carried : bool array, shape (n,)
         Points that have carried a force.
     out_force, out_gap, out_outside : array, shape (>= steps,)
@@ -401,16 +422,12 @@ def march(
                 f[i] += guide_slide[k, i] * drag
                 for c in range(2):
                     f[i] += 0.5 * guide_traces[k, c, i] * guide_force[k, c]
-        # contact forces of the start of the step, and the payment
-        share = 0.5
-        if debt != 0.0 and books[4] != 0.0:
-            pay = -debt / books[4]
-            share += min(max(pay, -_PAY_LIMIT), _PAY_LIMIT)
+        # half of the contact forces of the start of the step
         for i in range(modes):
             kick[i] = 0.0
         for k in range(n):
             if lam[k] > 0.0:
-                a = share * lam[k]
+                a = 0.5 * lam[k]
                 for i in range(modes):
                     kick[i] += a * traces[k, i]
         for i in range(modes):
@@ -498,30 +515,34 @@ def march(
                 least = 1e300
                 for k in range(n):
                     least = min(least, open_gap[k])
-        # books of the contact: work of the mean forces on d = gap0 + Phi q, against the potential
+        # work of the mean forces on d = gap0 + Phi q, against the potential, and the payment
         if n:
-            work = 0.0
-            power = 0.0
-            stored = 0.0
+            work, stored = _work(gap0, traces, lam, new, before, qf)
+            whole_step = potential > 0.0 and stored > 0.0
+            owed = debt + work + stored - potential
+            pay = 0.0
+            if owed != 0.0 and work != 0.0:
+                limit = _PAY_LIMIT if whole_step else 1.0
+                pay = min(max(-owed / work, -limit), limit)
+                for i in range(modes):
+                    kick[i] = 0.0
+                for k in range(n):
+                    if lam[k] > 0.0 or new[k] > 0.0:
+                        a = 0.5 * pay * (lam[k] + new[k])
+                        for i in range(modes):
+                            kick[i] += a * traces[k, i]
+                for i in range(modes):
+                    whole[i] += kick[i]
+                    qf[i] += B1[i] * kick[i]
+                    vf[i] += B2[i] * kick[i]
+                work, stored = _work(gap0, traces, lam, new, before, qf)
             for k in range(n):
-                if lam[k] > 0.0 or new[k] > 0.0:
-                    mean = share * lam[k] + 0.5 * new[k]
-                    mean_force += axial[k] * mean
-                    travel = 0.0
-                    end = gap0[k]
-                    for i in range(modes):
-                        travel += traces[k, i] * (qf[i] - before[i])
-                        end += traces[k, i] * qf[i]
-                    work += mean * travel
-                    power += new[k] * travel
-                    stored -= 0.5 * new[k] * end
-                    if len(out_points):
-                        out_points[taken, k] = mean
-                elif len(out_points):
-                    out_points[taken, k] = 0.0
-            debt += work + stored - potential
+                mean = 0.5 * (1.0 + pay) * (lam[k] + new[k])
+                mean_force += axial[k] * mean
+                if len(out_points):
+                    out_points[taken, k] = mean
+            debt += (1.0 + pay) * work + stored - potential
             potential = stored
-            books[4] = power
             if counts[0] > 0:
                 books[5] = 0.0
                 books[7] += 1.0
@@ -551,8 +572,8 @@ def march(
                     for d in range(2):
                         held += 0.5 * normal[k, c] * guide_compliance[k, c, d] * normal[k, d]
                     guide_force[k, c] = normal[k, c]
-            books[2] -= given + held - books[8]
-            books[8] = held
+            books[2] -= given + held - books[4]
+            books[4] = held
         for i in range(modes):
             q[i] = qf[i]
             v[i] = vf[i]

@@ -179,7 +179,7 @@ class _Run:
         self.index = np.zeros(n, dtype=np.int64)
         self.B = np.zeros((n, n))
         self.counts = np.zeros(2, dtype=np.int64)
-        self.books = np.zeros(9)
+        self.books = np.zeros(8)
         self.carried = np.zeros(n, dtype=bool)
         self.guide_arrays = _guide_arrays(guide, M)
         self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
@@ -427,7 +427,7 @@ class _Run:
 
     def energy(self) -> float:
         modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
-        return float(modal) + self.contact_energy() + self.spring_energy() + float(self.books[8])
+        return float(modal) + self.contact_energy() + self.spring_energy() + float(self.books[4])
 
     def ledger_start(self) -> tuple[float, float, NDArray[np.float64]]:
         modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
@@ -481,7 +481,7 @@ class _Run:
                 contact_dissipation=float(spent[2]),
                 damping=float(spent[0]),
                 work=float(spent[1]),
-                spring=self.spring_energy() - spring + float(spent[8]),
+                spring=self.spring_energy() - spring + float(spent[4]),
             ),
             external_force=outside,
             longest_period=model.longest_period,
