@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
+from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -70,6 +71,7 @@ def build_interface(
     *,
     ports: tuple[Port, Port] | None = None,
     count: int | None = None,
+    space: ContactSpace | None = None,
 ) -> InterfaceModel:
     """Interface-level model of a case.
 
@@ -82,6 +84,8 @@ def build_interface(
         Contact ports of both bodies: needed when modes are chosen by participation.
     count : int, optional
         Take so many modes of each body, as far as the pool goes, instead of those of the case.
+    space : ContactSpace, optional
+        Other contact points of the same surfaces than those of the static contact.
     """
     bodies = [
         InterfaceBody(
@@ -98,8 +102,8 @@ def build_interface(
             name=CONTACT,
             upper=moving,
             lower=problem.pair.lower.name,
-            space=problem.space,
-            compliance=problem.static.compliance,
+            space=problem.space if space is None else space,
+            compliance=problem.static.compliance if space is None else None,
         )
     ]
     if above is not None:
