@@ -22,7 +22,7 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.verification import GROUPS, Check, compare, run_checks
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
-COMMANDS = ["demo", "impact", "reduce", "report", "schema", "stroke", "verify"]
+COMMANDS = ["compare", "demo", "export", "impact", "reduce", "report", "schema", "stroke", "verify"]
 
 
 @pytest.fixture(autouse=True)
