@@ -48,6 +48,7 @@ Look = tuple[Colour, Style, float]
 
 _LOOKS: dict[str, Look] = {
     "full": ("black", "solid", 2.4),
+    "interface": ("sky", "solid", 1.6),
     "reduced": ("red", "dashed", 2.2),
     "reduced-participation": ("green", "long", 1.9),
     "reduced-attachment": ("blue", "dashdot", 1.9),

@@ -126,9 +126,13 @@ def answer(study: ImpactStudy) -> str:
     text += f"These numbers come from the {_called(study.reference)} run"
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
+    elif study.reference == "interface":
+        text += ", which keeps the bodies as modes and decides the contact point by point"
     text += "."
     if "reduced" in study.deviations:
         text += f" {verdict(study.levels['reduced'], study.deviations['reduced'])}"
+    elif study.reference == "reduced" and "reduced" in study.estimates:
+        text += f" {_estimated(study.estimates['reduced'])}"
     return text
 
 
@@ -144,5 +148,14 @@ def verdict(result: LevelResult, deviation: Deviation) -> str:
     )
 
 
+def _estimated(estimate: Deviation) -> str:
+    """Errors that one run of the interface level gives the reduced level."""
+    return (
+        f"Estimated error of this level: {signed_share(estimate.peak_force)} in peak force, "
+        f"{signed_share(estimate.contact_time)} in contact time and "
+        f"{signed(estimate.restitution, 4)} in restitution."
+    )
+
+
 def _called(level: str) -> str:
-    return {"full": "full-order"}.get(level, level)
+    return {"full": "full-order", "interface": "interface-level"}.get(level, level)

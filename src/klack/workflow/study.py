@@ -282,6 +282,7 @@ class ImpactStudy:
 
     @property
     def ordered(self) -> tuple[LevelResult, ...]:
-        """Results in the order of tables: the reference, the reduced level, the others as run."""
-        first = dict.fromkeys(n for n in (self.reference, "reduced") if n in self.levels)
+        """Results in the order of tables: the reference, interface, reduced, the others as run."""
+        best = (self.reference, "interface", "reduced")
+        first = dict.fromkeys(name for name in best if name in self.levels)
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
