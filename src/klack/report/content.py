@@ -7,17 +7,23 @@ the text of the case come from the user.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Protocol
 
 import numpy as np
 
 from klack.report.chart import BarChart, Chart
+from klack.report.estimate_wording import ESTIMATE_COLUMNS, estimate_rows, estimate_sentence
 from klack.report.figures import charts
-from klack.report.section_figure import SectionFigure, section_figure
+from klack.report.pressure_figure import pressure_figure
+from klack.report.pressure_view import study_views
+from klack.report.pressure_wording import pressure_rows
+from klack.report.section_figure import section_figure
 from klack.report.wording import answer, count, listed, quantity, share, signed, signed_share
 from klack.workflow.study import BodySummary, ImpactStudy, LevelResult
 
 __all__ = [
     "Content",
+    "Picture",
     "Section",
     "Table",
     "body_table",
@@ -39,13 +45,25 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
+class Picture(Protocol):
+    """An image (SVG) and what has to be said about it."""
+
+    @property
+    def image(self) -> bytes:
+        """SVG."""
+
+    @property
+    def note(self) -> str:
+        """Caption."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """A heading with what belongs under it, in this order: text, picture, charts, tables."""
 
     title: str
     paragraphs: tuple[str, ...] = ()
-    picture: SectionFigure | None = None
+    picture: Picture | None = None
     charts: tuple[Chart | BarChart, ...] = ()
     tables: tuple[Table, ...] = ()
 
@@ -88,10 +106,11 @@ def report_content(study: ImpactStudy) -> Content:
     def named(*names: str) -> tuple[Chart | BarChart, ...]:
         return tuple(by_name[name] for name in names if name in by_name)
 
-    sections = [_computed(study)]
+    sections = [_estimates(study), _computed(study)]
     if study.sections:
         sections.append(Section(title="The bodies at peak force", picture=section_figure(study)))
     sections.append(Section(title="Force over time", charts=named("force")))
+    sections.append(_pressure(study))
     sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
     if transfer:
         sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
@@ -238,6 +257,30 @@ def _computed(study: ImpactStudy) -> Section:
     )
 
 
+def _estimates(study: ImpactStudy) -> Section:
+    title = "How good is the reduced level?"
+    if not study.estimates:
+        return Section(title=title)
+    return Section(
+        title=title,
+        paragraphs=(estimate_sentence(study),),
+        tables=(Table(columns=ESTIMATE_COLUMNS, rows=estimate_rows(study)),),
+    )
+
+
+def _pressure(study: ImpactStudy) -> Section:
+    title = "Pressure in the contact"
+    views = study_views(study)
+    if not views:
+        return Section(title=title)
+    columns = ("", *(view.title for view in views))
+    return Section(
+        title=title,
+        picture=pressure_figure(views),
+        tables=(Table(columns=columns, rows=pressure_rows(views)),),
+    )
+
+
 def body_table(bodies: Sequence[BodySummary]) -> Table:
     """Model, material, mass, mesh and modes: one column per body."""
     return Table(
@@ -361,9 +404,43 @@ def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         (
             "degrees of freedom",
             "Of the time integration: free displacements of the full order; modes and rigid "
-            "motions of the reduced level.",
+            "motions of the reduced and interface levels.",
         ),
+        *_definitions_point_by_point(study),
     )
+
+
+def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    """Of words that only stand in reports with contact points of their own."""
+    found = []
+    if "interface" in study.levels or study.estimates:
+        found.append(
+            (
+                "interface level",
+                "Both bodies as modes, what the modes miss as a static compliance between all "
+                "contact points, and the contact decided point by point in every step: open, or "
+                "closed and never pulling. It covers eccentric, tilted and partial contact.",
+            )
+        )
+    if study.estimates:
+        found.append(
+            (
+                "estimated error",
+                "Deviation of a reduced level from one interface-level run at the same condition, "
+                "with more modes than the reduced level keeps. It holds the error of the local law "
+                "and of the modes left out, not that of the mesh.",
+            )
+        )
+    if any(result.pressure is not None for result in study.levels.values()):
+        found.append(
+            (
+                "pressure",
+                "Force of a contact point, normal to the surface, over its area. How well it is "
+                "resolved depends on the elements across the contact (see Resolution); sums such "
+                "as the line load are far more accurate than the pressure at one point.",
+            )
+        )
+    return tuple(found)
 
 
 def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
@@ -376,12 +453,13 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         (
             "Physics",
             "Linear elastic, isotropic bodies with small deformations; frictionless contact of "
-            "smooth surfaces; no fluid, no roughness, no plastic flow. Motion along the axis.",
+            "smooth surfaces; no fluid, no roughness, no plastic flow.",
         ),
         (
             "Reduced level",
-            "One force along the axis with one pressure pattern. Eccentric, tilted or partial "
-            "contact is outside its assumption, and no number of modes makes up for that.",
+            "Motion and force along the axis, with one pressure pattern. Eccentric, tilted or "
+            "partial contact is outside its assumption, and no number of modes makes up for that: "
+            "the interface level is made for it.",
         ),
         (
             "Resolution",

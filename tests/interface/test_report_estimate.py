@@ -1,0 +1,77 @@
+"""The answer to 'how good is the reduced level?'; the truth is the made-up study."""
+
+from dataclasses import replace
+
+import pytest
+
+from klack.contact.restitution import Deviation
+from klack.report.content import report_content
+from klack.report.estimate_wording import ESTIMATE_COLUMNS, estimate_rows, estimate_sentence
+from klack.report.wording import answer
+from klack.workflow.study import ImpactStudy
+
+
+def deviation(peak: float, restitution: float = 0.0) -> Deviation:
+    return Deviation(
+        peak_force=peak,
+        contact_time=-0.001,
+        impulse=0.0,
+        restitution=restitution,
+        history_l2=0.002,
+        third_octave_max_dB=0.1,
+        third_octave_up_to_Hz=2e5,
+    )
+
+
+def certified(study: ImpactStudy, estimate: Deviation) -> ImpactStudy:
+    basis = "interface level, 80 + 80 modes, 834 contact points"
+    return replace(study, estimates={"reduced": estimate}, estimate_basis=basis)
+
+
+def plain(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_the_true_deviation_stands_beside_the_estimate(impact_study: ImpactStudy) -> None:
+    study = certified(impact_study, deviation(0.0031))
+
+    (row,) = estimate_rows(study)
+
+    assert len(row) == len(ESTIMATE_COLUMNS)
+    true = 100 * impact_study.deviations["reduced"].peak_force
+    assert plain(row[1]) == f"+0.31 %\ntrue: {true:+.2f} %"
+    sentence = estimate_sentence(study)
+    assert "834 contact points" in sentence
+    assert "the full order, which was run too" in sentence
+
+
+def test_without_the_full_order_there_is_no_truth(impact_study: ImpactStudy) -> None:
+    levels = {"reduced": impact_study.levels["reduced"]}
+    study = replace(impact_study, levels=levels, reference="reduced", deviations={})
+    study = certified(study, deviation(0.0031))
+
+    assert "true" not in "".join(estimate_rows(study)[0])
+    assert "full order" not in estimate_sentence(study)
+    assert "Estimated error of this level: +0.31 % in peak force" in plain(answer(study))
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (deviation(0.009), "good enough to rely on"),
+        (deviation(-0.03), "not for the last per cent"),
+        (deviation(0.0, restitution=-0.17), "use the interface level"),
+        (deviation(float("nan"), restitution=0.0), "good enough to rely on"),
+    ],
+)
+def test_the_largest_error_decides(impact_study: ImpactStudy, error: Deviation, words: str) -> None:
+    assert words in estimate_sentence(certified(impact_study, error))
+
+
+def test_the_report_answers_first(impact_study: ImpactStudy) -> None:
+    content = report_content(certified(impact_study, deviation(0.0031)))
+
+    assert content.sections[0].title == "How good is the reduced level?"
+    assert "estimated error" in dict(content.definitions)
+    titles = [section.title for section in report_content(impact_study).sections]
+    assert "How good is the reduced level?" not in titles
