@@ -83,6 +83,17 @@ def flat(record: PressureRecord, inner: float) -> PressureRecord:
     )
 
 
+def sector(record: PressureRecord) -> PressureRecord:
+    """Only the points of a ring within 60 degrees of +x."""
+    kept = np.abs(np.arctan2(record.points[:, 1], record.points[:, 0])) < np.pi / 3
+    return replace(
+        record,
+        points=record.points[kept],
+        area=record.area[kept],
+        point_force=record.point_force[:, kept],
+    )
+
+
 def view(record: PressureRecord, title: str = "made up") -> PressureView:
     found = pressure_view(title, record, 0.0)
     assert found is not None
@@ -100,10 +111,11 @@ def view(record: PressureRecord, title: str = "made up") -> PressureView:
         (ring(scatter=0.8), "ring"),
         (spot((0.0, 0.0)), "spot"),
         (spot((5e-3, 0.0)), "spot"),  # far off the axis it is no ring either
+        (sector(ring()), "spot"),
         (flat(ring(), RADIUS), "meridian"),
         (flat(ring(), 0.0), "disc"),
     ],
-    ids=["ring", "ring off the axis", "scattered ring", "spot", "spot off the axis", "2-D", "disc"],
+    ids=["ring", "aside", "scattered", "spot", "spot aside", "sector", "meridian", "disc"],
 )
 def test_points_and_forces_tell_the_kind_of_contact(record: PressureRecord, shape: str) -> None:
     assert contact_map(record).shape == shape
