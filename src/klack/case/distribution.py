@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import log1p
+from math import exp, log1p, pi, sqrt
 from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
@@ -57,6 +57,19 @@ class Distribution:
             below = float(ndtr(-self.first / self.second))
             value = self.first + self.second * float(ndtri(below + share * (1.0 - below)))
             return max(value, 0.0)
+        return self.first
+
+    @property
+    def mean(self) -> float:
+        """Mean of all draws."""
+        if self.kind == "uniform":
+            return 0.5 * (self.first + self.second)
+        if self.kind == "rayleigh":
+            return self.first * sqrt(pi / 2.0)
+        if self.kind == "normal" and self.second > 0.0:
+            a = self.first / self.second
+            density = exp(-0.5 * a * a) / sqrt(2.0 * pi)
+            return self.first + self.second * density / float(ndtr(a))
         return self.first
 
     @property

@@ -31,6 +31,7 @@ __all__ = [
     "check_resolution",
     "check_rim",
     "contact_compliance",
+    "extended_compliance",
     "static_contact",
 ]
 
@@ -134,6 +135,43 @@ class StaticContact:
         """Half width of the contact [m] at an axial force [N]."""
         forces, widths = np.append(0.0, self.force), np.append(0.0, self.half_width)
         return float(np.interp(force, forces, widths))
+
+
+def extended_compliance(
+    space: ContactSpace,
+    known: StaticContact,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+) -> NDArray[np.float64]:
+    """Condensed static compliance of a space that shares most of its points with a known one.
+
+    Only the columns of the new points are solved for.
+
+    Parameters
+    ----------
+    space : ContactSpace
+        Of the same surfaces and the same slave side as ``known.space``.
+    known : StaticContact
+    flexibility_a, flexibility_b : Flexibility
+
+    Returns
+    -------
+    array, shape (nc, nc) [m/N]
+    """
+    if space.slave != known.space.slave:
+        return contact_compliance(space, flexibility_a, flexibility_b)
+    _, here, there = np.intersect1d(space.nodes, known.space.nodes, return_indices=True)
+    fresh = np.setdiff1d(np.arange(space.count), here)
+    C = np.zeros((space.count, space.count))
+    C[np.ix_(here, here)] = known.compliance[np.ix_(there, there)]
+    for start in range(0, len(fresh), _CHUNK):
+        rows = fresh[start : start + _CHUNK]
+        columns = np.zeros((space.count, len(rows)))
+        for G, flexibility in ((space.G_a, flexibility_a), (space.G_b, flexibility_b)):
+            columns += G @ flexibility.solve(G[rows].T.toarray())
+        C[:, rows] = columns
+        C[np.ix_(rows, here)] = columns[here].T
+    return (C + C.T) / 2.0
 
 
 def static_contact(

@@ -72,6 +72,7 @@ def build_interface(
     ports: tuple[Port, Port] | None = None,
     count: int | None = None,
     space: ContactSpace | None = None,
+    compliance: NDArray[np.float64] | None = None,
 ) -> InterfaceModel:
     """Interface-level model of a case.
 
@@ -86,6 +87,8 @@ def build_interface(
         Take so many modes of each body, as far as the pool goes, instead of those of the case.
     space : ContactSpace, optional
         Other contact points of the same surfaces than those of the static contact.
+    compliance : array, shape (nc, nc), optional [m/N]
+        Static compliance of both bodies at these.
     """
     bodies = [
         InterfaceBody(
@@ -103,7 +106,7 @@ def build_interface(
             upper=moving,
             lower=problem.pair.lower.name,
             space=problem.space if space is None else space,
-            compliance=problem.static.compliance if space is None else None,
+            compliance=problem.static.compliance if space is None else compliance,
         )
     ]
     if above is not None:

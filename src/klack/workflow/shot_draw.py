@@ -1,0 +1,246 @@
+r"""What differs between the drops of one valve, drawn at random.
+
+Each shot has its own stream of numbers, seeded by (seed, index): its draw depends neither on how
+many shots there are nor on who computes them.  Every quantity always takes the same members of that
+stream, so a change of one distribution leaves the draws of all others as they were.
+
+With a guide and no stated distribution, the axis of the moving body passes through one point of the
+clearance disc at the lowest guiding height, and one at the highest, each uniform over its disc:
+
+.. math:: x(z) = p_1 + (p_2 - p_1)\frac{z - z_1}{z_2 - z_1}, \qquad |p_1|, |p_2| \le c .
+
+Its eccentricity is |x| at the height of first touch, its tilt the slope of x.
+"""
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from klack.case.distribution import Distribution
+from klack.case.schema import Case
+from klack.case.shots import Shots
+from klack.errors import InputError
+
+__all__ = [
+    "ShotDraw",
+    "centric_draw",
+    "closing_force",
+    "draw_shot",
+    "extreme_placements",
+    "polar",
+    "shots_of",
+]
+
+_ATTEMPTS = 1000
+_HIGHEST_HARMONIC = 40
+# Members of the stream of a shot.
+_PLACE, _TILT = slice(0, 2), slice(2, 4)
+_FORCE, _FRICTION, _WAVINESS, _HARMONICS = 4, 5, 6, 7
+_NUMBERS = _HARMONICS + 2 * _HIGHEST_HARMONIC
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShotDraw:
+    """One draw.
+
+    Parameters
+    ----------
+    index : int
+        Number of the shot, from 0; -1 for the centred one.
+    aside : array, shape (2,) [m]
+        Position of the axis of the moving body at the height of first touch.
+    lean : array, shape (2,) [rad]
+        Slope of that axis over the height: towards x and y.
+    force : float [N]
+        Closing force at first touch.
+    friction : float [-]
+    waviness : float [m]
+        Root mean square.
+    waves : array, shape (h, 2) [m]
+        Amplitudes of cosine and sine of each harmonic of the ring.
+    harmonics : int array, shape (h,)
+    """
+
+    index: int
+    aside: NDArray[np.float64]
+    lean: NDArray[np.float64]
+    force: float
+    friction: float
+    waviness: float
+    waves: NDArray[np.float64]
+    harmonics: NDArray[np.int64]
+
+    def radial_deviation(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Deviation of the ring from a circle [m], outwards, at angles round the axis [rad]."""
+        phase = self.harmonics[:, None] * np.asarray(angle)[None, :]
+        return np.asarray(self.waves[:, 0] @ np.cos(phase) + self.waves[:, 1] @ np.sin(phase))
+
+
+def closing_force(case: Case) -> Distribution:
+    """Distribution of the closing force at first touch."""
+    stated = case.shots.force if case.shots is not None else None
+    return stated if stated is not None else Distribution("fixed", case.motion.closing_force)
+
+
+def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
+    """Draw shot ``index`` of a case.
+
+    Parameters
+    ----------
+    case : Case
+        With a section ``shots``.
+    seed, index : int
+    height : float [m]
+        z of first touch in the drawing of the moving body.
+
+    Raises
+    ------
+    InputError
+        When the guide leaves no room for the stated eccentricity and tilt.
+    """
+    shots = shots_of(case)
+    stream = _stream(seed, index, 0)
+    aside, lean = _placement(case, shots, seed, index, height)
+    force = closing_force(case).quantile(stream[_FORCE])
+    friction = case.guide.friction if case.guide is not None else 0.0
+    if shots.friction is not None:
+        friction = shots.friction.quantile(stream[_FRICTION])
+    waviness, low, high = 0.0, 2, 1
+    if shots.waviness is not None:
+        waviness = shots.waviness.rms.quantile(stream[_WAVINESS])
+        low, high = shots.waviness.harmonics
+    harmonics = np.arange(low, high + 1)
+    first = _HARMONICS + 2 * (harmonics - 1)
+    waves = ndtri(np.stack([stream[first], stream[first + 1]], axis=1))
+    scale = float(np.sqrt(np.sum(waves**2) / 2.0))  # root mean square round the ring
+    return ShotDraw(
+        index=index,
+        aside=aside,
+        lean=lean,
+        force=force,
+        friction=friction,
+        waviness=waviness,
+        waves=waves * (waviness / scale) if scale > 0.0 else waves,
+        harmonics=harmonics,
+    )
+
+
+def centric_draw(case: Case) -> ShotDraw:
+    """Return the shot that all others scatter around: centred, upright, round, with the mean force.
+
+    It has no Coulomb friction; viscous drag in the guide is no scatter and stays.
+    """
+    return ShotDraw(
+        index=-1,
+        aside=np.zeros(2),
+        lean=np.zeros(2),
+        force=closing_force(case).mean,
+        friction=0.0,
+        waviness=0.0,
+        waves=np.zeros((0, 2)),
+        harmonics=np.zeros(0, dtype=np.int64),
+    )
+
+
+def extreme_placements(
+    case: Case, height: float, directions: int = 8
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
+    """Farthest placements (aside, lean) that shots can draw, in some directions each.
+
+    Where a distribution has no end, one draw in ten thousand lies beyond.
+    """
+    shots = shots_of(case)
+    extremes = []
+    for angle in 2.0 * pi * np.arange(directions) / directions:
+        towards = np.array([cos(angle), sin(angle)])
+        for sign in (1.0, -1.0):
+            if shots.eccentricity is None and shots.tilt is None and case.guide is not None:
+                c = case.guide.clearance
+                extremes.append(_axis(case, height, c * towards, sign * c * towards))
+                continue
+            aside = _largest(shots.eccentricity) * towards
+            extremes.append((aside, sign * _largest(shots.tilt) * towards))
+    return tuple(extremes)
+
+
+def shots_of(case: Case) -> Shots:
+    """Section ``shots`` of a case; :class:`InputError` without one."""
+    if case.shots is None:
+        raise InputError(
+            f"{case.path or 'case'}: shots",
+            got="no section 'shots'",
+            expected="what differs from shot to shot",
+            hint="add 'shots: {count: 50}' and a 'guide', or 'eccentricity' and 'tilt'.",
+        )
+    return case.shots
+
+
+def _stream(seed: int, index: int, attempt: int) -> NDArray[np.float64]:
+    """Random numbers between 0 and 1 of one attempt to draw one shot."""
+    return np.random.default_rng([seed, index, attempt]).random(_NUMBERS)
+
+
+def _placement(
+    case: Case, shots: Shots, seed: int, index: int, height: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    for attempt in range(_ATTEMPTS):
+        stream = _stream(seed, index, attempt)
+        if shots.eccentricity is None and shots.tilt is None:
+            if case.guide is None:
+                return np.zeros(2), np.zeros(2)
+            c = case.guide.clearance
+            return _axis(case, height, _in_disc(stream[_PLACE], c), _in_disc(stream[_TILT], c))
+        aside = _vector(shots.eccentricity, stream[_PLACE])
+        lean = _vector(shots.tilt, stream[_TILT])
+        if _has_room(case, height, aside, lean):
+            return aside, lean
+    raise InputError(
+        f"{case.path or 'case'}: shots",
+        got=f"eccentricity and tilt that left the guide in {_ATTEMPTS} draws",
+        expected="placements inside the radial clearance at all guiding heights",
+        hint="make them smaller, or leave both out: the guide then says how far the body may go.",
+    )
+
+
+def _axis(
+    case: Case, height: float, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position at first touch and slope of the axis through two points at the outer heights."""
+    heights = case.guide.heights if case.guide is not None else (0.0, 1.0)
+    slope = (high - low) / (heights[-1] - heights[0])
+    return low + slope * (height - heights[0]), slope
+
+
+def _in_disc(shares: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """Point of a disc, all places alike, from two numbers between 0 and 1."""
+    distance, angle = radius * sqrt(shares[0]), 2.0 * pi * shares[1]
+    return distance * np.array([cos(angle), sin(angle)])
+
+
+def _vector(size: Distribution | None, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vector of a drawn length in any direction, all directions alike."""
+    if size is None:
+        return np.zeros(2)
+    angle = 2.0 * pi * shares[1]
+    return size.quantile(float(shares[0])) * np.array([cos(angle), sin(angle)])
+
+
+def _has_room(
+    case: Case, height: float, aside: NDArray[np.float64], lean: NDArray[np.float64]
+) -> bool:
+    if case.guide is None:
+        return True
+    at = [aside + lean * (z - height) for z in case.guide.heights]
+    return max(hypot(*x) for x in at) <= case.guide.clearance
+
+
+def _largest(size: Distribution | None) -> float:
+    return 0.0 if size is None else size.quantile(1.0 - 1e-4)
+
+
+def polar(vector: NDArray[np.float64]) -> tuple[float, float]:
+    """Length and direction [rad], from x towards y, of a plane vector."""
+    return hypot(*vector), atan2(vector[1], vector[0])
