@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _RECIPROCITY = 1e-6
-"""Largest asymmetry of the static compliance, relative to its largest entry."""
+"""Largest difference of the works of two loads on each other's displacements."""
 
 _STATIC_LIMIT = 1e-6
 """Largest deviation of the static answer to a load pattern."""
@@ -98,7 +98,7 @@ class StaticChecks:
     lowest_pivot : float [-]
         Smallest Cholesky pivot of the residual compliance over its largest diagonal entry, above 0.
     reciprocity : float [-]
-        Largest difference of the static compliance from its transpose, over its largest entry.
+        Works of two loads on each other's displacements, their difference over their size (Betti).
     static_limit : float [-]
         Deviation of modes + residual from the static answer of the whole bodies to one load.
     modal_share : float [-]
@@ -231,7 +231,7 @@ def interface_model(
     rows = [len(contact.space.gap) for contact in contacts]
     last = np.cumsum(rows).astype(np.int64)
     first = np.asarray(last - rows, dtype=np.int64)
-    whole, asymmetry = _static_compliance(bodies, contacts, names, first, last)
+    whole = _static_compliance(bodies, contacts, names, first, last)
     blocks = [_traces(item, contacts, first, last) for item in bodies]
     traces = np.hstack(blocks)
     omega = np.concatenate([_with_rigid(item, item.modes.omega) for item in bodies])
@@ -239,10 +239,11 @@ def interface_model(
     modal = (traces[:, elastic] / omega[elastic]) @ (traces[:, elastic] / omega[elastic]).T
     compliance = whole - modal
     compliance = 0.5 * (compliance + compliance.T)
+    reciprocity, static_limit = _fresh_statics(bodies, contacts, first, last, compliance + modal)
     checks = StaticChecks(
         lowest_pivot=_lowest_pivot(compliance),
-        reciprocity=asymmetry,
-        static_limit=_static_limit(bodies, contacts, names, first, last, compliance + modal),
+        reciprocity=reciprocity,
+        static_limit=static_limit,
         modal_share=float(np.trace(modal) / np.trace(whole)),
     )
     _require_sound(checks)
@@ -341,11 +342,8 @@ def _static_compliance(
     names: Sequence[str],
     first: NDArray[np.int64],
     last: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], float]:
-    """Static compliance of all points, and its largest asymmetry over its largest entry.
-
-    A body with several contacts couples them.
-    """
+) -> NDArray[np.float64]:
+    """Static compliance of all points; a body with several contacts couples them."""
     total = np.zeros((int(last[-1]),) * 2)
     for contact in contacts:
         for name in (contact.upper, contact.lower):
@@ -364,7 +362,6 @@ def _static_compliance(
             ]
             C = contact_compliance(contact.space, pair[0], pair[1])
         total[a:b, a:b] = C
-    asymmetry = float(np.max(np.abs(total - total.T), initial=0.0) / np.max(np.abs(total)))
     for i, one in enumerate(contacts):
         for j, other in enumerate(contacts):
             if i == j:
@@ -374,9 +371,7 @@ def _static_compliance(
                 if G is not None and H is not None:
                     part = G @ item.flexibility.solve(H.T.toarray())
                     total[first[i] : last[i], first[j] : last[j]] += part
-    if len(contacts) > 1:
-        asymmetry = float(np.max(np.abs(total - total.T)) / np.max(np.abs(total)))
-    return 0.5 * (total + total.T), asymmetry
+    return 0.5 * (total + total.T)
 
 
 def _rows_of(contact: InterfaceContact, name: str) -> csr_array | None:
@@ -386,36 +381,38 @@ def _rows_of(contact: InterfaceContact, name: str) -> csr_array | None:
 
 
 def _lowest_pivot(compliance: NDArray[np.float64]) -> float:
+    scale = float(np.max(np.abs(np.diag(compliance))))
     try:
         factor = np.linalg.cholesky(compliance)
     except np.linalg.LinAlgError:
-        lowest = float(np.linalg.eigvalsh(compliance)[0])
-        return min(lowest, 0.0) / float(np.max(np.diag(compliance)))
-    return float(np.min(np.diag(factor)) ** 2 / np.max(np.diag(compliance)))
+        return min(float(np.linalg.eigvalsh(compliance)[0]), 0.0) / scale
+    return float(np.min(np.diag(factor)) ** 2 / scale)
 
 
-def _static_limit(
+def _fresh_statics(
     bodies: Sequence[InterfaceBody],
     contacts: Sequence[InterfaceContact],
-    names: Sequence[str],
     first: NDArray[np.int64],
     last: NDArray[np.int64],
     whole: NDArray[np.float64],
-) -> float:
-    """Deviation of ``whole`` from fresh static solutions of the bodies under one uneven load."""
-    load = np.random.default_rng(5).uniform(0.0, 1.0, int(last[-1]))
-    answer = np.zeros(len(load))
+) -> tuple[float, float]:
+    """Two uneven loads on the whole bodies, solved anew: reciprocity, deviation of ``whole``."""
+    loads = np.random.default_rng(5).uniform(0.0, 1.0, (int(last[-1]), 2))
+    answers = np.zeros(loads.shape)
     for item in bodies:
         parts = [
             (G, slice(int(a), int(b)))
             for contact, a, b in zip(contacts, first, last, strict=True)
             if (G := _rows_of(contact, item.body.name)) is not None
         ]
-        force = sum(G.T @ load[rows] for G, rows in parts)
-        u = item.flexibility.solve(np.asarray(force))
+        forces = sum(G.T @ loads[rows] for G, rows in parts)
+        u = item.flexibility.solve(np.asarray(forces))
         for G, rows in parts:
-            answer[rows] += G @ u
-    return float(np.max(np.abs(whole @ load - answer)) / np.max(np.abs(answer)))
+            answers[rows] += G @ u
+    works = loads.T @ answers
+    reciprocity = abs(works[0, 1] - works[1, 0]) / abs(works[0, 1])
+    limit = np.max(np.abs(whole @ loads - answers)) / np.max(np.abs(answers))
+    return float(reciprocity), float(limit)
 
 
 def _require_sound(checks: StaticChecks) -> None:
