@@ -1,0 +1,160 @@
+"""CalculiX as a witness: the same mesh, the same matrices, the same impact.
+
+Truth: CalculiX (ccx 2.20), an independent finite-element program, run here on klack's decks.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.sparse import block_diag, coo_array, csr_array, triu
+from scipy.sparse.linalg import norm
+
+from klack.acoustics.comparison import compare_histories
+from klack.case import find_case, load_case
+from klack.case.schema import Case
+from klack.contact.restitution import measure_impact
+from klack.elasticity.body import ElasticBody, elastic_body
+from klack.exchange.calculix_case import calculix_impact, calculix_settings
+from klack.exchange.calculix_deck import (
+    CalculixImpact,
+    CalculixSettings,
+    deck_lines,
+    write_deck,
+)
+from klack.exchange.calculix_result import other_run, read_calculix
+from klack.exchange.calculix_run import find_calculix, run_calculix
+from klack.materials import Material
+from klack.transient.full_order import simulate_full_order
+from klack.verification.lattice import lattice_mesh
+from klack.workflow.problem import build_problem
+from klack.workflow.progress import silent
+
+pytestmark = pytest.mark.skipif(
+    find_calculix() is None, reason="CalculiX is not installed (apt-get install calculix-ccx)"
+)
+
+STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
+STORED = Path(__file__).parents[1] / "data" / "calculix_bars.dat"
+
+
+def bar(name: str, family: str, low: float, high: float, *, crown: bool, held: bool) -> ElasticBody:
+    """Bar of 1 mm x 1 mm, its bottom crowned like a sphere of 40 mm if asked."""
+
+    def shape(x: np.ndarray) -> np.ndarray:
+        y = x.copy()
+        y[:, 2] += crown * (high - x[:, 2]) / (high - low) * (x[:, 0] ** 2 + x[:, 1] ** 2) / 40e-3
+        return y
+
+    line = np.linspace(-0.5e-3, 0.5e-3, 3)
+    mesh = lattice_mesh(family, [line, line, np.linspace(low, high, 3)], shape)
+    nodes = mesh.surface("bottom").nodes if held else ()
+    return elastic_body(name, mesh, {"solid": STEEL}, fixed_nodes=nodes)
+
+
+def two_bars(family: str) -> CalculixImpact:
+    upper = bar("upper", family, 0.0, 2e-3, crown=True, held=False)
+    lower = bar("lower", family, -1e-3, 0.0, crown=False, held=True)
+    return CalculixImpact(
+        title="Two bars",
+        upper=upper,
+        lower=lower,
+        upper_surface=upper.mesh.surface("bottom"),
+        lower_surface=lower.mesh.surface("top"),
+        materials={"upper": {"solid": STEEL}, "lower": {"solid": STEEL}},
+        speed=0.5,
+    )
+
+
+def symmetric(file: Path) -> csr_array:
+    row, column, value = np.loadtxt(file, unpack=True)
+    A = coo_array((value, (row.astype(int) - 1, column.astype(int) - 1))).tocsr()
+    return A + triu(A, 1).T if triu(A, 1).nnz else A + triu(A.T, 1)
+
+
+# How far the matrices are apart in the Frobenius norm.  ccx integrates wedges with fewer points,
+# and the mass of tetrahedra with 4 or 1 points where 14 or 5 are exact.
+APART = [
+    ("hex8", 1e-12, 1e-12),
+    ("hex20", 1e-12, 1e-12),
+    ("tet4", 1e-11, 0.4),
+    ("tet10", 1e-11, 0.3),
+    ("wedge6", 0.1, 0.4),
+    ("wedge15", 0.02, 0.2),
+]
+
+
+@pytest.mark.parametrize(("family", "stiffness", "mass"), APART)
+def test_matrices_are_those_of_calculix(family, stiffness, mass, tmp_path):
+    impact = two_bars(family)
+    lines = list(deck_lines(impact, CalculixSettings(step=1e-7, duration=1e-6, penalty=1e16)))
+    first, last = lines.index("*SURFACE INTERACTION, NAME=CONTACT"), lines.index("*BOUNDARY")
+    lines = lines[:first] + lines[last : last + 2]
+    step = ["*STEP", "*FREQUENCY, SOLVER=MATRIXSTORAGE", "1", "*END STEP"]
+    deck = tmp_path / "bars.inp"
+    deck.write_text("\n".join([*lines, *step]) + "\n")
+
+    run_calculix(deck, duration=1.0)
+
+    places = [line.split(".") for line in (tmp_path / "bars.dof").read_text().split()]
+    dofs = np.array([3 * (int(node) - 1) + int(axis) - 1 for node, axis in places])
+    bodies = (impact.upper, impact.lower)
+    K = block_diag([body.K for body in bodies]).tocsr()[dofs][:, dofs]
+    M = block_diag([body.M for body in bodies]).tocsr()[dofs][:, dofs]
+    # N/mm and tonnes
+    assert norm(1e3 * symmetric(tmp_path / "bars.sti") - K) < stiffness * norm(K)
+    assert norm(1e3 * symmetric(tmp_path / "bars.mas") - M) < mass * norm(M)
+
+
+def test_the_stored_output_is_what_calculix_prints(tmp_path):
+    deck = tmp_path / "bars.inp"
+    settings = CalculixSettings(step=100e-9, duration=3.6e-6, penalty=2e16)
+    write_deck(two_bars("hex20"), settings, deck)
+
+    result = read_calculix(run_calculix(deck, duration=settings.duration).data)
+
+    stored = read_calculix(STORED)
+    # versions of ccx iterate a little differently
+    np.testing.assert_allclose(result.force, stored.force, atol=1e-3 * stored.force.max())
+    np.testing.assert_allclose(result.total_energy, stored.total_energy, rtol=1e-4)
+
+
+def coarse_witness() -> Case:
+    """The shipped case on 5 200 instead of 8 700 degrees of freedom."""
+    case = load_case(find_case("witness"))
+    bodies = {}
+    for name, body in case.bodies.items():
+        contact = body.mesh.contact.model_copy(update={"extent": 0.07e-3})
+        sizes = {"size": 1e-3, "grading": 0.7, "contact": contact}
+        bodies[name] = body.model_copy(update={"mesh": body.mesh.model_copy(update=sizes)})
+    return case.model_copy(update={"bodies": bodies})
+
+
+@pytest.mark.slow
+def test_full_order_agrees_with_calculix(tmp_path):
+    """Goal of the project: force history within 2 % of the peak; 200 ns are converged to 0.7 %."""
+    case = coarse_witness()
+    problem = build_problem(case, silent)
+    problem.close()
+    result = simulate_full_order(
+        problem.pair.upper,
+        problem.pair.lower,
+        problem.space,
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.full_step,
+    )
+    impact = calculix_impact(case, silent)
+    settings = calculix_settings(case, impact, step=200e-9, duration=9.2e-6)
+    deck = tmp_path / "witness.inp"
+    write_deck(impact, settings, deck)
+
+    run = run_calculix(deck, duration=settings.duration, time_limit=600.0)
+
+    other = other_run(read_calculix(run.data), result.history)
+    off = compare_histories(other.history, result.history)
+    assert off.history_l2 < 0.02
+    assert abs(off.peak_force) < 0.01
+    assert abs(off.restitution) < 0.002
+    assert measure_impact(result.history).sub_contacts == 1
+    assert other.energy_swing < 5e-3
