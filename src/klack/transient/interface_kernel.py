@@ -387,6 +387,15 @@ def march(
     new = np.zeros(n)
     normal = np.zeros((guides, 2))
     free = np.zeros((guides, 2))
+    # change of the sliding speed in a step per force, and per speed with drag, at all heights alike
+    mobility = np.zeros(guides)
+    damped = np.zeros(guides)
+    for k in range(guides):
+        for j in range(guides):
+            for i in range(modes):
+                yields = abs(guide_slide[k, i] * guide_slide[j, i] * B2[i])
+                mobility[k] += yields
+                damped[k] += guide_viscous[j] * yields
     debt = books[3]
     potential = 0.0
     # potential of the contact: -lam (gap0 + Phi q) / 2, since closed points have no gap
@@ -413,10 +422,12 @@ def march(
             slide = 0.0
             for i in range(modes):
                 slide += guide_slide[k, i] * v[i]
-            drag = -guide_viscous[k] * slide
+            # drag of the mean speed over the step; friction may stop the shaft, not turn it round
+            drag = -guide_viscous[k] * slide / (1.0 + 0.5 * damped[k])
             if guide_friction[k] > 0.0:
                 pressed = np.sqrt(guide_force[k, 0] ** 2 + guide_force[k, 1] ** 2)
-                drag -= guide_friction[k] * pressed * slide / np.sqrt(slide**2 + slip_speed**2)
+                rub = guide_friction[k] * pressed / np.sqrt(slide**2 + slip_speed**2)
+                drag -= min(rub, 1.0 / mobility[k]) * slide
             braking += drag
             for i in range(modes):
                 f[i] += guide_slide[k, i] * drag
