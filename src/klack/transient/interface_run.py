@@ -41,7 +41,9 @@ _GUIDED_DOUBLINGS = 0  # a shaft meets its stiff bore for a microsecond or two o
 _FLIGHT_CHUNK = 20e-6  # [s]
 _NEAR = 8.0  # fine steps before a possible touch
 _FAR = 200.0  # fine steps that end a segment without a touch
-_STALE = 0.2e-6  # what the gaps of the last impact may be wrong by after a flight [m]
+_STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
+_FRESH = 0.04e-6  # gaps as good as new [m]
+_WARY_SHARE = 0.25  # of the safe time, while the guide may kick
 _SLIP_SPEED = 1e-3  # [m/s]
 _RIM_RESERVE = 1.1
 
@@ -183,6 +185,11 @@ class _Run:
         self.carried = np.zeros(n, dtype=bool)
         self.guide_arrays = _guide_arrays(guide, M)
         self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
+        self.taken_at = np.zeros(6)
+        first, last = model.contacts[0][1:]
+        self.arm = np.zeros(3)
+        if gaps is not None:
+            self.arm = model.points[first:last].mean(axis=0) - model.centre
         self.push = np.ascontiguousarray(model.rigid[2])
         self.time = 0.0
         self.segments: list[ImpactSegment] = []
@@ -242,7 +249,8 @@ class _Run:
         if self.gaps is None:
             return
         r = self.rigid_count
-        fresh = self.gaps(self.model.rigid @ self.q)
+        self.taken_at = self.model.rigid @ self.q
+        fresh = self.gaps(self.taken_at)
         self.gap0 = fresh - self.model.traces[:, :r] @ self.q[:r]
 
     def touch(self) -> float:
@@ -267,7 +275,6 @@ class _Run:
                 self.fly(duration, progress)
                 if self.time >= end:
                     break
-                self.take_gaps()
             self.impact(duration, wait if flight else 0, progress)
             if impacts is not None and flight and len(self.segments) >= impacts:
                 break
@@ -275,15 +282,20 @@ class _Run:
             progress(1.0)
 
     def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
-        """Jump until a gap may close soon."""
+        """Jump until a gap may close soon; take the gaps anew on the way."""
         empty = np.zeros((0, self.model.mode_count))
-        reserve = self.gap0 - (0.0 if self.gaps is None else _STALE)
         while self.time < duration:
-            safe = self.safe(reserve, min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step))
+            stale = self.stale()
+            horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
+            safe = self.safe(self.gap0 - stale, horizon)
             if safe < _NEAR * self.step:
-                return
-            doublings = int(np.log2(safe / self.step))
-            doublings = min(doublings, _DOUBLINGS if self.unguided(safe) else _GUIDED_DOUBLINGS)
+                if stale <= _FRESH:
+                    return
+                self.take_gaps()
+                continue
+            doublings = min(int(np.log2(safe / self.step)), _DOUBLINGS)
+            if not self.unguided(safe):
+                safe, doublings = _WARY_SHARE * safe, _GUIDED_DOUBLINGS
             length = self.step * 2.0**doublings
             steps = max(1, int(min(safe, _FLIGHT_CHUNK) / length))
             self.march(self.stepper(doublings), steps, 0, empty, np.zeros(0), np.zeros((0, 0)))
@@ -291,6 +303,17 @@ class _Run:
             self.keep_motion()
             if progress is not None:
                 progress(min(self.time / duration, 1.0))
+
+    def stale(self) -> float:
+        """Tell by how much the gaps may differ from those of the geometry [m].
+
+        Surfaces that enclose an angle slide past each other: a share of the way is missing.
+        """
+        if self.gaps is None:
+            return 0.0
+        moved = self.model.rigid @ self.q - self.taken_at
+        way = float(np.linalg.norm(moved[:3] + np.cross(moved[3:], self.arm)))
+        return _STALE_SHARE * way + 0.5 * _FRESH
 
     def safe(self, gap: NDArray[np.float64], horizon: float) -> float:
         outside = self.constant - self.spring * float(self.push @ self.q)
