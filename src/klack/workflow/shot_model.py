@@ -24,7 +24,7 @@ __all__ = ["ShotModel", "build_shots", "centred_case"]
 
 # An eccentric contact carries on a part of the ring only, and yields more.
 _SOFTER = 1.6
-_WIDER = 2.5
+_WIDER = 4.0
 _FIRST = 0.02  # share of the reach: points with so small a gap touch first
 _FLIGHT_STEPS = 20  # before first touch, without a gap
 _SPAN_OVER_CONTACT = 3.0
@@ -134,14 +134,20 @@ def _candidates(
 ) -> ContactSpace:
     """Contact points that close in a centred impact or in one from the farthest placements."""
     reach = problem.space.reach
-    wide = contact_space(*_surfaces(problem), reach=_WIDER * reach, slave=problem.space.slave)
+    farthest = extreme_placements(case, drawn_height)
+    off_axis = max(float(np.linalg.norm(aside)) for aside, _ in farthest)
+    wide = contact_space(
+        *_surfaces(problem), reach=_WIDER * reach + off_axis, slave=problem.space.slave
+    )
     gaps = _gaps(problem, wide)
     about, centre = np.array([0.0, 0.0, height]), problem.pair.upper.centre_of_mass
-    keep = wide.gap <= wide.gap.min() + reach
-    for aside, lean in extreme_placements(case, drawn_height):
+    keep = wide.gap <= wide.gap.min() + _SOFTER * reach
+    for aside, lean in farthest:
         open_by = _gaps_in_touch(gaps, wide, rigid_placement(aside, lean, about, centre))
         keep |= open_by <= _SOFTER * reach
-    return wide.restricted(keep)
+    # and one row more: on coarse elements a contact is not much wider than a point
+    G = abs(wide.G_a if wide.slave == "a" else wide.G_b)
+    return wide.restricted(G @ (G.T @ keep.astype(float)) > 0)
 
 
 def _gaps_in_touch(

@@ -94,7 +94,7 @@ def run_shots(
         shots = columns_of(outcomes)
         alone = columns_of([centric])
         highest = _highest(shots)
-        lowest = int(np.argmin(shots.restitution))
+        lowest = int(np.nanargmin(shots.restitution))
         pictured = {"centric": centred, "highest": draws[highest], "lowest": draws[lowest]}
         pressures = _pressures(model.setup, pictured)
         clock("shots", 1.0)
@@ -166,12 +166,14 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
 
 def _highest(shots: ShotColumns) -> int:
     """Row with the highest rebound."""
-    if not np.any(np.isfinite(shots.rebound_height)):
+    complete = np.isfinite(shots.rebound_height) & np.isfinite(shots.restitution)
+    if not np.any(complete):
         raise ConvergenceError(
-            "shots: no shot had come to the top of its rebound when it ended.\n"
-            "Try: a longer shots.duration, or a closing force in 'motion'."
+            "shots: no shot came to the top of a rebound that follows a clear separation.\n"
+            "Try: a longer shots.duration, or another closing force: rebounds of less than 50 us "
+            "belong to one impact."
         )
-    return int(np.nanargmax(shots.rebound_height))
+    return int(np.argmax(np.where(complete, shots.rebound_height, -np.inf)))
 
 
 def _pressures(setup: ShotSetup, pictured: Mapping[str, ShotDraw]) -> dict[str, PressureRecord]:
