@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from klack.case import find_case, load_case
-from klack.contact.pairing import axial_distance
+from klack.contact.pairing import axial_distance, face_geometry, project_to_surface
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import InputError
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
@@ -26,6 +26,7 @@ from klack.exchange.calculix_deck import (
 from klack.materials import Material
 from klack.mesh.abaqus import AbaqusModel, read_abaqus_model
 from klack.mesh.mesh import Mesh, Surface
+from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
 from klack.workflow.progress import silent
 
@@ -140,6 +141,30 @@ def test_the_flight_lasts_two_steps_from_any_placement():
         gap = axial_distance(placed, bodies.upper_surface, bodies.lower.mesh, bodies.lower_surface)
         assert gap == pytest.approx(2 * 50e-9 * 0.5, rel=1e-6)  # coordinates of 2 mm, round-off
         assert speed == 0.5
+
+
+def test_no_point_of_a_waving_ring_overlaps_at_the_start():
+    """Between the nodes of 12 layers the faces wave: random points, not those that were sampled."""
+    upper, lower, _ = needle_over_seat(size=25e-6, bulk=1e-3, layers=12)
+    bodies = CalculixImpact(
+        title="Ring",
+        upper=upper,
+        lower=lower,
+        upper_surface=upper.mesh.surface("tip"),
+        lower_surface=lower.mesh.surface("cone"),
+        materials={body.name: {"solid": STEEL} for body in (upper, lower)},
+        speed=0.5,
+    )
+
+    shift, _ = start_of_flight(bodies, 50e-9)
+
+    xi = np.random.default_rng(1).dirichlet(np.ones(3), 200)[:, :2]
+    (block,) = bodies.upper_surface.blocks
+    placed = upper.mesh.points + np.array([0.0, 0.0, shift])
+    points = face_geometry(placed, block, xi).position.reshape(-1, 3)
+    down = np.tile([0.0, 0.0, -1.0], (len(points), 1))
+    gap = project_to_surface(points, down, lower.mesh, bodies.lower_surface, deepest=np.inf).gap
+    assert np.nanmin(gap) == pytest.approx(2 * 50e-9 * 0.5, rel=0.1)
 
 
 def test_a_force_starts_where_the_case_says_or_gives_back_its_work():

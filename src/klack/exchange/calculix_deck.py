@@ -29,6 +29,7 @@ from klack.materials import Material
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import Mesh, Surface
+from klack.workflow.placement import first_touch_of_meshes
 
 __all__ = [
     "LOWER",
@@ -156,27 +157,18 @@ def default_penalty(impact: CalculixImpact) -> float:
 def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
     """Where and how fast the upper body starts: its shift along +z [m] and its speed [m/s].
 
-    A penalty would turn an overlap into energy, and klack's placement lets curved faces overlap by
-    some nanometres where their weighted gap is zero.  So the upper body starts two steps of flight
-    before the surfaces themselves touch.  Without outside force it is brought there from any
-    distance; with one it is only moved back if it is nearer than that, and its speed is what the
-    force has left of the given one on the way back.
+    A penalty would turn an overlap into energy, and klack's placement lets curved faces overlap a
+    little where their weighted gap is zero.  So the upper body starts two steps of flight before
+    any point touches.  Without outside force it is brought there from any distance; with one it is
+    only moved back if it is nearer than that, and its speed is what the force has left of the given
+    one on the way back.
 
     Raises
     ------
     InputError
         If the surfaces do not face each other, or the force alone would already stop the flight.
     """
-    distance = axial_distance(
-        impact.upper.mesh, impact.upper_surface, impact.lower.mesh, impact.lower_surface
-    )
-    if not np.isfinite(distance):
-        raise InputError(
-            f"contact of '{impact.upper_surface.name}' with '{impact.lower_surface.name}'",
-            got="no line along z that meets both surfaces",
-            expected="surfaces that face each other along the axis of motion z",
-            hint="check which faces are named in contact.between.",
-        )
+    distance = _distance(impact)
     least = _FLIGHT_STEPS * step * impact.speed
     if impact.closing_force == 0.0:
         return least - distance, impact.speed
@@ -190,6 +182,24 @@ def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
             hint="take a shorter step.",
         )
     return back, sqrt(square)
+
+
+def _distance(impact: CalculixImpact) -> float:
+    """Way of the upper body to -z until any point touches [m], negative where they overlap.
+
+    The faces of a coarse swept mesh wave by up to 0.1 um between their nodes, which a penalty at
+    integration points feels, so they are sampled densely.
+    """
+    sides = (impact.upper.mesh, impact.upper_surface, impact.lower.mesh, impact.lower_surface)
+    distance = axial_distance(*sides)
+    if not np.isfinite(distance):
+        raise InputError(
+            f"contact of '{impact.upper_surface.name}' with '{impact.lower_surface.name}'",
+            got="no line along z that meets both surfaces",
+            expected="surfaces that face each other along the axis of motion z",
+            hint="check which faces are named in contact.between.",
+        )
+    return min(distance, first_touch_of_meshes(*sides, tolerance=0.0).clearance)
 
 
 def write_deck(impact: CalculixImpact, settings: CalculixSettings, path: Path) -> None:
