@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from klack.case import find_case, load_case
+from klack.case.guide import CaseGuide
 from klack.contact.pairing import axial_distance, face_geometry, project_to_surface
 from klack.elasticity.body import ElasticBody, elastic_body
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
 from klack.exchange.calculix_deck import (
     CalculixImpact,
@@ -233,6 +234,13 @@ def test_axisymmetric_cases_are_refused_before_any_mesh():
 
     with pytest.raises(InputError, match="model: swept"):
         calculix_impact(load_case(find_case("demo-valve-axisymmetric")), nothing)
+
+
+def test_a_guide_is_left_out_with_a_note():
+    case = load_case(find_case("witness"))
+    guide = CaseGuide(surface="shaft", heights=("1 mm", "2 mm"), clearance="5 um")
+    with pytest.warns(AccuracyWarning, match="left out of the deck, as in the full order: guide"):
+        calculix_impact(case.model_copy(update={"guide": guide}), silent)
 
 
 def test_the_witness_case_becomes_a_deck(tmp_path):

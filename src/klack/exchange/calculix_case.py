@@ -1,7 +1,9 @@
 """The impact of a case as CalculiX shall compute it."""
 
+import warnings
+
 from klack.case.schema import Case
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
 from klack.workflow.bodies import build_bodies
 from klack.workflow.progress import Progress
@@ -17,8 +19,12 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     Raises
     ------
     InputError
-        For axisymmetric bodies, before anything is meshed, and for a guide, which only the
-        interface level knows.
+        For axisymmetric bodies, before anything is meshed.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the case has a guide or a stop above, which only the interface level knows.
     """
     if case.dimension != 3:
         raise InputError(
@@ -28,12 +34,13 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             "whose contact is another problem",
             hint="say 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
-    if case.guide is not None:
-        raise InputError(
-            f"{case.path or 'case'}: guide",
-            got="a guide of the moving body",
-            expected="a body that flies freely, as in the full order",
-            hint="take the guide out of a copy of the case.",
+    left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
+    if left_out:
+        warnings.warn(
+            f"left out of the deck, as in the full order: {', '.join(left_out)}. Try: compare with "
+            "the level 'full'.",
+            AccuracyWarning,
+            stacklevel=2,
         )
     pair = build_bodies(case, progress)
     return CalculixImpact(
