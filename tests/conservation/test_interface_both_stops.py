@@ -83,8 +83,9 @@ def test_bounces_between_both_ends_keep_the_energy(model: InterfaceModel):
     assert abs(run.energy.residual) < 1e-6
     for segment in run.impacts[:4]:
         change = segment.history.velocity_a[-1] - segment.history.velocity_a[0]
-        push = segment.history.impulse * (1.0 if segment.contact == "contact" else -1.0)
-        assert model.mass * change == pytest.approx(push, rel=1e-9)
+        # seen with the stop below, whichever it is
+        assert segment.side == (1.0 if segment.contact == "contact" else -1.0)
+        assert model.mass * change == pytest.approx(segment.history.impulse, rel=1e-9)
     first = measure_impact(run.impacts[0].history)
     assert 0.98 < first.restitution < 1.0  # 0.997 on this seat without the stop above
 

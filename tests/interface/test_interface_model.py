@@ -1,15 +1,23 @@
 """What the interface model refuses, and what it says; truth: the documented errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from klack.contact.restitution import measure_impact
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 from klack.transient.interface_run import simulate_interface
 from klack.verification.impacts import needle_over_seat
-from klack.verification.interface_bodies import free_rod, rigid_body
+from klack.verification.interface_bodies import (
+    free_rod,
+    modal_model,
+    rigid_body,
+    rod_between_stops,
+)
 
 
 class Distorted(Flexibility):
@@ -178,3 +186,75 @@ def test_progress_ends_at_one():
 
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+def edge(model, beyond):
+    """The same model, with contact points that all lie at the border of the candidates."""
+    return replace(model, rim=np.ones(model.count, dtype=bool), beyond=np.full(model.count, beyond))
+
+
+@pytest.mark.parametrize("height", [None, 0.1e-6, 20e-6])
+def test_a_contact_at_the_rim_is_complete_while_nothing_beyond_closes(height):
+    """Approach of about 1.4 um, wherever the body starts."""
+    model = free_rod(3, stiffness=1e9, gap=0.1e-6)
+    run = {"speed": 0.5, "duration": 70e-6, "height": height}
+    reached = simulate_interface(model, **run).approach
+
+    simulate_interface(edge(model, 1.2 * (reached + 0.1e-6)), **run)
+    with pytest.raises(InputError, match="rim of the candidates"):
+        simulate_interface(edge(model, 1.05 * (reached + 0.1e-6)), **run)
+
+
+def test_a_start_below_the_meshes_does_not_hide_the_rim():
+    model = edge(free_rod(3, stiffness=1e9, gap=10e-6), 10.5e-6)
+    lowered = np.array([0.0, 0.0, -9.9e-6, 0.0, 0.0, 0.0])
+
+    with pytest.raises(InputError, match="rim of the candidates"):
+        simulate_interface(model, speed=0.5, duration=20e-6, offset=lowered)
+
+
+def test_the_rim_of_the_stop_counts_the_way_up():
+    rod = rod_between_stops(3, stiffness=1e9, gaps=(50e-6, 10e-6))
+    up = {"speed": 0.0, "velocity": np.array([0, 0, 0.5, 0, 0, 0]), "duration": 40e-6}
+
+    run = simulate_interface(edge(rod, 13e-6), **up)
+    with pytest.raises(InputError, match="rim of the candidates"):
+        simulate_interface(edge(rod, 11.5e-6), **up)
+
+    assert run.impacts[0].contact == "stop"
+    assert run.approach == 0.0
+
+
+def test_an_impact_on_the_stop_is_seen_with_the_stop_below():
+    """Mirror image of the same impact on the seat; the stop is free and takes momentum."""
+    mass, soft = 3e-3, 1e-8
+    model = modal_model(
+        masses=(mass, 4 * mass),
+        omega=np.zeros(2),
+        traces=np.array([[1.0, -0.5], [-1.0, 0.5]]) / np.sqrt(mass),
+        compliance=soft * np.eye(2),
+        gap=np.array([1e-6, 1e-3]),
+        owner=np.array([0, 1]),
+        axial=np.array([1.0, -1.0]),
+        contacts=(("seat", 0, 1), ("stop", 1, 2)),
+    )
+    model = replace(model, drift=np.diag([1.0, 0.5]) / np.sqrt(mass))
+
+    down = simulate_interface(model, speed=0.5, duration=60e-6, force=3.0)
+    up = simulate_interface(
+        model.with_gap(np.array([1e-3, 1e-6])),
+        speed=0.0,
+        duration=60e-6,
+        force=-3.0,
+        velocity=np.array([0, 0, 0.5, 0, 0, 0]),
+    )
+
+    (seat,), (stop,) = down.impacts, up.impacts
+    assert (seat.contact, seat.side, stop.contact, stop.side) == ("seat", 1.0, "stop", -1.0)
+    for name in ("force", "gap", "velocity_a", "velocity_b", "external_force"):
+        np.testing.assert_allclose(getattr(stop.history, name), getattr(seat.history, name))
+    measures = measure_impact(stop.history)
+    assert measures.approach_speed == pytest.approx(0.502, rel=1e-3)  # 3 N along 1 um
+    assert measures.restitution == pytest.approx(1.0, abs=1e-2)  # 3 N press during 10 us
+    assert measures.impulse_residual == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(stop.velocity, -seat.velocity)

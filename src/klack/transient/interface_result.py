@@ -17,9 +17,12 @@ class ImpactSegment:
     Parameters
     ----------
     contact : str
-        Name of the contact that carried most.
+        Name of the contact that carried first.
+    side : float [-]
+        1 when it pushes the moving body to +z, -1 when the stop is above.
     history : ImpactHistory
-        Axial contact force (magnitude), smallest gap, velocities of the centres of mass.
+        Axial contact force (magnitude), smallest gap, velocities of the centres of mass; seen with
+        the other body below, so velocities and outside forces along +z are ``side`` times these.
     point_force : float32 array, shape (n, nc) [N]
         Mean force of every contact point in each step; no rows when points were not asked for.
     position : array, shape (6,) [m], [rad]
@@ -29,6 +32,7 @@ class ImpactSegment:
     """
 
     contact: str
+    side: float
     history: ImpactHistory
     point_force: NDArray[np.float32]
     position: NDArray[np.float64]
@@ -97,7 +101,7 @@ class InterfaceResult:
     rounds_per_step : float
         Active sets tried per step in contact.
     approach : float [m]
-        Largest way of the centre of mass of the moving body after first touch.
+        Largest way of the centre of mass of the moving body to -z after the first touch below.
     wall_time : float [s]
         Of the time loop.
     """

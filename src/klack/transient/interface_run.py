@@ -176,6 +176,10 @@ class _Run:
         )
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.gap0 = np.array(model.gap)
+        below = model.axial > 1e-6
+        self.clearance = max(
+            0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
+        )
         self.q, self.v, self.lam = np.zeros(M), np.zeros(M), np.zeros(n)
         self.active = np.zeros(n, dtype=bool)
         self.index = np.zeros(n, dtype=np.int64)
@@ -195,7 +199,7 @@ class _Run:
         self.segments: list[ImpactSegment] = []
         self.motion: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         self.steps = 0
-        self.lowest = np.inf
+        self.lowest, self.highest = np.inf, -np.inf
         self.touched_at: float | None = None
 
     def stepper(self, doublings: int) -> _Stepper:
@@ -379,8 +383,9 @@ class _Run:
             path = end - way[-1] + way
             if self.touched_at is None:
                 closed = np.flatnonzero(force[:taken] > 0)
-                self.touched_at = float(path[closed[0]]) if len(closed) else path[0]
+                self.touched_at = float(path[closed[0]]) if len(closed) else None
             self.lowest = min(self.lowest, float(path.min()))
+            self.highest = max(self.highest, float(path.max()))
         return status
 
     def march(  # type: ignore[no-untyped-def]
@@ -486,17 +491,21 @@ class _Run:
             points = np.concatenate(segment.point_force)
         initial, spring, books = segment.ledger
         spent = self.books - books
-        own = segment.velocity[2] - drift[0, 1] if drift.shape[1] > 1 else segment.velocity[2]
+        contact, side, other = self.closed(force)
+        # as if the other body were below: z points from it to the moving one
+        moving, hit, mass = side * drift[:, 0], np.zeros(len(drift)), np.inf
+        if other is not None:
+            hit, mass = side * drift[:, other], model.masses[other]
         history = ImpactHistory(
             step=self.step,
             start=segment.time,
             force=np.abs(force),
             gap=gap,
-            velocity_a=drift[:, 0],
-            velocity_b=drift[:, 1] if drift.shape[1] > 1 else np.zeros(len(drift)),
-            speed=abs(float(own)),
+            velocity_a=moving,
+            velocity_b=hit,
+            speed=abs(float(moving[0] - hit[0])),
             mass_a=model.masses[0],
-            mass_b=model.masses[1] if len(model.masses) > 1 else np.inf,
+            mass_b=mass,
             ledger=EnergyLedger(
                 initial=initial,
                 bodies=self.body_energies(),
@@ -506,34 +515,53 @@ class _Run:
                 work=float(spent[1]),
                 spring=self.spring_energy() - spring + float(spent[4]),
             ),
-            external_force=outside,
+            external_force=side * outside,
             longest_period=model.longest_period,
             solver=f"interface level, {model.mode_count} modal coordinates, "
             f"{model.count} contact points",
         )
         return ImpactSegment(
-            contact=self.busiest(force),
+            contact=contact,
+            side=side,
             history=history,
             point_force=points,
             position=segment.position,
             velocity=segment.velocity,
         )
 
-    def busiest(self, force: NDArray[np.float64]) -> str:
-        """Name of the contact that carried: the sign of the axial force tells which side."""
-        up = float(np.sum(force)) >= 0.0
-        for name, first, last in self.model.contacts:
-            if (float(np.mean(self.model.axial[first:last])) >= 0.0) == up:
-                return name
-        return self.model.contacts[0][0]
+    def closed(self, force: NDArray[np.float64]) -> tuple[str, float, int | None]:
+        """Contact that carried first, its side, and the other body there (None: it has no modes).
+
+        The sign of the axial force tells which side.
+        """
+        model = self.model
+        carried = np.flatnonzero(force)
+        side = -1.0 if len(carried) and force[carried[0]] < 0.0 else 1.0
+        name, first, last = next(
+            (
+                (name, first, last)
+                for name, first, last in model.contacts
+                if side * float(np.sum(model.axial[first:last])) >= 0.0
+            ),
+            model.contacts[0],
+        )
+        met = set(model.owner[np.any(model.traces[first:last] != 0.0, axis=0)].tolist()) - {0}
+        return name, side, min(met, default=None)
+
+    def approach(self) -> float:
+        """Largest way to -z after the first touch below [m]."""
+        return 0.0 if self.touched_at is None else max(0.0, self.touched_at - self.lowest)
 
     def check_rim(self) -> None:
         """Refuse a contact that has grown to the border of the candidate points."""
         at_rim = self.carried & self.model.rim
         if not np.any(at_rim):
             return
-        travel = _RIM_RESERVE * abs(self.start_lift - min(self.lowest, self.start_lift))
-        if np.all(travel * np.abs(self.model.axial[at_rim]) < self.model.beyond[at_rim]):
+        axial = self.model.axial[at_rim]
+        # way to either side from the placement of the meshes, where ``beyond`` belongs; below, a
+        # body that leans or sits off its axis is taken as if it touched where the meshes do
+        travel = np.where(axial >= 0.0, self.clearance + self.approach(), max(self.highest, 0.0))
+        if np.all(_RIM_RESERVE * travel * np.abs(axial) < self.model.beyond[at_rim]):
             return
         at = ", ".join(f"{x * 1e3:.4g}" for x in self.model.points[np.argmax(at_rim)])
         raise InputError(
@@ -546,9 +574,6 @@ class _Run:
     def result(self, wall_time: float) -> InterfaceResult:
         times, positions, velocities = zip(*self.motion, strict=True)
         contact_steps = int(self.books[7])
-        approach = 0.0
-        if self.touched_at is not None:
-            approach = max(0.0, self.touched_at - self.lowest)
         return InterfaceResult(
             impacts=tuple(self.segments),
             motion=RigidMotion(
@@ -567,7 +592,7 @@ class _Run:
             steps=self.steps,
             steps_in_contact=contact_steps,
             rounds_per_step=float(self.books[6]) / max(contact_steps, 1),
-            approach=approach,
+            approach=self.approach(),
             wall_time=wall_time,
         )
 

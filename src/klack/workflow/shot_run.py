@@ -261,7 +261,7 @@ def _path(result: InterfaceResult) -> tuple[NDArray[np.float64], NDArray[np.floa
     spans = []
     for segment in result.impacts:
         history = segment.history
-        speed = history.velocity_a
+        speed = segment.side * history.velocity_a
         way = np.cumsum(0.5 * (speed[1:] + speed[:-1])) * history.step
         times.append(history.edges)
         heights.append(segment.position[2] + np.append(0.0, way))
