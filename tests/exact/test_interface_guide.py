@@ -180,7 +180,7 @@ def test_a_sliding_bounce_loses_mu_times_the_side_impulse(needle):
 
 @pytest.mark.parametrize(("flight", "rtol"), [(False, 1e-6), (True, 5e-3)])
 def test_viscous_drag_decays_exponentially(needle, flight, rtol):
-    """v = v0 exp(-c t / m); a step of flight lasts up to a fifth of m / c here."""
+    """Speed v0 exp(-c t / m); a step of flight lasts up to a fifth of m / c here."""
     drag, time = 30.0, 100e-6
     guide = lateral_guide(needle, clearance=CLEARANCE, stiffness=STIFFNESS, viscous=drag)
 

@@ -53,8 +53,9 @@ def modal_model(
     axial: Array | None = None,
     contacts: tuple[tuple[str, int, int], ...] | None = None,
     points: Array | None = None,
+    damping: Array | None = None,
 ) -> InterfaceModel:
-    """Undamped model from its arrays; coordinate 0 is the flight of the moving body along z.
+    """Model from its arrays, undamped by default; coordinate 0 is the flight of the moving body along z.
 
     Parameters
     ----------
@@ -69,6 +70,7 @@ def modal_model(
         Without it all coordinates belong to the moving body.
     axial, contacts, points : optional
         Without them: one contact below the moving body, on its axis.
+    damping : array, shape (M,), optional [-]
     """
     nc, modes = traces.shape
     if rigid is None:
@@ -80,7 +82,7 @@ def modal_model(
         bodies=("moving", "other")[: len(masses)],
         masses=tuple(masses),
         omega=np.asarray(omega, dtype=float),
-        damping=np.zeros(modes),
+        damping=np.zeros(modes) if damping is None else damping,
         owner=np.zeros(modes, dtype=np.int64) if owner is None else owner,
         traces=np.ascontiguousarray(traces, dtype=float),
         compliance=np.ascontiguousarray(compliance, dtype=float),
