@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from klack.report.contact_map import Cells, ContactMap, averaged, contact_map, line_load_weights
+from klack.report.contact_map import (
+    Cells,
+    ContactMap,
+    averaged,
+    closed,
+    contact_map,
+    line_load_weights,
+)
 from klack.report.content import report_content
 from klack.report.html import render_html
 from klack.report.pdf import render_pdf
@@ -214,6 +221,25 @@ def test_the_pressure_ends_with_the_surface_not_below_it() -> None:
     mean = averaged(np.where(owner < 0, 0.0, 1.0), cells)
 
     np.testing.assert_allclose(mean[7:], 1.0, rtol=1e-12)
+
+
+def test_single_cells_without_a_force_are_no_holes() -> None:
+    """A checkerboard of cells carries everywhere; three empty rows stay empty."""
+    owner = np.kron(np.arange(16 * 12).reshape(16, 12), np.ones((3, 5), dtype=int))
+    cells = Cells(
+        along=np.linspace(0.0, 360.0, 61),
+        across=np.linspace(0.0, 1.0, 49),
+        owner=owner,
+        closed=True,
+    )
+    carries = np.add.outer(np.arange(16), np.arange(12)) % 2 == 0
+    carries[6:9] = False
+
+    found = closed(carries.ravel()[owner], cells)
+
+    assert found[3:15].all()
+    assert not found[18 + 3 : 27 - 3].any()
+    assert found[30:-3].all()
 
 
 def test_the_pressure_at_peak_force() -> None:

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
 from scipy.spatial import cKDTree
 
 from klack.workflow.study import PressureRecord
@@ -28,6 +28,7 @@ __all__ = [
     "ContactMap",
     "averaged",
     "cell_edges",
+    "closed",
     "contact_map",
     "line_load_weights",
     "map_cells",
@@ -235,6 +236,16 @@ def averaged(values: Floats, cells: Cells) -> Floats:
     return np.divide(mean, weight, out=np.zeros_like(mean), where=weight > 0)
 
 
+def closed(carries: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
+    """What carries, with holes and notches of single cells filled, shape (ny, nx)."""
+    rows, columns = (2 * (width // 2) + 3 for width in _cell_size(cells))  # a little more than one
+    # beyond the ends of a ring is its other end, beyond all others nothing
+    wide = np.pad(carries, [(rows, rows), (0, 0)])
+    wide = np.pad(wide, [(0, 0), (columns, columns)], mode="wrap" if cells.closed else "constant")
+    filled = minimum_filter(maximum_filter(wide, (rows, columns)), (rows, columns))
+    return np.asarray(filled[rows:-rows, columns:-columns] & (cells.owner >= 0))
+
+
 def _cell_size(cells: Cells) -> tuple[int, int]:
     """Usual number of rectangles of one cell across and along."""
     rows, columns = np.nonzero(cells.owner >= 0)
@@ -244,5 +255,5 @@ def _cell_size(cells: Cells) -> tuple[int, int]:
 
 def _usual_run(owner: NDArray[np.int64], line: NDArray[np.int64]) -> int:
     """Median number of rectangles that one cell has in one line of the picture."""
-    _, number = np.unique(np.column_stack([owner, line]), axis=0, return_counts=True)
-    return max(round(float(np.median(number))), 1)
+    number = np.bincount(owner * (int(line.max(initial=0)) + 1) + line)
+    return max(round(float(np.median(number[number > 0]))), 1)

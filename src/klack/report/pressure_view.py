@@ -10,6 +10,7 @@ from klack.report.contact_map import (
     Cells,
     ContactMap,
     averaged,
+    closed,
     contact_map,
     line_load_weights,
     map_cells,
@@ -135,7 +136,7 @@ def peak_pressure(view: PressureView, cells: Cells) -> Floats:
     """Pressure at the peak force, averaged over an element, shape (ny, nx) [Pa].
 
     Points at the corners of quadratic elements and points in the middle of their sides may
-    alternate; the mean over both does not.  Zero where the points carry nothing.
+    alternate; the mean over both does not.  Zero where neighbouring points carry nothing.
     """
     single = np.append(view.force[view.peak] / view.area, 0.0)[cells.owner]
-    return np.where(single > 0, averaged(single, cells), 0.0)
+    return np.where(closed(single > 0, cells), averaged(single, cells), 0.0)

@@ -70,7 +70,7 @@ def pressure_rows(views: Sequence[PressureView]) -> tuple[tuple[str, ...], ...]:
         rows.insert(0, ("line load at the peak force", *(_around(v, q) for v, q in pairs)))
         angles = [_degrees(cut) for cut in cells]
         rows += [
-            ("first touch", *(_first(q, a) for q, a in zip(loads, angles, strict=True))),
+            ("first touch", *(_first(v, q, a) for (v, q), a in zip(pairs, angles, strict=True))),
             ("closed all round", *(_closed(v, q) for v, q in pairs)),
         ]
     return tuple(rows)
@@ -90,11 +90,11 @@ def _around(view: PressureView, load: Floats) -> str:
     return f"{text}\n{1e-3 * low:.1f} to {1e-3 * high:.1f} N/mm round the ring"
 
 
-def _first(load: Floats, angle: Floats) -> str:
+def _first(view: PressureView, load: Floats, angle: Floats) -> str:
     """Where the ring begins to carry: the middle of what carries in the first record."""
-    begins = int(np.argmax(load.any(axis=1)))
-    if load[begins].all():
+    if _closes_at_once(view, load):
         return "all round at once"
+    begins = int(np.argmax(load.any(axis=1)))
     middle = np.angle(load[begins] @ np.exp(1j * np.radians(angle)), deg=True)
     return f"at {round(middle) % 360}°"
 
@@ -105,6 +105,11 @@ def _closed(view: PressureView, load: Floats) -> str:
     if not len(whole):
         return f"never\nat most {100 * float((load > 0).mean(axis=1).max()):.0f} % of it"
     start, end = float(view.time[whole[0]]), float(view.time[whole[-1]])
-    if start < _AT_ONCE * float(view.time[-1]):
+    if _closes_at_once(view, load):
         return f"until {quantity(end, 's', 3)}"
     return f"from {quantity(start, 's', 3)} to {quantity(end, 's', 3)}"
+
+
+def _closes_at_once(view: PressureView, load: Floats) -> bool:
+    whole = np.flatnonzero((load > 0).all(axis=1))
+    return bool(len(whole)) and bool(view.time[whole[0]] < _AT_ONCE * view.time[-1])
