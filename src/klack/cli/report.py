@@ -1,4 +1,4 @@
-"""``klack report``: the report of a stored result, of an impact or of a stroke."""
+"""``klack report``: the report of a stored result, of an impact, of a stroke or of shots."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ __all__ = ["report"]
 def report(
     result: Annotated[
         Path,
-        Parameter(name="RESULT", help="Folder that klack impact or klack stroke wrote."),
+        Parameter(name="RESULT", help="Folder that klack impact, stroke or shots wrote."),
     ],
     /,
     *,
@@ -42,9 +42,11 @@ def report(
 def _load(result: Path) -> "Study":
     """Read whichever kind of study the store holds."""
     from klack.workflow.record_store import stored_format
+    from klack.workflow.shots_store import SHOTS_FORMAT, load_shots
     from klack.workflow.store import load_study
     from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
 
-    return (
-        load_stroke(result) if stored_format(result) == STROKE_FORMAT.name else load_study(result)
-    )
+    name = stored_format(result)
+    if name == STROKE_FORMAT.name:
+        return load_stroke(result)
+    return load_shots(result) if name == SHOTS_FORMAT.name else load_study(result)

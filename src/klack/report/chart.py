@@ -95,7 +95,8 @@ class Curve:
 
     ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1) or ``points``.
     A curve without ``label`` has no entry in the legend and no number under the pointer; one that
-    is not ``listed`` has the number alone.
+    is not ``listed`` has the number alone.  ``names`` are words for the single points, shown under
+    the pointer with both numbers.
     """
 
     x: NDArray[np.float64]
@@ -106,6 +107,7 @@ class Curve:
     width: float = 1.8
     drawn: Literal["line", "steps", "points"] = "line"
     listed: bool = True
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:

@@ -36,7 +36,7 @@ def plotly_chart(chart: Chart) -> dict[str, Any]:
         "height": int(70 + _PANEL_HEIGHT * sum(panel.share for panel in chart.panels)),
         "showlegend": True,
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
-        "hovermode": "x unified",
+        "hovermode": "closest" if _has_names(chart) else "x unified",
         "shapes": [],
         "annotations": [],
         "xaxis": _axis(chart.x) | {"anchor": f"y{_suffix(len(heights) - 1)}"},
@@ -100,6 +100,10 @@ def _suffix(panel: int) -> str:
     return "" if panel == 0 else str(panel + 1)
 
 
+def _has_names(chart: Chart) -> bool:
+    return any(curve.names for panel in chart.panels for curve in panel.curves)
+
+
 def _numbers(values: ArrayLike) -> list[float | None]:
     """Six digits are more than a picture can show; gaps become null."""
     return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(values)]
@@ -138,7 +142,12 @@ def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) 
         "hovertemplate": f"%{{y:.4g}} {escape(y_unit)}",
         "xhoverformat": ".4g",
     }
-    if not curve.label:
+    if curve.names:
+        trace["text"] = [escape(name) for name in curve.names]
+        trace["hovertemplate"] = (
+            f"%{{text}}: %{{x:.4g}} {escape(x_unit)}, %{{y:.4g}} {escape(y_unit)}<extra></extra>"
+        )
+    elif not curve.label:
         trace["hoverinfo"] = "skip"
         del trace["hovertemplate"]
     colour = COLOURS[curve.colour]

@@ -1,17 +1,21 @@
 """The content of a report of any kind of study."""
 
 from klack.report.content import Content, report_content
+from klack.report.shots_content import shots_content
 from klack.report.stroke_content import stroke_content
+from klack.workflow.shots_study import ShotsStudy
 from klack.workflow.stroke_study import StrokeStudy
 from klack.workflow.study import ImpactStudy
 
 __all__ = ["Study", "study_content"]
 
-Study = ImpactStudy | StrokeStudy
+Study = ImpactStudy | StrokeStudy | ShotsStudy
 
 
 def study_content(study: Study) -> Content:
     """Put a study into words, tables and figures."""
     if isinstance(study, StrokeStudy):
         return stroke_content(study)
+    if isinstance(study, ShotsStudy):
+        return shots_content(study)
     return report_content(study)
