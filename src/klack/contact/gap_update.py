@@ -107,9 +107,9 @@ class RigidGaps:
         hats = hat_quadrature(space, *slave)
         faces = curved_faces(*master)
         within = _LISTED_WITHIN * space.reach
-        first, listed = list_near(
-            hats.position, hats.normal, faces.centre, faces.axes, faces.half, within
-        )
+        lines = (hats.position, hats.normal)
+        met, _, _ = cut_nearest(*lines, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
+        first, listed = list_near(*lines, met, faces.centre, faces.axes, faces.half, within)
         extents = [
             np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
             for mesh, surface in (slave, master)

@@ -24,6 +24,8 @@ __all__ = [
 MONOMIALS = 8
 """1, x, y, x^2, x y, y^2, x^2 y, x y^2."""
 
+_CLOSE = 0.1  # half widths of a face within which no other sheet of the surface can be
+
 _BOX_SAMPLES = 5  # along an edge, at which a face is sampled for its box
 
 
@@ -130,7 +132,7 @@ def cut_nearest(  # type: ignore[no-untyped-def]
     for p in range(count):
         face[p], xi[p, 0], xi[p, 1], gap[p] = _nearest_of(
             *(every, points[p], normals[p], coefficients, centre, axes, half, triangle),
-            *(inside, opposed, deepest),
+            *(inside, opposed, deepest, 0.0),
         )
     return face, xi, gap
 
@@ -153,7 +155,8 @@ def cut_listed(  # type: ignore[no-untyped-def]
     """Nearest valid cut of every line, looked for among a few faces first.
 
     Line p tries the faces ``listed[first[p]:first[p + 1]]``, and all others if none of these is
-    cut.  Everything else is as in :func:`cut_nearest`.
+    cut.  A cut much nearer than its face is wide is the nearest one: between two sheets of a
+    surface that look the same way there is a whole wall.  Else as :func:`cut_nearest`.
 
     Returns
     -------
@@ -166,7 +169,7 @@ def cut_listed(  # type: ignore[no-untyped-def]
         for faces in (listed[first[p] : first[p + 1]], every):
             face, _, _, gap[p] = _nearest_of(
                 *(faces, points[p], normals[p], coefficients, centre, axes, half, triangle),
-                *(inside, opposed, deepest),
+                *(inside, opposed, deepest, _CLOSE),
             )
             if face >= 0:
                 break
@@ -174,8 +177,10 @@ def cut_listed(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def list_near(points, normals, centre, axes, half, within):  # type: ignore[no-untyped-def]
+def list_near(points, normals, start, centre, axes, half, within):  # type: ignore[no-untyped-def]
     """Faces whose boxes, larger by ``within`` [m] on all sides, each line meets.
+
+    Face ``start[p]`` (-1: none) comes first.
 
     Returns
     -------
@@ -188,10 +193,11 @@ def list_near(points, normals, centre, axes, half, within):  # type: ignore[no-u
         listed = np.empty(first[-1], dtype=np.int64)
         count = 0
         for p in range(len(points)):
-            for f in range(len(centre)):
-                if _meets_box(
-                    *(centre[f] - points[p], normals[p], axes[f], half[f], within),
-                ):
+            for i in range(-1, len(centre)):
+                f = i if i >= 0 else start[p]
+                if f < 0 or (i == start[p] and i >= 0):
+                    continue
+                if _meets_box(centre[f] - points[p], normals[p], axes[f], half[f], within):
                     if fill:
                         listed[count] = f
                     count += 1
@@ -219,9 +225,12 @@ def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _nearest_of(  # type: ignore[no-untyped-def]
-    faces, x, n, coefficients, centre, axes, half, triangle, inside, opposed, deepest
+    faces, x, n, coefficients, centre, axes, half, triangle, inside, opposed, deepest, close
 ):
-    """Nearest valid cut of one line with some faces; returns face, u, v, gap."""
+    """Nearest valid cut of one line with some faces; returns face, u, v, gap.
+
+    A cut nearer than ``close`` half widths of its face ends the search.
+    """
     x0, x1, x2 = x
     n0, n1, n2 = n
     best, found, at_u, at_v, gap = np.inf, -1, 0.0, 0.0, np.nan
@@ -249,6 +258,8 @@ def _nearest_of(  # type: ignore[no-untyped-def]
             within = abs(u) <= 1.0 + inside and abs(v) <= 1.0 + inside
         if within:
             best, found, at_u, at_v, gap = abs(g), f, u, v, g
+            if best < close * h0:
+                break
     return found, at_u, at_v, gap
 
 
