@@ -1,6 +1,10 @@
 """Make the pictures of the documentation: ``python docs/pictures.py RESULT...``.
 
 Of ``klack demo`` come section.svg and force.svg, of ``klack stroke demo-stroke`` stroke.svg.
+
+Of two results of ``klack impact CASE --level interface`` comes pressure.svg; their cases are
+copies of ``demo-valve`` with titles of their own, the second with
+``placement: {eccentricity: 1 um}`` under ``motion``.
 """
 
 import sys
@@ -9,6 +13,8 @@ from pathlib import Path
 
 from klack.report.chart import Chart
 from klack.report.figures import force_chart
+from klack.report.pressure_figure import draw_pressure
+from klack.report.pressure_view import PressureView, pressure_view
 from klack.report.printed import svg_chart
 from klack.report.section_figure import section_figure
 from klack.report.stroke_figures import actuation_chart
@@ -23,11 +29,18 @@ IMAGES = Path(__file__).parent / "images"
 
 def main(results: list[Path]) -> None:
     """Write the pictures that belong to each result."""
+    rings: list[PressureView] = []
     for result in results:
         if stored_format(result) == STROKE_FORMAT.name:
             (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(load_stroke(result))))
+            continue
+        study = load_study(result)
+        if study.sections:
+            _write_impact(study)
         else:
-            _write_impact(load_study(result))
+            rings += _ring(study)
+    if len(rings) > 1:
+        (IMAGES / "pressure.svg").write_bytes(draw_pressure(rings))
 
 
 def stroke_chart(study: StrokeStudy) -> Chart:
@@ -39,6 +52,13 @@ def stroke_chart(study: StrokeStudy) -> Chart:
     axis = replace(first.y, range=(-0.05 * top, 1.4 * top))  # with room for the words of the marks
     kept[0] = replace(first, y=axis, marks=whole.panels[0].marks)
     return replace(whole, panels=tuple(kept))
+
+
+def _ring(study: ImpactStudy) -> list[PressureView]:
+    """Contact forces of the interface level, under the title of the case."""
+    result = study.levels["interface"]
+    view = pressure_view(study.title, result.pressure, result.measures.first_touch)
+    return [view] if view is not None and view.places.shape == "ring" else []
 
 
 def _write_impact(study: ImpactStudy) -> None:
