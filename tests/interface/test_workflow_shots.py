@@ -1,0 +1,232 @@
+"""Many shots; truth = a ball thrown upwards, energy, and the same shots computed otherwise."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.case import load_case
+from klack.errors import InputError
+from klack.workflow.progress import silent
+from klack.workflow.record_store import stored_format
+from klack.workflow.shot_draw import centric_draw, draw_shot
+from klack.workflow.shot_model import build_shots
+from klack.workflow.shot_run import columns_of, run_shot, simulate_shot
+from klack.workflow.shots import judge_rule, run_shots
+from klack.workflow.shots_log import LOG_NAME, ShotLog, fingerprint, finish_log, logged_shots
+from klack.workflow.shots_pool import run_shots_on
+from klack.workflow.shots_store import SHOTS_FORMAT, load_shots, save_shots
+from klack.workflow.shots_study import MEASURES, ShotColumns
+from klack.workflow.shots_summary import (
+    DISTRIBUTION_COLUMNS,
+    distribution_rows,
+    shots_to_json,
+)
+
+CASE = load_case(Path(__file__).parents[1] / "data" / "case" / "shots.yaml")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return build_shots(CASE, silent, threads=1)
+
+
+@pytest.fixture(scope="module")
+def draws(model):
+    return [draw_shot(CASE, 1, index, model.touch_height) for index in range(4)]
+
+
+@pytest.fixture(scope="module")
+def centred(model):
+    return run_shot(model.setup, centric_draw(CASE))
+
+
+@pytest.fixture(scope="module")
+def alone(model, draws):
+    """The shots one by one, in this process."""
+    return [run_shot(model.setup, draw) for draw in draws]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A study that was interrupted after two shots and went on."""
+    folder = tmp_path_factory.mktemp("shots")
+
+    def stop(stage: str, fraction: float) -> None:
+        if stage == "shots" and fraction >= 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_shots(CASE, count=4, workers=1, folder=folder, progress=stop, threads=1)
+    assert logged_shots(folder) == 2
+    done = run_shots(CASE, count=4, workers=1, folder=folder, threads=1)
+    finish_log(folder)
+    assert not (folder / LOG_NAME).exists()
+    return done
+
+
+def same(one: ShotColumns, other: ShotColumns) -> None:
+    for field in fields(ShotColumns):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+def test_a_centred_rebound_is_a_throw(model, centred):
+    """Height v^2 m / (2 F) and time 2 v m / F after the impact; the body still rings a little."""
+    numbers = centred.numbers
+    speed = numbers["restitution"] * numbers["approach_speed"]
+    fall = numbers["force"] / model.setup.model.mass
+
+    # the bodies are still pressed together at separation: 1 % of the height
+    assert numbers["rebound_height"] == pytest.approx(speed**2 / (2 * fall), rel=0.02)
+    flight = numbers["second_impact"] - numbers["contact_time"]
+    assert flight == pytest.approx(2 * speed / fall, rel=0.02)
+    # waves of the coarse mesh, 8 layers round the circle
+    assert numbers["rocking"] < 1e-5
+    assert numbers["impacts"] == 2
+    impulse = model.setup.model.mass * (1 + numbers["restitution"]) * numbers["approach_speed"]
+    pressed = numbers["force"] * numbers["contact_time"]
+    assert numbers["impulse"] == pytest.approx(impulse + pressed, rel=1e-3)
+
+
+def test_traces_start_at_first_touch(model, centred, alone):
+    time, force_time = model.setup.trace_time, model.setup.force_time
+    for outcome in (centred, *alone):
+        assert outcome.height[0] == pytest.approx(0.0, abs=1e-9)
+        top = np.nanmax(outcome.height[time < outcome.numbers["second_impact"]])
+        # on a grid of duration/600
+        assert top == pytest.approx(outcome.numbers["rebound_height"], rel=1e-3)
+    assert centred.numbers["sub_contacts"] == 1
+    impulse = np.trapezoid(centred.force, force_time)
+    assert impulse == pytest.approx(centred.numbers["impulse"], rel=0.01)
+
+
+def test_shots_off_centre_lose_rebound_to_rocking_and_keep_the_books(alone):
+    for outcome in alone:
+        assert outcome.numbers["eccentricity"] > 0
+        assert outcome.numbers["rocking"] > 1e-4
+        assert abs(outcome.numbers["energy_residual"]) < 1e-4
+
+
+def test_a_frictionless_guide_takes_no_energy(model, draws):
+    """Steps of 50 ns in the contact with the bore: 0.1 % of the energy."""
+    for draw in draws:
+        energy = simulate_shot(model.setup, replace(draw, friction=0.0)).energy
+        assert abs(energy.guide) < 1e-3 * energy.initial
+
+
+def test_friction_in_the_guide_brakes(model, draws):
+    energy = simulate_shot(model.setup, replace(draws[1], friction=0.3)).energy
+    assert energy.guide > 1e-3 * energy.initial
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_same_numbers(model, draws, alone):
+    log = ShotLog(None, "")
+    run_shots_on(2, model.setup, draws, log, silent)
+
+    same(columns_of([log.done[draw.index] for draw in draws]), columns_of(alone))
+    for draw, outcome in zip(draws, alone, strict=True):
+        np.testing.assert_array_equal(log.done[draw.index].height, outcome.height)
+
+
+def test_an_interrupted_study_goes_on_with_the_same_numbers(study, alone):
+    assert study.resumed == 2
+    same(study.shots, columns_of(alone))
+
+
+def test_a_log_of_another_study_is_not_used(tmp_path: Path, alone):
+    mark = fingerprint(CASE, 1, None)
+    log = ShotLog(tmp_path, mark)
+    for outcome in alone:
+        log.add(outcome)
+
+    assert set(ShotLog(tmp_path, mark).done) == {0, 1, 2, 3}
+    assert fingerprint(CASE, 2, None) != mark
+    assert ShotLog(tmp_path, fingerprint(CASE, 2, None)).done == {}
+    assert logged_shots(tmp_path) == 0
+
+
+def test_a_line_cut_off_costs_one_shot(tmp_path: Path, alone):
+    log = ShotLog(tmp_path, "mark")
+    for outcome in alone:
+        log.add(outcome)
+    path = tmp_path / LOG_NAME
+    path.write_bytes(path.read_bytes()[:-40])
+
+    again = ShotLog(tmp_path, "mark")
+    assert set(again.done) == {0, 1, 2}
+    again.add(alone[3])
+    whole = ShotLog(tmp_path, "mark")
+    assert set(whole.done) == {0, 1, 2, 3}
+    same(columns_of(list(whole.done.values())), columns_of(alone))
+
+
+def test_a_failing_shot_is_named(model, draws):
+    rim = replace(
+        model.setup.model,
+        rim=np.ones(model.setup.model.count, dtype=bool),
+        beyond=np.zeros(model.setup.model.count),
+    )
+    with pytest.raises(InputError, match=r"(?s)shot 2.*contact\.reach"):
+        run_shots_on(1, replace(model.setup, model=rim), draws[2:3], ShotLog(None, ""), silent)
+
+
+def test_a_study_comes_back_from_disk(study, tmp_path: Path):
+    save_shots(study, tmp_path)
+    back = load_shots(tmp_path)
+
+    assert stored_format(tmp_path) == SHOTS_FORMAT.name
+    same(back.shots, study.shots)
+    assert back.rule == study.rule
+    assert back.distributions == study.distributions
+    assert set(back.pressures) == {"centric", "highest", "lowest"}
+    np.testing.assert_array_equal(back.shot_traces.height, study.shot_traces.height)
+
+
+def test_numbers_for_scripts(study):
+    data = shots_to_json(study)
+
+    assert data["seed"] == 1
+    assert len(data["shots"]) == 4
+    assert data["shots"][0].keys() == data["centric"].keys()
+    for key in ("restitution", "rebound_height_m", "peak_force_N", "contact_time_s", "tilt_rad"):
+        assert data["shots"][2][key] is not None
+    highest = max(range(4), key=lambda i: data["shots"][i]["rebound_height_m"])
+    assert data["highest"] == highest
+    bias = data["shots"][highest]["rebound_height_m"] - data["centric"]["rebound_height_m"]
+    assert data["rule"]["rebound_height_bias"] == pytest.approx(bias)
+    spread = data["distribution"]["restitution"]
+    values = [shot["restitution"] for shot in data["shots"]]
+    assert spread["mean"] == pytest.approx(np.mean(values))
+    assert spread["quantile_1"] == max(values)
+    rows = distribution_rows(study)
+    assert len(rows) == len(MEASURES)
+    assert all(len(row) == len(DISTRIBUTION_COLUMNS) for row in rows)
+
+
+def columns(restitution, height) -> ShotColumns:
+    given = {"restitution": restitution, "rebound_height": height}
+    return ShotColumns(
+        **{
+            field.name: np.array(given.get(field.name, np.zeros(len(restitution))))
+            for field in fields(ShotColumns)
+        }
+    )
+
+
+def test_the_rule_is_judged_by_the_restitution_of_the_highest_shot():
+    centric = columns([0.8], [20e-6])
+    right = judge_rule(columns([0.7, 0.804, 0.81], [15e-6, 21e-6, 19e-6]), centric, 1)
+    wrong = judge_rule(columns([0.7, 0.78], [15e-6, 19e-6]), centric, 1)
+
+    assert right.holds
+    assert right.relative_restitution_bias == pytest.approx(0.005)
+    assert right.rebound_height_bias == pytest.approx(1e-6)
+    assert right.rank == 1
+    assert "right for this valve" in right.sentence
+    assert not wrong.holds
+    assert wrong.restitution_bias == pytest.approx(-0.02)
+    assert wrong.rank == 0
+    assert "wrong for this valve" in wrong.sentence
+    assert "-2.50 %" in wrong.sentence
