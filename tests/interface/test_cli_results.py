@@ -23,8 +23,9 @@ def asked(monkeypatch, impact_study):
     """Replace the calculation by a finished study; tell what it was asked for."""
     got = SimpleNamespace(study=impact_study)
 
-    def run_impact(case, *, levels, progress, threads):
+    def run_impact(case, *, levels, certify, progress, threads):
         got.case, got.levels, got.threads = case, levels, threads
+        got.certify = certify
         progress("mesh", 1.0)
         return got.study
 
@@ -74,6 +75,12 @@ def test_options_of_impact(asked, capsys):
     out, err = capsys.readouterr()
     assert json.loads(out)["case"] == "demo"
     assert err == ""
+
+
+@pytest.mark.parametrize(("option", "expected"), [((), True), (("--no-certify",), False)])
+def test_the_error_is_estimated_unless_told_otherwise(asked, option, expected):
+    assert main(["impact", "two-rods", "--no-report", "--quiet", *option]) == 0
+    assert asked.certify is expected
 
 
 def test_levels_come_from_the_case_if_none_are_asked_for(asked):
