@@ -97,20 +97,25 @@ def two_spheres(
 
 
 def blocked_bar_model(
-    length: float, *, modes: int, material: Material = STEEL, elements: int = 60
+    length: float,
+    *,
+    modes: int,
+    radius: float = 2e-3,
+    material: Material = STEEL,
+    elements: int = 60,
 ) -> InterfaceModel:
-    """Bar of radius 2 mm without lateral strain over a wall that is a million times stiffer.
+    """Bar without lateral strain over a wall that is a million times stiffer.
 
     Parameters
     ----------
     length : float [m]
     modes : int
         Plane ones of the bar, the lowest; picked by the compliance they give a uniform pressure.
+    radius : float [m]
     material : Material
     elements : int
     """
-    radius = 2e-3
-    bar, space = blocked_bar(length, radius, elements, material)
+    bar, _ = blocked_bar(length, radius, elements, material)
     corners = [np.array([0.0, 2.0 * radius]), np.array([-length, 0.0])]
     wall_mesh = lattice_mesh("quad8", corners)
     wall = elastic_body(

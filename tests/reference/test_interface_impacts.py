@@ -1,0 +1,196 @@
+"""Impacts at the interface level against solutions of others.
+
+Hertz (Johnson 1985, section 11.4), the wave equation, Runge-Kutta on the same modes, tables of
+needles on a spring (exact delay relation; rods with few modes by velocity Verlet), and the
+technology showcase "Impact of a Metal Bar on a Rigid Wall" of ANSYS (problem 17).
+"""
+
+from math import inf, pi, sqrt
+
+import numpy as np
+import pytest
+
+from klack.contact.restitution import find_contacts, measure_impact
+from klack.materials import Material
+from klack.transient.full_order import simulate_full_order
+from klack.transient.interface_model import InterfaceContact
+from klack.transient.interface_run import simulate_interface
+from klack.verification.beam_impact import sphere_on_beam
+from klack.verification.impacts import STEEL, bulk_wave_speed
+from klack.verification.interface_bodies import free_rod, modal_model, reduce_bodies
+from klack.verification.interface_impacts import blocked_bar_model, hertz_impact, two_spheres
+
+SPEED = 0.5
+
+
+@pytest.fixture(scope="module")
+def beam():
+    impact = sphere_on_beam()
+    return impact, impact.touches(speed=SPEED, duration=5e-3)
+
+
+def test_sub_impacts_of_a_sphere_on_a_beam(beam):
+    """Four of them in 5 ms; number, times and impulses, to a tenth of a step of 0.5 us."""
+    impact, touches = beam
+    step = 0.5e-6
+
+    run = simulate_interface(impact.model(), speed=SPEED, duration=5e-3, step=step, points=False)
+
+    found = find_contacts(run.history, threshold=1e-4)
+    assert len(found) == len(touches) == 4
+    for phase, touch in zip(found, touches, strict=True):
+        impulse = run.history.force[phase.first : phase.last].sum() * step
+        assert impulse == pytest.approx(touch.impulse, rel=2e-5)
+        assert phase.start == pytest.approx(touch.start, abs=step)
+        assert phase.end == pytest.approx(touch.end, abs=step)
+    assert run.energy.residual == pytest.approx(0.0, abs=1e-5)
+
+
+def test_springs_in_parallel_stand_for_hertz(beam):
+    """30 pieces of the law: impulses of the law itself to 1e-4."""
+    impact, touches = beam
+
+    smooth = impact.touches(speed=SPEED, duration=5e-3, smooth=True)
+
+    assert len(smooth) == len(touches)
+    for piecewise, exact in zip(touches, smooth, strict=True):
+        assert piecewise.impulse == pytest.approx(exact.impulse, rel=1e-4)
+        assert piecewise.end == pytest.approx(exact.end, rel=1e-3)
+
+
+@pytest.mark.parametrize(("modes", "radius_b", "speed"), [(0, 2e-3, 0.1), (12, 3e-3, 0.2)])
+def test_two_spheres_follow_hertz(modes, radius_b, speed):
+    """Contact radius over sphere radius 1/80 and 1/50: half of that is the error of the theory."""
+    hertz = hertz_impact(2e-3, radius_b, speed)
+    a, b, space = two_spheres(2e-3, radius_b, size=hertz.radius / 5.0)
+    contact = InterfaceContact(name="face", upper="upper", lower="lower", space=space)
+    model, _ = reduce_bodies((a, b), [contact], (modes, modes))
+
+    run = simulate_interface(
+        model,
+        speed=speed,
+        duration=1.3 * hertz.contact_time,
+        step=hertz.contact_time / 800,
+        height=1e-9,
+    )
+
+    measures = measure_impact(run.history)
+    limit = 0.5 * hertz.radius / 2e-3
+    assert measures.peak_force == pytest.approx(hertz.peak_force, rel=limit)
+    assert measures.contact_time == pytest.approx(hertz.contact_time, rel=limit)
+    history = run.history
+    parting = history.velocity_a[-1] - history.velocity_b[-1]
+    assert parting / speed == pytest.approx(1.0, abs=1e-5)
+    momentum = a.mass * history.velocity_a + b.mass * history.velocity_b
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-12)
+
+
+def test_full_order_spheres_agree_with_the_interface_level():
+    hertz = hertz_impact(2e-3, 2e-3, 0.2)
+    a, b, space = two_spheres(2e-3, 2e-3, size=hertz.radius / 5.0)
+    contact = InterfaceContact(name="face", upper="upper", lower="lower", space=space)
+    model, _ = reduce_bodies((a, b), [contact], (12, 12))
+    duration, step = 1.3 * hertz.contact_time, hertz.contact_time / 400
+
+    ours = measure_impact(
+        simulate_interface(model, speed=0.2, duration=duration, step=step, height=1e-9).history
+    )
+    full = measure_impact(
+        simulate_full_order(a, b, space, speed=0.2, duration=duration, step=step).history
+    )
+
+    assert ours.peak_force == pytest.approx(full.peak_force, rel=1e-3)
+    assert ours.contact_time == pytest.approx(full.contact_time, rel=3e-3)  # found to a step
+    assert full.peak_force == pytest.approx(hertz.peak_force, rel=1e-2)
+
+
+def test_bar_without_lateral_strain_gives_a_square_pulse():
+    """F = rho c_p A v, T = 2 L / c_p, e = 1; forty modes ring at the front, their mean is right."""
+    length, c = 0.03, bulk_wave_speed(STEEL)
+    time = 2 * length / c
+    model = blocked_bar_model(length, modes=40)
+
+    run = simulate_interface(model, speed=SPEED, duration=1.6 * time, step=time / 4000)
+
+    history = run.history
+    force = STEEL.density * c * pi * 2e-3**2 * SPEED
+    inside = (history.time > 0.2 * time) & (history.time < 0.8 * time)
+    assert history.force[inside].mean() == pytest.approx(force, rel=1e-2)
+    assert measure_impact(history).contact_time == pytest.approx(time, rel=1e-2)
+    assert history.impulse == pytest.approx(2 * model.mass * SPEED, rel=5e-3)
+    assert history.velocity_a[-1] / SPEED == pytest.approx(1.0, abs=1e-2)
+    assert history.velocity_a[-1] < SPEED
+    pressure = run.impacts[0].point_force[inside].mean(axis=0) / model.area
+    np.testing.assert_allclose(pressure, force / (pi * 2e-3**2), rtol=1e-2)
+    np.testing.assert_allclose(pressure, pressure.mean(), rtol=1e-5)  # a plane wave
+
+
+@pytest.mark.parametrize(
+    ("kappa", "modes", "peak", "restitution", "separation"),
+    [
+        (1.0, 200, 0.869142, 0.974081, 3.63660),
+        (3.0, 200, 0.997523, 0.982917, 2.55920),
+        (11.37, 200, 1.000000, 0.995452, 2.14760),
+        (11.37, 10, 1.0292, 0.99586, None),
+        (11.37, 20, 1.0075, 0.99548, None),
+    ],
+)
+def test_needle_on_a_spring(kappa, modes, peak, restitution, separation):
+    """Spring of kappa E A / L under a rod; with few modes the residual compliance carries on."""
+    length, modulus = 30e-3, 210e9 * pi * 2e-3**2
+    c = sqrt(210e9 / 7850.0)
+    model = free_rod(modes, stiffness=kappa * modulus / length)
+
+    run = simulate_interface(
+        model, speed=SPEED, duration=4.0 * length / c, step=length / c / 2000, points=False
+    )
+
+    measures = measure_impact(run.history)
+    assert measures.peak_force / (modulus / c * SPEED) == pytest.approx(peak, rel=1e-4)
+    assert run.history.velocity_a[-1] / SPEED == pytest.approx(restitution, abs=1e-5)
+    if separation is not None:
+        assert measures.contact_time * c / length == pytest.approx(separation, rel=5e-5)
+
+
+def test_ansys_metal_bar_rigid():
+    """Rigid bar from 1 mm above a rigid wall: 227.00 m/s and 239.61 J before and after.
+
+    The energy belongs to 9.300 g (the cylinder of D6.4 x L32.4 mm of copper has 9.308 g); the wall
+    is a spring of 1e12 N/m here.
+    """
+    speed, energy = 227.0, 239.61
+    mass = 2.0 * energy / speed**2
+    model = modal_model(
+        masses=(mass, inf),
+        omega=np.zeros(1),
+        traces=np.array([[mass**-0.5]]),
+        compliance=np.array([[1e-12]]),
+        gap=np.array([1e-3]),
+    )
+    time = pi * sqrt(mass / 1e12)
+
+    run = simulate_interface(model, speed=speed, duration=8e-6, step=time / 1000, flight=True)
+
+    rebound = run.motion.velocity[-1, 2]
+    assert mass == pytest.approx(8930.0 * pi * 3.2e-3**2 * 32.4e-3, rel=1e-3)
+    assert len(run.impacts) == 1
+    assert round(rebound, 2) == 227.00
+    assert round(0.5 * mass * rebound**2, 2) == 239.61
+    assert run.energy.final == pytest.approx(energy, rel=1e-6)
+
+
+def test_ansys_metal_bar_elastic():
+    """The elastic bar without lateral strain: energy unchanged, 227 m/s but for its ringing."""
+    copper = Material(name="copper", young=117e9, poisson=0.35, density=8930.0)
+    length, speed = 32.4e-3, 227.0
+    time = 2 * length / bulk_wave_speed(copper)
+    model = blocked_bar_model(length, modes=40, radius=3.2e-3, material=copper)
+
+    run = simulate_interface(model, speed=speed, duration=1.6 * time, step=time / 4000)
+
+    history = run.history
+    rebound = history.velocity_a[-1]
+    assert 0.5 * model.mass * speed**2 == pytest.approx(239.61, rel=1e-3)
+    assert run.energy.final == pytest.approx(run.energy.initial, rel=1e-6)
+    assert rebound == pytest.approx(speed, rel=1e-2)
+    assert history.impulse == pytest.approx(model.mass * (speed + rebound), rel=1e-12)
