@@ -55,7 +55,7 @@ def modal_model(
     points: Array | None = None,
     damping: Array | None = None,
 ) -> InterfaceModel:
-    """Model from its arrays, undamped by default; coordinate 0 is the flight of the moving body along z.
+    """Model from its arrays; coordinate 0 is the flight of the moving body along z.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ GROUPS = (
     "integrator",
     "impact",
     "transient",
+    "interface",
     "spectra",
     "mechanics",
     "fluids",
