@@ -22,7 +22,18 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.verification import GROUPS, Check, compare, run_checks
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
-COMMANDS = ["compare", "demo", "export", "impact", "reduce", "report", "schema", "stroke", "verify"]
+COMMANDS = [
+    "compare",
+    "demo",
+    "export",
+    "impact",
+    "reduce",
+    "report",
+    "schema",
+    "shots",
+    "stroke",
+    "verify",
+]
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,7 @@ from klack.mesh.rigid import Pose
 from klack.workflow.shot_draw import centric_draw, draw_shot, extreme_placements, polar
 from klack.workflow.shot_run import rigid_placement
 
-GUIDED = load_case(Path(__file__).parents[1] / "data" / "case" / "shots.yaml")
+GUIDED = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
 TOUCH = -0.42e-3
 # Kolmogorov-Smirnov: a true distribution fails once in a thousand seeds
 SURE = 1e-3

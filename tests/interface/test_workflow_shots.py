@@ -24,7 +24,7 @@ from klack.workflow.shots_summary import (
     shots_to_json,
 )
 
-CASE = load_case(Path(__file__).parents[1] / "data" / "case" / "shots.yaml")
+CASE = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
 
 
 @pytest.fixture(scope="module")
