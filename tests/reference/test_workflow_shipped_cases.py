@@ -9,9 +9,10 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from klack.case import load_case, shipped_cases
+from klack.case import load_case, read_case, shipped_cases
 from klack.case.schema import Case
 from klack.workflow.impact import run_impact
+from klack.workflow.shots import run_shots
 from klack.workflow.study import ImpactStudy
 
 pytestmark = pytest.mark.slow
@@ -30,6 +31,7 @@ def study_of(name: str, *levels: str) -> ImpactStudy:
 
 def test_all_shipped_cases_are_tested():
     assert set(shipped_cases()) == {
+        "demo-shots",
         "demo-stroke",  # in test_workflow_stroke.py
         "demo-valve",
         "demo-valve-axisymmetric",
@@ -149,3 +151,31 @@ def test_solid_demo_valve_reduced():
     assert result.measures.sub_contacts == 1
     assert study.contact.size_ratio < 1.2
     assert 0.8 < result.measures.restitution < 1.0
+
+
+def test_shots_of_the_guided_valve():
+    """On a coarse mesh.  Truth: momentum, and a throw against the spring that closes."""
+    path = shipped_cases()["demo-shots"]
+    text = path.read_text(encoding="utf-8")
+    for fine, coarse in (
+        ("{size: 0.02 mm, extent: 0.08 mm}", "{size: 0.05 mm, extent: 0.05 mm}"),
+        ("layers: 18", "layers: 12"),
+        ("size: 2 mm", "size: 4 mm"),
+        ("grading: 0.4", "grading: 0.9"),
+    ):
+        assert fine in text
+        text = text.replace(fine, coarse)
+    study = run_shots(read_case(text, path), count=3, workers=1)
+
+    centric, shots = study.centric.row(0), study.shots
+    back = centric["restitution"] * centric["approach_speed"]
+    impulse = study.mass * (back + centric["approach_speed"]) + 6.0 * centric["contact_time"]
+    assert centric["impulse"] == pytest.approx(impulse, rel=2e-3)
+    # m v^2 / 2 = 6 N h + 10 N/mm h^2 / 2, while the body still rings
+    top = (sqrt(36.0 + 1e4 * study.mass * back**2) - 6.0) / 1e4
+    assert centric["rebound_height"] == pytest.approx(top, rel=0.01)
+    assert np.all(shots.impacts == 4)
+    assert np.all(shots.restitution > 0.8)
+    assert np.all(np.abs(shots.energy_residual) < 1e-3)
+    assert np.all(shots.rocking > centric["rocking"])
+    assert set(study.pressures) == {"centric", "highest", "lowest"}
