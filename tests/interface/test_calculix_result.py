@@ -100,7 +100,8 @@ def test_an_outside_force_is_part_of_the_balance(bars):
     """With a force of 2 N the same record means 2 N t less momentum, and its work is booked."""
     pushed = replace(reference(), external_force=np.full(40, -2.0))
 
-    plain, history = other_run(bars, reference()).history, other_run(bars, pushed).history
+    plain, run = other_run(bars, reference()).history, other_run(bars, pushed)
+    history = run.history
 
     lost = plain.velocity_a - history.velocity_a
     assert lost[-1] - lost[0] == pytest.approx(2.0 * 3.6e-6 / MASS, rel=1e-9)
@@ -108,6 +109,10 @@ def test_an_outside_force_is_part_of_the_balance(bars):
     # counted from the first record on, 0.1 us after the start
     way -= 0.5e-7 * history.velocity_a[1]
     assert history.ledger.work == pytest.approx(-2.0 * way, rel=1e-6)
+    # this record knows nothing of the force: its work is missing in the energies
+    missing = history.ledger.work / history.ledger.initial
+    assert abs(missing) > 0.1
+    assert run.energy_swing >= abs(missing) - 0.01
 
 
 def test_unequal_records_keep_their_impulse(bars):

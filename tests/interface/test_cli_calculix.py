@@ -5,17 +5,21 @@ The program ccx is played by small scripts, so that its failures can be.
 
 import json
 import os
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from klack.cli.main import main
+from klack.case import find_case
+from klack.cli.main import app, main
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
+from klack.workflow.compare import COMPARISON_COLUMNS
 from klack.workflow.store import save_study
 
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to" / "check-with-calculix.md"
 MASS = 1.5667291666666663e-05  # kg, of the bar in that file
 
 GOOD = f"""cp {BARS} $2.dat
@@ -136,6 +140,21 @@ def test_export_refuses_with_one_message(arguments, words, capsys, tmp_path):
     assert all(word in err for word in words)
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_how_to_page_asks_for_what_there_is():
+    """Its commands are taken as they stand, and its table has the columns of the real one."""
+    text = HOW_TO.read_text(encoding="utf-8")
+    commands = [line for line in text.splitlines() if line.startswith("klack ")]
+    assert len(commands) == 4
+    for line in commands:
+        command, bound, _ = app.parse_args(
+            shlex.split(line)[1:], print_error=False, exit_on_error=False
+        )
+        assert command.__name__ in ("impact", "export", "compare")
+        if command.__name__ != "compare":
+            assert find_case(bound.args[0]).is_file()
+    assert all(column in text for column in COMPARISON_COLUMNS)
 
 
 def test_export_looks_for_the_program_before_it_works(play, capsys):
