@@ -250,8 +250,8 @@ def simulate_case(
     gap = case.contact.gap or 0.0
     step = case.run.interface_step if step is None else step
     force = case.motion.force
-    if spring is not None:  # the preload is the force at first touch, a gap below the start
-        force += spring.preload - spring.stiffness * gap
+    if spring is not None:  # the preload is the force at first touch; a gap above it pushes harder
+        force += spring.preload + spring.stiffness * gap
     return simulate_interface(
         model,
         speed=case.motion.speed,

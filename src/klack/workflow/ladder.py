@@ -43,7 +43,9 @@ def closing_force(case: Case) -> float:
 def impact_energy(case: Case, pair: BodyPair) -> float:
     """Bound of the energy at first touch [J]: kinetic, and work of closing forces on the way."""
     kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
-    return kinetic + closing_force(case) * (case.contact.gap or 0.0)
+    gap, spring = case.contact.gap or 0.0, case.motion.spring
+    stored = 0.5 * spring.stiffness * gap**2 if spring else 0.0
+    return kinetic + closing_force(case) * gap + stored
 
 
 def static_ladder(

@@ -334,8 +334,8 @@ def _simulate_bodies(
     closing = case.motion.force
     springs: tuple[ReturnSpring, ...] = ()
     if spring is not None:
-        # the preload is the force at first touch; the record starts a gap above it
-        closing += spring.preload - spring.stiffness * _gap(case)
+        # the preload is the force at first touch; a gap above it the spring pushes harder
+        closing += spring.preload + spring.stiffness * _gap(case)
         springs = (ReturnSpring(body=upper.name, port=PORT, stiffness=spring.stiffness),)
     forces: tuple[AxialForce, ...] = ()
     if closing != 0:
