@@ -141,12 +141,14 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
     that varies (the closing force, for one) lifts single shots above the centred one.
     """
     e, h = float(shots.restitution[highest]), float(shots.rebound_height[highest])
+    aside = float(shots.eccentricity[highest])
     e0, h0 = float(centric.restitution[0]), float(centric.rebound_height[0])
     restitution, height = e / e0 - 1.0, h / h0 - 1.0
     holds = abs(restitution) < _RULE_HOLDS
     found = (
-        f"Of {shots.count} shots, shot {highest} rebounds highest: {format_si(h, 'm', 3)} at a "
-        f"restitution of {e:.4f}; the centred shot has {format_si(h0, 'm', 3)} and {e0:.4f}."
+        f"Of {shots.count} shots, shot {highest}, {format_si(aside, 'm', 2)} off the axis, "
+        f"rebounds highest: {format_si(h, 'm', 3)} at a restitution of {e:.4f}; the centred shot has "
+        f"{format_si(h0, 'm', 3)} and {e0:.4f}."
     )
     verdict = (
         f"Taking the highest rebound of {shots.count} for the centred one is "
