@@ -147,8 +147,8 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
     holds = abs(restitution) < _RULE_HOLDS
     found = (
         f"Of {shots.count} shots, shot {highest}, {format_si(aside, 'm', 2)} off the axis, "
-        f"rebounds highest: {format_si(h, 'm', 3)} at a restitution of {e:.4f}; the centred shot has "
-        f"{format_si(h0, 'm', 3)} and {e0:.4f}."
+        f"rebounds highest: {format_si(h, 'm', 3)} at a restitution of {e:.4f}; "
+        f"the centred shot has {format_si(h0, 'm', 3)} and {e0:.4f}."
     )
     verdict = (
         f"Taking the highest rebound of {shots.count} for the centred one is "
