@@ -26,10 +26,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["FAILED", "FINISHED", "OPEN", "march", "safe_flight", "solve_active"]
+__all__ = ["FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
 
-FINISHED, OPEN, FAILED = 0, 1, 2
-"""Why :func:`march` returned: all steps done; open for long enough; no active set found."""
+FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
+"""Why :func:`march` returned.
+
+All steps done; open for long enough; no active set found; a contact would begin that pushes the
+other way (the other stop), and that step is not taken.
+"""
 
 _FAST_ROUNDS = 60
 _REFRESH = 256
@@ -352,10 +356,11 @@ def march(
         Of :func:`solve_active`.
     guide_force : array, shape (k, 2) [N]
         On the shaft, at the start of the next step.
-    books : array, shape (8,)
+    books : array, shape (9,)
         0 damping loss, 1 work of the constant force, 2 guide (friction and its numerical part),
         3 energy debt of the contact, 4 strain energy of the guides, 5 steps since the last contact
-        (-1 before the first), 6 LCP rounds, 7 steps with contact.
+        (-1 before the first), 6 LCP rounds, 7 steps with contact, 8 direction of the last contact
+        force (0 before the first).
     carried : bool array, shape (n,)
         Points that have carried a force.
     out_force, out_gap, out_outside : array, shape (>= steps,)
@@ -503,6 +508,14 @@ def march(
             )
             if rounds < 0:
                 return taken, FAILED
+            if wait:
+                way = 0.0
+                for k in range(n):
+                    way += axial[k] * new[k]
+                if way * books[8] < 0.0:
+                    return taken, TURNED
+                if way != 0.0:
+                    books[8] = 1.0 if way > 0.0 else -1.0
             books[6] += rounds
             for i in range(modes):
                 kick[i] = 0.0

@@ -20,7 +20,7 @@ from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import FAILED, OPEN, march, safe_flight
+from klack.transient.interface_kernel import FAILED, OPEN, TURNED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import (
     ImpactSegment,
@@ -185,7 +185,7 @@ class _Run:
         self.index = np.zeros(n, dtype=np.int64)
         self.B = np.zeros((n, n))
         self.counts = np.zeros(2, dtype=np.int64)
-        self.books = np.zeros(8)
+        self.books = np.zeros(9)
         self.carried = np.zeros(n, dtype=bool)
         self.guide_arrays = _guide_arrays(guide, M)
         self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
@@ -346,9 +346,9 @@ class _Run:
     def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
         """Fine steps through one impact, or to the end of the run."""
         segment = _Segment(self)
-        self.books[5] = -1.0
+        self.books[5], self.books[8] = -1.0, 0.0
         status = 0
-        while self.time < duration * (1.0 - 1e-9) and status != OPEN:
+        while self.time < duration * (1.0 - 1e-9) and status not in (OPEN, TURNED):
             steps = min(_CHUNK, ceil((duration - self.time) / self.step * (1.0 - 1e-9)))
             status = self.fine(segment, steps, wait)
             if progress is not None:
