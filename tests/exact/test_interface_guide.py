@@ -1,5 +1,6 @@
 """The guide of a needle; truth: motion of a rigid body on springs, with friction and with drag."""
 
+from dataclasses import replace
 from math import exp, pi, sqrt
 
 import numpy as np
@@ -9,10 +10,14 @@ from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
-from klack.materials import Material
+from klack.mesh.mesh import Surface
+from klack.mesh.profile import Line, Profile
+from klack.mesh.rigid import Pose
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_revolved
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_run import simulate_interface
-from klack.verification.impacts import needle_over_seat
+from klack.verification.impacts import STEEL, needle_over_seat
 from klack.verification.interface_bodies import lateral_guide, modal_model, rigid_body
 from klack.verification.lattice import lattice_mesh
 
@@ -193,15 +198,40 @@ def test_viscous_drag_decays_exponentially(needle, flight, rtol):
     assert run.energy.residual == pytest.approx(0.0, abs=1e-12)
 
 
-STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
+LENGTH, RADIUS = 24e-3, 2e-3
 
 
-@pytest.fixture(scope="module")
-def shaft():
-    """Square shaft of 4 x 4 x 24 mm with nodes at every 3 mm; all sides are its surface."""
-    side, length = np.linspace(-2e-3, 2e-3, 3), np.linspace(0.0, 24e-3, 9)
-    mesh = lattice_mesh("hex20", [side, side, length])
-    body = elastic_body("shaft", mesh, {"solid": STEEL})
+def round_shaft(structured):
+    """Cylinder D4 x L24 mm; swept in layers of 3 mm, or tetrahedra that know no rings."""
+    edges = (
+        Line((RADIUS, 0.0), "bottom"),
+        Line((RADIUS, LENGTH), "shaft"),
+        Line((0.0, LENGTH), "end"),
+        Line((0.0, 0.0), "axis"),
+    )
+    profile = {"shaft": Profile((0.0, 0.0), edges)}
+    if not structured:
+        return mesh_revolved(profile, MeshSizing(size=1.5e-3))
+    square, z = np.linspace(-1.0, 1.0, 5), np.linspace(0.0, LENGTH, 9)
+
+    def disc(x):
+        """Square to disc: concentric squares become circles."""
+        out = x.copy()
+        reach = np.max(np.abs(x[:, :2]), axis=1)
+        length = np.maximum(np.linalg.norm(x[:, :2], axis=1), 1e-12)
+        out[:, :2] *= (RADIUS * reach / length)[:, None]
+        return out
+
+    mesh = lattice_mesh("hex20", [square, square, z], disc)
+    sides = [mesh.surface(name) for name in ("left", "right", "front", "back")]
+    skin = Surface("shaft", tuple(block for side in sides for block in side.blocks))
+    return replace(mesh, surfaces={**mesh.surfaces, "shaft": skin})
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["hexahedra", "tetrahedra"])
+def shaft(request):
+    mesh = round_shaft(request.param)
+    body = elastic_body("shaft", mesh, {mesh.solids[0]: STEEL})
     return body, Flexibility(body)
 
 
@@ -219,29 +249,50 @@ def shaft_guide(shaft, count, **more):
         compliance=np.ones((1, 1)),
         gap=np.ones(1),
     )
-    settings = {"surface": "right", "heights": (6e-3, 18e-3), "clearance": 4e-6} | more
+    settings = {"surface": "shaft", "heights": (6e-3, 18e-3), "clearance": 4e-6} | more
     return guide_of_shaft(model, body, shapes, flexibility, **settings), omega
 
 
 @pytest.mark.parametrize("count", [0, 1, 8])
 def test_consistent_law_makes_the_statics_of_a_section_exact(shaft, count):
-    """Modes + residual = static flexibility of the shaft, plus the bore."""
-    body, flexibility = shaft
+    """Modes + residual = static flexibility, whatever is kept, plus the bore."""
     bore = 2e8
     guide, omega = shaft_guide(shaft, count, stiffness=bore)
-    nodes = body.mesh.surface("right").nodes
+    whole, _ = shaft_guide(shaft, 0)
 
-    for k, height in enumerate((6e-3, 18e-3)):
-        ring = nodes[np.abs(body.mesh.points[nodes, 2] - height) < 1e-9]
-        load = np.zeros((body.dof_count, 2))
-        load[3 * ring, 0] = load[3 * ring + 1, 1] = 1.0 / len(ring)
-        exact = load.T @ flexibility.solve(load)
+    for k in range(2):
         modal = guide.traces[k][:, omega > 0] / omega[omega > 0]
         np.testing.assert_allclose(
-            guide.compliance[k] + modal @ modal.T, exact + np.eye(2) / bore, rtol=1e-9, atol=1e-18
+            guide.compliance[k] + modal @ modal.T,
+            whole.compliance[k] + np.eye(2) / bore,
+            rtol=1e-9,
+            atol=1e-18,
         )
         assert np.linalg.eigvalsh(guide.compliance[k] - np.eye(2) / bore)[0] > 0
-        assert guide.heights[k] == pytest.approx(height)
+
+
+def test_a_load_on_a_section_bends_the_shaft_as_a_beam():
+    """Free shaft, force P at 6 mm: deflection there by Timoshenko's beam with inertia relief."""
+    mesh = round_shaft(True)
+    body = elastic_body("shaft", mesh, {mesh.solids[0]: STEEL})
+
+    guide, _ = shaft_guide((body, Flexibility(body)), 0)
+
+    x = np.linspace(0.0, LENGTH, 4001)
+    h, at = x[1], 1000  # 6 mm
+    mass, arm = 1.0 / LENGTH, x - 0.5 * LENGTH
+    # rigid acceleration under a unit force, its inertia forces, shear and bending moment
+    accelerated = mass * (1.0 + 12.0 / LENGTH**2 * arm[at] * arm)
+    shear = np.append(0.0, np.cumsum(0.5 * (accelerated[1:] + accelerated[:-1])) * h)
+    shear = shear - (x > x[at])
+    moment = np.append(0.0, np.cumsum(0.5 * (shear[1:] + shear[:-1])) * h)
+    area, inertia = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4
+    kappa = 6 * 1.3 / (7 + 6 * 0.3)
+    expected = np.sum(moment**2) * h / (210e9 * inertia)
+    expected += np.sum(shear**2) * h / (kappa * STEEL.shear_modulus * area)
+    assert guide.compliance[0, 0, 0] == pytest.approx(expected, rel=0.1)  # a ring dents locally
+    assert guide.compliance[0, 0, 0] > expected
+    assert guide.compliance[0, 0, 1] == pytest.approx(0.0, abs=1e-6 * expected)
 
 
 def test_linear_law_is_the_bore_alone(shaft):
@@ -250,19 +301,35 @@ def test_linear_law_is_the_bore_alone(shaft):
     np.testing.assert_allclose(guide.compliance, np.repeat(np.eye(2)[None] / 1e8, 2, axis=0))
 
 
-def test_sections_move_with_the_body(shaft):
-    """Rigid modes of the guide: translation of the section, and along the axis."""
+def test_sections_move_as_the_axis_does(shaft):
+    """Any rigid motion: displacement of the axis at the height of the section, exactly."""
     body, _ = shaft
     guide, _ = shaft_guide(shaft, 0)
-    R = np.array([[0.01, 0.02, 0.03, 0.1, 0.2, 0.3]])
-    arm = np.array([[2e-3, 0.0, z] for z in guide.heights]) - body.centre_of_mass
-    expected = R[0, :3] + np.cross(R[0, 3:], arm)
-    field = (R[0, :3] + np.cross(R[0, 3:], body.mesh.points - body.centre_of_mass)).ravel()
+    shift, turn = np.array([0.01, 0.02, 0.03]), np.array([0.1, 0.2, 0.3])
+    heights = np.column_stack([np.zeros((2, 2)), guide.heights])
+    expected = shift + np.cross(turn, heights - body.centre_of_mass)
+    field = (shift + np.cross(turn, body.mesh.points - body.centre_of_mass)).ravel()
     q = body.rigid_modes.T @ (body.M @ field)
 
-    np.testing.assert_allclose(guide.traces @ q, expected[:, :2], rtol=1e-9)
-    np.testing.assert_allclose(guide.slide @ q, expected[:, 2], rtol=1e-9)
-    np.testing.assert_allclose(guide.offset, [[2e-3, 0.0]] * 2, atol=1e-12)
+    np.testing.assert_allclose(guide.heights, (6e-3, 18e-3), atol=0.3e-3)
+    np.testing.assert_allclose(guide.traces @ q, expected[:, :2], rtol=1e-6)
+    np.testing.assert_allclose(guide.slide @ q, expected[:, 2], rtol=1e-6)
+
+
+def test_a_shaft_that_leans_off_its_axis_is_found_where_it_is(shaft):
+    """3 um aside and leaning by 1 mrad about its middle: axis of the section within 20 nm."""
+    body, _ = shaft
+    pose = Pose(
+        rotation=np.array([0.0, 1e-3, 0.0]),
+        about=np.array([0.0, 0.0, 12e-3]),
+        shift=np.array([3e-6, -1e-6, 0.0]),
+    )
+    placed = replace(body, mesh=body.mesh.placed(pose))
+
+    guide, _ = shaft_guide((placed, Flexibility(placed)), 0)
+
+    aside = 3e-6 + 1e-3 * (guide.heights - 12e-3)
+    np.testing.assert_allclose(guide.offset, np.column_stack([aside, [-1e-6] * 2]), atol=20e-9)
 
 
 def test_drag_is_shared_and_friction_can_be_changed(shaft):
@@ -278,12 +345,13 @@ def test_drag_is_shared_and_friction_can_be_changed(shaft):
 @pytest.mark.parametrize(
     ("more", "text"),
     [
-        ({"heights": (6e-3, 30e-3)}, "between 0 and 24 mm"),
+        ({"heights": (6e-3, 30e-3)}, "and 24 mm"),
         ({"consistent": False}, "stiffness of the bore"),
         ({"clearance": 0.0}, "clearance"),
         ({"friction": -1.0}, "friction"),
         ({"viscous": -1.0}, "viscous"),
         ({"surface": "collar"}, "one of"),
+        ({"surface": "bottom", "heights": (0.0,)}, "cylinder around the axis"),
     ],
 )
 def test_errors_say_what_to_do(shaft, more, text):

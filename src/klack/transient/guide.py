@@ -5,7 +5,7 @@ bore pushes it back towards the axis,
 
 .. math:: N \ge 0, \qquad |x| - c \le k^{-1} N, \qquad x = x_0 + T q,
 
-with the lateral displacement *x* of the shaft section (mean over its ring of nodes, which has the
+with the lateral displacement *x* of the shaft section (mean over a ring of nodes, which has the
 same weights as the force) and the compliance :math:`k^{-1}` that the modes do not have: of the
 bore, and, for the consistent law, of the shaft itself (static flexibility less that of the kept
 modes).  Along the axis the bore brakes: Coulomb friction :math:`\mu N` against the direction of
@@ -27,6 +27,9 @@ from klack.errors import InputError, require_nonnegative, require_positive
 from klack.transient.interface_model import InterfaceModel
 
 __all__ = ["Guide", "guide_of_shaft"]
+
+_ROUND = 1e-2
+"""Largest deviation of a guided surface from a round one, over its width."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,7 +98,8 @@ def guide_of_shaft(
     surface : str
         Cylindrical surface of the shaft.
     heights : sequence of float [m]
-        z at the placement; each takes the ring of nodes of the surface that is nearest.
+        z at the placement; each takes the ring of nodes of the surface that is nearest (on an
+        unstructured mesh as many near it as surround the axis).
     clearance : float [m]
         Radial.
     stiffness : float, optional [N/m]
@@ -108,7 +112,8 @@ def guide_of_shaft(
     Raises
     ------
     InputError
-        For a height without nodes, a body of revolution, or a contact without any compliance.
+        For a height without nodes, a surface that is not round, a body of revolution, or a contact
+        without any compliance.
     """
     require_positive("guide: clearance", clearance, "m")
     require_nonnegative("guide: friction", friction, "-")
@@ -155,7 +160,11 @@ def guide_of_shaft(
 def _section(
     body: ElasticBody, surface: str, height: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights of the ring of nodes nearest to a height, shape (n_dof, 3), and its centre."""
+    """Weights of a ring of nodes near a height, shape (n_dof, 3), and the axis there, shape (3,).
+
+    The weights are as equal as can be while their mean place is the axis: any rigid motion then
+    moves the section as it moves the axis, on unstructured meshes as well.
+    """
     nodes = body.mesh.surface(surface).nodes
     z = body.mesh.points[nodes, 2]
     if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
@@ -167,12 +176,60 @@ def _section(
             hint="heights are those of the placed body.",
         )
     at = float(z[np.argmin(np.abs(z - height))])
-    width = max(1e-6, 0.02 * float(np.ptp(body.mesh.points[nodes, 0])))
-    ring = nodes[np.abs(z - at) <= width]
+    places = body.mesh.points[nodes] - [0.0, 0.0, at]
+    centre = _axis(f"guide of body '{body.name}': surface '{surface}'", places)
+    places[:, :2] -= centre
+    size = float(np.ptp(places[:, :2]))
+    width = max(1e-6, 0.02 * size)
+    near = np.abs(places[:, 2]) <= width
+    while not _supports(places[near], size) and width < 0.5 * size:
+        width *= 1.3
+        near = np.abs(places[:, 2]) <= width
+    weights = _weights(places[near], size)
     load = np.zeros((body.dof_count, 3))
     for c in range(3):
-        load[3 * ring + c, c] = 1.0 / len(ring)
-    return load, body.mesh.points[ring].mean(axis=0)
+        load[3 * nodes[near] + c, c] = weights
+    return load, np.append(centre, at)
+
+
+def _axis(where: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    r"""Centre at z = 0 of the round surface through some points, shape (2,) [m].
+
+    .. math:: x^2 + y^2 = 2 (x_c + s_x z) x + 2 (y_c + s_y z) y + c_0 + c_1 z + c_2 z^2
+
+    in the mean: cylinders and slender cones that may lean a little.
+    """
+    middle = places[:, :2].mean(axis=0)
+    size = float(np.ptp(places[:, :2]))
+    x, y = (places[:, :2] - middle).T / size
+    z = places[:, 2] / max(float(np.max(np.abs(places[:, 2]))), size)
+    terms = np.column_stack([2 * x, 2 * y, 2 * x * z, 2 * y * z, np.ones(len(x)), z, z**2])
+    solution, *_ = np.linalg.lstsq(terms, x**2 + y**2, rcond=1e-10)
+    miss = float(np.max(np.abs(terms @ solution - x**2 - y**2)))
+    if len(x) < 5 or not miss < _ROUND:
+        raise InputError(
+            where,
+            got=f"a surface that is off the nearest round one by {miss * size * 1e6:.3g} um",
+            expected="a cylinder around the axis of the body",
+            hint="name the cylindrical part of the shaft alone, or refine the mesh around it.",
+        )
+    return np.asarray(middle + size * solution[:2])
+
+
+def _weights(places: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Weights nearest to equal ones whose sum is 1 and whose mean place is the origin."""
+    conditions = np.vstack([np.ones(len(places)), places.T / size])
+    missing = np.array([1.0, 0.0, 0.0, 0.0]) - conditions.mean(axis=1)
+    return np.asarray(1.0 / len(places) + np.linalg.pinv(conditions, rcond=1e-9) @ missing)
+
+
+def _supports(places: NDArray[np.float64], size: float) -> bool:
+    """Tell whether points hold the axis from all sides: no weight below zero, no sector free."""
+    if len(places) < 4:
+        return False
+    angle = np.sort(np.arctan2(places[:, 1], places[:, 0]))
+    widest = np.max(np.diff(angle, append=angle[0] + 2.0 * np.pi))
+    return bool(widest < 0.6 * np.pi and np.min(_weights(places, size)) >= 0.0)
 
 
 def _missing(
