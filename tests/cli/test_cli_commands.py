@@ -179,7 +179,9 @@ def play(monkeypatch: pytest.MonkeyPatch, run: Callable[..., object]) -> None:
 
 
 def raising(error: BaseException) -> Callable[..., object]:
-    def run(case: object, *, levels: object, progress: Callable, threads: object) -> object:
+    def run(
+        case: object, *, levels: object, certify: bool, progress: Callable, threads: object
+    ) -> object:
         progress("mesh", 0.5)
         raise error
 
@@ -194,7 +196,9 @@ def raising(error: BaseException) -> Callable[..., object]:
 def test_several_levels_in_one_option(words, monkeypatch):
     asked = []
 
-    def run(case: object, *, levels: object, progress: object, threads: object) -> object:
+    def run(
+        case: object, *, levels: object, certify: bool, progress: object, threads: object
+    ) -> object:
         asked.append(levels)
         raise ConvergenceError("far enough")
 
