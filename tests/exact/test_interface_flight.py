@@ -1,5 +1,6 @@
 """Jumps over free flight; truth: exact modal motion, and the same run in fine steps throughout."""
 
+from dataclasses import replace
 from math import inf, sqrt
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from klack.contact.restitution import measure_impact
+from klack.contact.restitution import find_contacts, measure_impact
 from klack.transient.interface_kernel import safe_flight
 from klack.transient.interface_run import simulate_interface
+from klack.verification.beam_impact import sphere_on_beam
 from klack.verification.interface_bodies import (
     free_rod,
     lateral_guide,
@@ -158,6 +160,24 @@ def test_the_run_stops_after_so_many_impacts():
 
     assert len(run.impacts) == 2
     assert run.motion.time[-1] < 5e-3
+
+
+def test_sub_impacts_are_one_impact_while_the_longest_mode_still_swings():
+    """Sphere on a beam: open for 119 us between its first two contacts.
+
+    An impact is over when nothing has touched for 50 us, or two periods of the longest mode.
+    """
+    model = sphere_on_beam().model()
+    slow = replace(model, longest_period=80e-6)
+    run = {"speed": 0.5, "duration": 1e-3, "step": 1e-6, "flight": True, "points": False}
+
+    apart, together = (simulate_interface(m, **run).impacts for m in (model, slow))
+
+    assert len(apart) == 2
+    assert [len(find_contacts(impact.history)) for impact in apart] == [1, 1]
+    first = apart[0].history
+    assert 49e-6 < first.edges[-1] - find_contacts(first)[0].end < 53e-6
+    assert [len(find_contacts(impact.history)) for impact in together] == [2]
 
 
 def test_damping_is_booked_in_flight_and_in_contact():
