@@ -308,6 +308,8 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     --------
     >>> format_si(3.6e-6, "m"), format_si(1.25e9, "N/m"), format_si(0.0, "N")
     ('3.6 um', '1.25 GN/m', '0 N')
+    >>> format_si(4.51e-7, "m", 2)
+    '450 nm'
     """
     if unit in ("", "-"):
         return f"{value:.{digits}g}"
@@ -318,7 +320,8 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     if unit.startswith("kg") or "^" in unit.split("/")[0]:
         return f"{value:.{digits}g} {unit}"
     power = next((p for p in sorted(prefixes, reverse=True) if rounded >= 10.0**p), -15)
-    return f"{value / 10.0**power:.{digits}g} {prefixes[power]}{unit}"
+    scaled = float(f"{value / 10.0**power:.{digits}g}")
+    return f"{scaled:.{max(digits, 3)}g} {prefixes[power]}{unit}"  # 450 nm, not 4.5e+02 nm
 
 
 def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
