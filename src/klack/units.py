@@ -42,6 +42,7 @@ __all__ = [
     "Rate",
     "Ratio",
     "Resistance",
+    "Rotation",
     "Speed",
     "Stiffness",
     "Temperature",
@@ -116,6 +117,13 @@ RATE = Kind(
     ("1/s", "1/ms"),
     {"1/s": 1.0, "s^-1": 1.0, "1/ms": 1e3, "1/us": 1e6},
 )
+ROTATION = Kind(
+    "a speed of rotation",
+    "1/s",
+    "2000 rpm",
+    ("rpm", "1/min", "1/s"),
+    {"rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min^-1": 1.0 / 60.0, "1/s": 1.0},
+)
 AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"))
 VOLUME = Kind("a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"))
 MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"))
@@ -160,6 +168,7 @@ KINDS = (
     ANGLE,
     FREQUENCY,
     RATE,
+    ROTATION,
     AREA,
     VOLUME,
     MASS,
@@ -373,6 +382,7 @@ Density = Annotated[float, *_typed(DENSITY)]
 Angle = Annotated[float, *_typed(ANGLE)]
 Frequency = Annotated[float, *_typed(FREQUENCY)]
 Rate = Annotated[float, *_typed(RATE)]
+Rotation = Annotated[float, *_typed(ROTATION)]
 Area = Annotated[float, *_typed(AREA)]
 Volume = Annotated[float, *_typed(VOLUME)]
 Mass = Annotated[float, *_typed(MASS)]

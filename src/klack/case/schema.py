@@ -22,6 +22,8 @@ from klack.case.bodies import (
 )
 from klack.case.consistency import check_consistency
 from klack.case.guide import CaseGuide
+from klack.case.measurement import CaseMeasurement
+from klack.case.noise import CaseNoise
 from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
@@ -259,6 +261,10 @@ class Case(CaseFile):
     run: Run = Field(description="Levels, steps, duration.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
     shots: Shots | None = Field(default=None, description="What klack shots draws.")
+    measurement: CaseMeasurement | None = Field(
+        default=None, description="How drops of this valve were measured."
+    )
+    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

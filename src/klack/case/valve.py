@@ -6,6 +6,8 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
+from klack.case.measurement import CaseMeasurement
+from klack.case.noise import CaseNoise
 from klack.case.schema import Lumped
 from klack.case.valve_consistency import check_valve
 from klack.errors import InputError
@@ -135,6 +137,10 @@ class ValveCase(CaseFile):
     network: NetworkSection = Field(description="Components of the valve and how they are joined.")
     run: StrokeRun = Field(description="Duration, steps and variants.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
+    measurement: CaseMeasurement | None = Field(
+        default=None, description="How strokes of this valve were measured."
+    )
+    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -1,0 +1,114 @@
+"""What is heard of a valve: which surfaces radiate, how it is mounted, how often it clicks."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from klack.case.bodies import BodySurface
+from klack.input.problem import CaseProblem
+from klack.input.section import Name, Section
+from klack.units import (
+    Area,
+    Density,
+    Frequency,
+    Length,
+    Mass,
+    Ratio,
+    Rotation,
+    Speed,
+    Stiffness,
+    Time,
+)
+
+__all__ = ["CaseNoise", "NoiseDrive", "NoiseMount", "NoisePlate"]
+
+
+class NoiseMount(Section):
+    """Spring between the held surfaces and the surroundings, instead of a rigid hold.
+
+    The force of the impacts stays that of the rigidly held body.
+    """
+
+    stiffness: Stiffness = Field(gt=0, description="Along the axis.")
+    loss_factor: Ratio = Field(default=0.05, ge=0, lt=1, description="Of the mount.")
+    mass: Mass | None = Field(
+        default=None,
+        gt=0,
+        description="Of all that moves on the mount; the mass of the body without.",
+    )
+
+
+class NoisePlate(Section):
+    """A plate that the valve is mounted on; its bending waves carry the sound on."""
+
+    thickness: Length = Field(gt=0, description="Of the plate; sheet steel 1 to 3 mm.")
+    area: Area = Field(gt=0, description="Of one side.")
+    material: Name = Field(description="Name of a material of the case.")
+    loss_factor: Ratio = Field(
+        default=0.01, gt=0, lt=1, description="Of the mounted plate; 0.5 to 5 %, an assumption."
+    )
+
+
+class NoiseDrive(Section):
+    """How often the valve is actuated in the drive pattern that can be listened to."""
+
+    frequency: Frequency | None = Field(default=None, gt=0, description="Strokes per second.")
+    speed: Rotation | None = Field(
+        default=None, gt=0, description="Speed of the engine, e.g. 2000 rpm."
+    )
+    strokes: Ratio = Field(
+        default=0.5, gt=0, description="Strokes per revolution; 0.5 for a four-stroke engine."
+    )
+    duration: Time = Field(default=2.0, gt=0, le=60, description="Length of the pattern.")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        self._exactly_one(("frequency", "speed"), "how often it clicks")
+        return self
+
+    @property
+    def rate(self) -> float:
+        """Strokes per second [Hz]."""
+        if self.frequency is not None:
+            return self.frequency
+        assert self.speed is not None
+        return self.speed * self.strokes
+
+
+class CaseNoise(Section):
+    """From contact force to the ear."""
+
+    surfaces: tuple[BodySurface, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="Surfaces that meet the air, as body.surface; without, all named surfaces of "
+        "held bodies but their contacts and supports.",
+    )
+    mount: NoiseMount | None = Field(
+        default=None, description="Elastic mount of the held bodies; rigid without."
+    )
+    plate: NoisePlate | None = Field(
+        default=None, description="Plate below the mount that radiates as well."
+    )
+    radiation: Literal["piston", "unity"] = Field(
+        default="piston",
+        description="Radiation efficiency: of a piston of the same area, or 1 (equivalent radiated "
+        "power, an upper bound).",
+    )
+    distance: Length = Field(default=1.0, gt=0, description="From the valve to the ear.")
+    air_density: Density = Field(default=1.204, gt=0, description="Of air at 20 degC.")
+    sound_speed: Speed = Field(default=343.2, gt=0, description="In air at 20 degC.")
+    drive: Annotated[NoiseDrive, Field(description="Pattern of clicks to listen to.")] = NoiseDrive(
+        frequency=10.0
+    )
+
+    @model_validator(mode="after")
+    def _distance(self) -> Self:
+        if self.distance < 0.05:
+            raise CaseProblem(
+                ("distance",),
+                got=f"{self.distance * 1e3:.3g} mm",
+                expected="5 cm or more",
+                hint="the estimate is one of the far field; 1 m is usual.",
+            )
+        return self

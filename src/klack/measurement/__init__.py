@@ -1,0 +1,1 @@
+"""Measured strokes: records, single strokes, and the numbers that are read off them."""

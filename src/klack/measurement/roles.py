@@ -1,0 +1,21 @@
+"""What a measured channel can be, and the kind of quantity that it then holds."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from klack.units import ACCELERATION, CURRENT, FORCE, LENGTH, PRESSURE, SPEED, VOLTAGE, Kind
+
+__all__ = ["ROLES", "Role"]
+
+Role = Literal["lift", "velocity", "current", "voltage", "pressure", "acceleration", "force"]
+
+ROLES: Mapping[Role, Kind] = {
+    "lift": LENGTH,
+    "velocity": SPEED,
+    "current": CURRENT,
+    "voltage": VOLTAGE,
+    "pressure": PRESSURE,
+    "acceleration": ACCELERATION,
+    "force": FORCE,
+}
+"""Kind of quantity of each role; inside klack its values are in the SI unit of that kind."""
