@@ -1,0 +1,88 @@
+"""The force of every stop as one uniform series that keeps each impulse.
+
+A stroke records the force of a stop in every fine step near an impact, and as means over longer
+records all the time.  Both are joined on the grid of the fine steps: fine steps as they are, and in
+the rest of a record the impulse that is left over from its mean.  So the impulse of every record is
+that of the run, through flight, impact, and rest on the stop.
+
+Forces of magnets and fluid on the housing are not among them.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.spectrum import force_series
+from klack.contact.history import ImpactHistory
+from klack.signals import TimeSeries
+from klack.simulation.network_result import NetworkResult
+
+__all__ = ["impact_force", "stop_force", "stop_forces"]
+
+Floats = NDArray[np.float64]
+
+
+def impact_force(history: ImpactHistory) -> TimeSeries:
+    """Contact force of an impact [N], means over its intervals, with a zero before the start."""
+    series = force_series(history)
+    return TimeSeries(
+        step=series.step,
+        values=np.concatenate([[0.0], series.values]),
+        unit=series.unit,
+        start=series.start - series.step,
+        name=series.name,
+    )
+
+
+def stop_forces(result: NetworkResult) -> Mapping[str, TimeSeries]:
+    """Force of every stop of a stroke [N]; see :func:`stop_force`."""
+    return {stop: stop_force(result, stop) for stop in result.interfaces}
+
+
+def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
+    """Contact and film force of one stop [N], means over fine steps, above zero when it presses.
+
+    Parameters
+    ----------
+    result : NetworkResult
+    stop : str
+        Component.
+    """
+    step = result.step
+    start, spacing = float(result.time[0]), float(result.time[1] - result.time[0])
+    size = round(spacing / step)  # fine steps of a record
+    count = (result.time.size - 1) * size
+    record = result.interfaces[stop]
+    place = np.round((record.time - start) / step).astype(np.int64)
+    length = np.maximum(1, np.round(record.step / step).astype(np.int64))
+    force = record.contact_force + record.film_force
+    values, known = np.zeros(count), np.zeros(count, dtype=bool)
+    for offset in range(int(length.max(initial=1))):
+        seen = (length > offset) & (place + offset >= 0) & (place + offset < count)
+        values[place[seen] + offset] = force[seen]
+        known[place[seen] + offset] = True
+    mean = _record_means(result, stop)
+    if mean is not None:
+        _share_out(values.reshape(-1, size), known.reshape(-1, size), mean)
+    return TimeSeries(step=step, values=values, unit="N", start=start + 0.5 * step, name=stop)
+
+
+def _record_means(result: NetworkResult, stop: str) -> Floats | None:
+    """Mean of contact and film force over every record; the first channel value has no record."""
+    found = [
+        result.channels[name].values[1:]
+        for name in (f"{stop} contact force", f"{stop} film force")
+        if name in result.channels
+    ]
+    return np.sum(found, axis=0) if found else None
+
+
+def _share_out(values: Floats, known: NDArray[np.bool_], mean: Floats) -> None:
+    """Give the unknown steps of each record (row) the impulse that the known ones leave over."""
+    size = values.shape[1]
+    missing = size - known.sum(axis=1)
+    left = mean * size - values.sum(axis=1)
+    each = np.divide(left, missing, out=np.zeros(mean.size), where=missing > 0)
+    each[np.abs(left) <= 1e-12 * np.abs(values).sum(axis=1)] = 0.0  # round-off
+    values += np.where(known, 0.0, each[:, None])

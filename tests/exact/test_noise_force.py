@@ -1,0 +1,148 @@
+"""Force spectra of the noise study: closed Fourier integrals, and impulses that stay.
+
+Truth: half sine and decaying step in closed form; the sum of a series that is only averaged.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from klack.acoustics.force_spectrum import averaged, force_bands, force_spectrum
+from klack.acoustics.third_octave import band_edges
+from klack.signals import TimeSeries
+from klack.simulation.network_result import (
+    ChannelData,
+    EnergyBooks,
+    InterfaceRecord,
+    NetworkResult,
+)
+from klack.workflow.noise_force import stop_force
+
+PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
+
+
+def half_sine(start: float, length: float) -> TimeSeries:
+    """Interval means of a half sine that begins at zero, by its integral."""
+    edges = start + STEP * np.arange(round(length / STEP) + 1)
+    phase = np.pi * np.clip(edges / DURATION, 0.0, 1.0)
+    values = -PEAK * DURATION / np.pi * np.diff(np.cos(phase)) / STEP
+    return TimeSeries(step=STEP, values=values, unit="N", start=start + 0.5 * STEP)
+
+
+def half_sine_magnitude(f: float) -> float:
+    x = 2.0 * f * DURATION
+    if abs(x - 1.0) < 1e-9:
+        return 0.5 * PEAK * DURATION
+    return 2.0 * PEAK * DURATION / np.pi * abs(np.cos(0.5 * np.pi * x) / (1.0 - x**2))
+
+
+def test_a_pulse_has_its_closed_spectrum():
+    spectrum = force_spectrum(half_sine(-5e-6, 60e-6), resolution=1e3)
+    f = spectrum.frequency
+    seen = f <= 300e3
+
+    expected = np.array([half_sine_magnitude(value) for value in f[seen]])
+    assert abs(spectrum.values[0]) == pytest.approx(2.0 / np.pi * PEAK * DURATION, rel=1e-9)
+    np.testing.assert_allclose(np.abs(spectrum.values[seen]), expected, atol=1e-6 * expected[0])
+
+
+def test_the_bands_hold_the_energy_of_a_pulse():
+    bands = force_bands(half_sine(-5e-6, 60e-6))
+
+    assert bands.number[0] == -17
+    assert bands.number[-1] == 23  # 20 Hz to 200 kHz
+    low, high = band_edges(bands.number)
+    for i in (0, 10, 20, 28, 32, 40):
+        energy, _ = quad(
+            lambda f: 2.0 * half_sine_magnitude(f) ** 2, low[i], high[i], epsrel=1e-10, limit=200
+        )
+        # straight lines between frequencies that resolve a record of 60 us twenty times
+        assert bands.energy[i] == pytest.approx(energy, rel=5e-3)
+
+
+def test_a_force_that_stays_is_a_step():
+    """From 5 N to 15 N along an exponential of 30 us, in closed form."""
+    tau, height = 30e-6, 10.0
+    edges = STEP * np.arange(40_001)
+    gathered = edges - tau * (1.0 - np.exp(-edges / tau))
+    values = 5.0 + np.concatenate([[0.0], height * np.diff(gathered) / STEP])
+    force = TimeSeries(step=STEP, values=values, unit="N", start=-0.5 * STEP)
+
+    spectrum = force_spectrum(force, resolution=50.0)
+
+    f = spectrum.frequency[1:4000]
+    omega = 2.0 * np.pi * f
+    expected = height / (1j * omega * (1.0 + 1j * omega * tau))
+    assert np.isnan(spectrum.values[0])
+    # interval means alias a step by (f h)^2 at most: 2e-5 at the highest of these frequencies
+    np.testing.assert_allclose(spectrum.values[1:4000], expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("step", [20e-9, 90e-9, 1e-6, 7e-6])
+def test_averaging_keeps_impulse_and_ends(step):
+    pulse, rest = half_sine(-5e-6, 61e-6), 5.0
+    force = TimeSeries(step=STEP, values=pulse.values + rest, unit="N", start=pulse.start)
+
+    longer = averaged(force, step)
+
+    above = longer.values - rest  # the ends are held, at rest
+    assert above.sum() * longer.step == pytest.approx(pulse.values.sum() * STEP, rel=1e-11)
+    centre = (above * longer.time).sum() / above.sum()
+    assert centre == pytest.approx(0.5 * DURATION, abs=0.01 * step + 1e-12)
+    assert longer.values[0] == longer.values[-1] == pytest.approx(rest, rel=1e-12)
+
+
+def stroke_with_rest() -> NetworkResult:
+    """Needle at rest with 12 N until 3 us and from 30 us on; an impact in fine steps between."""
+    record, count = 50, 40  # fine steps of 20 ns in a record, records
+    fine = np.zeros(record * count)
+    fine[:130] = 12.0  # ends inside the third record
+    fine[700:1200] = 200.0 * np.sin(np.pi * (np.arange(500) + 0.5) / 500)
+    fine[1500:] = 12.0
+    fine[1530:1580] += 3.0
+    known = np.r_[100:135, 700:1205, 1520:1590]
+    mean = fine.reshape(count, record).mean(axis=1)
+    channel = np.concatenate([mean[:1], mean])
+    film = np.zeros(known.size)
+    return NetworkResult(
+        time=1e-6 * np.arange(count + 1),
+        channels={
+            "seat contact force": ChannelData(unit="N", values=0.75 * channel),
+            "seat film force": ChannelData(unit="N", values=0.25 * channel),
+        },
+        interfaces={
+            "seat": InterfaceRecord(
+                time=STEP * known,
+                step=np.full(known.size, STEP),
+                contact_force=fine[known],
+                film_force=film,
+                gap=film,
+                complete=True,
+            )
+        },
+        events=(),
+        books=EnergyBooks(supplies={}, losses={}, stores_before={}, stores_after={}),
+        step=STEP,
+        fine_steps=1,
+        coarse_steps=1,
+        wall_time=0.0,
+        state={"fine": fine},
+    )
+
+
+def test_the_force_of_a_stop_keeps_the_impulse_of_every_record():
+    result = stroke_with_rest()
+
+    force = stop_force(result, "seat")
+
+    fine = result.state["fine"]
+    assert force.step == STEP
+    assert force.time[0] == pytest.approx(0.5 * STEP)
+    np.testing.assert_allclose(
+        force.values.reshape(-1, 50).sum(axis=1), fine.reshape(-1, 50).sum(axis=1), rtol=1e-12
+    )
+    # fine steps as they were, rest where only the means tell of it
+    np.testing.assert_allclose(force.values[700:1200], fine[700:1200], rtol=1e-12)
+    np.testing.assert_allclose(force.values[:130], 12.0, rtol=1e-12)
+    np.testing.assert_allclose(force.values[1500:], fine[1500:], rtol=1e-12)
+    assert np.all(force.values[140:690] == 0.0)
