@@ -19,10 +19,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.elasticity.quadrature import quadrature
-from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
-from klack.mesh.mesh import FaceBlock, Mesh, Surface
+from klack.mesh.mesh import Mesh, Surface
+from klack.reduction.face_samples import face_samples
 
 __all__ = ["Observer", "Port", "node_observer", "pressure_port", "surface_port"]
 
@@ -108,8 +107,8 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
         )
     weights = np.zeros(mesh.node_count)
     for block in surface.blocks:
-        connectivity, values, area, _ = _face_samples(mesh, block)
-        np.add.at(weights, connectivity, np.einsum("qn,fq->fn", values, area))
+        at = face_samples(mesh, block)
+        np.add.at(weights, block.connectivity, np.einsum("qn,fq->fn", at.values, at.area))
     total = weights.sum()
     _require_area(where, total)
     return Port(name, (weights[:, None] / total * unit).ravel())
@@ -135,9 +134,10 @@ def pressure_port(mesh: Mesh, surface: str | Surface, *, name: str) -> Port:
     load = np.zeros((mesh.node_count, mesh.dimension))
     total = 0.0
     for block in surface.blocks:
-        connectivity, values, area, normal = _face_samples(mesh, block)
-        np.add.at(load, connectivity, -np.einsum("qn,fq,fqd->fnd", values, area, normal))
-        total += float(area.sum())
+        at = face_samples(mesh, block)
+        forces = -np.einsum("qn,fq,fqd->fnd", at.values, at.area, at.normal)
+        np.add.at(load, block.connectivity, forces)
+        total += float(at.area.sum())
     resultant = load.sum(axis=0)
     if mesh.dimension == 2:
         resultant[0] = 0.0  # radial forces cancel around the circle
@@ -202,27 +202,3 @@ def _require_area(where: str, area: float) -> None:
             expected="at least one face, not closed on itself",
             hint="check the name of the surface in the mesh.",
         )
-
-
-_FaceSamples = tuple[
-    NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]
-
-
-def _face_samples(mesh: Mesh, block: FaceBlock) -> _FaceSamples:
-    """Return connectivity (f, n), shape values (q, n), areas (f, q), outward normals (f, q, d)."""
-    xi, weights = quadrature(block.family, "mass")
-    values, slopes = shape_functions(block.family, xi)
-    corners = mesh.points[block.connectivity]
-    tangents = np.einsum("qnp,fnd->fqpd", slopes, corners)
-    if mesh.dimension == 2:
-        radius = np.einsum("qn,fn->fq", values, corners[:, :, 0])
-        along = tangents[:, :, 0, :]
-        normal = np.stack([along[..., 1], -along[..., 0]], axis=-1)  # tangent turned by -90 deg
-        circumference = 2.0 * np.pi * radius
-    else:
-        normal = np.cross(tangents[:, :, 0, :], tangents[:, :, 1, :])
-        circumference = np.ones(normal.shape[:2])
-    length = np.linalg.norm(normal, axis=-1)
-    normal = normal / np.where(length > 0, length, 1.0)[..., None]
-    return block.connectivity, values, length * weights * circumference, normal

@@ -28,7 +28,7 @@ from klack.reduction.recovery import Recovery, surface_faces
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ModeSelection, select
 
-__all__ = ["Correction", "reduce_body"]
+__all__ = ["Correction", "kept_modes", "reduce_body"]
 
 Correction = Literal["consistent", "attachment", "none"]
 
@@ -84,8 +84,7 @@ def reduce_body(
     patterns = _patterns(body, ports)
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
     pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, flexibility)
-    picked = select(modes, pool.omega, pool.shapes.T @ patterns)
-    kept = Modes(omega=pool.omega[picked], shapes=pool.shapes[:, picked])
+    kept = kept_modes(modes, pool, patterns)
     deflections = flexibility.solve(patterns)
     extra = _no_modes(body)
     if correction == "attachment" and shifts is None:
@@ -120,6 +119,20 @@ def reduce_body(
         attachment_count=len(extra.omega),
         recovery=_recovery(body, shapes, recovery_surfaces, recovery_nodes),
     )
+
+
+def kept_modes(selection: ModeSelection, pool: Modes, patterns: NDArray[np.float64]) -> Modes:
+    """Elastic modes of a pool that a reduction keeps, with their full shapes.
+
+    Parameters
+    ----------
+    selection : ByCount, ByFrequency or ByParticipation
+    pool : Modes
+    patterns : array, shape (n_dof, n_ports) [-]
+        Load patterns of the ports.
+    """
+    picked = select(selection, pool.omega, pool.shapes.T @ patterns)
+    return Modes(omega=pool.omega[picked], shapes=pool.shapes[:, picked])
 
 
 def _compute_pool(body: ElasticBody, modes: ModeSelection, flexibility: Flexibility) -> Modes:

@@ -1,11 +1,29 @@
 """A held body as a source of sound: modes, ports, and the normal motion of its surface."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Structure"]
+from klack.errors import InputError
+
+__all__ = ["STRUCTURE_UNITS", "Structure"]
+
+STRUCTURE_UNITS: Mapping[str, str] = {
+    "omega": "rad/s",
+    "damping": "1",
+    "port_signs": "1",
+    "port_shapes": "kg^-0.5",
+    "static_compliance": "m/N",
+    "participation": "kg^0.5",
+    "group_area": "m^2",
+    "face_area": "m^2",
+    "face_shapes": "kg^-0.5",
+    "face_residual": "m/N",
+    "axial_normals": "1",
+}
+"""Units of the arrays of a stored :class:`Structure`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -15,7 +33,9 @@ class Structure:
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad u_n(x) = \sum_i n \cdot \phi_i(x)\, q_i + \sum_p r_p(x) F_p
 
-    ``m`` modes, ``p`` ports, ``g`` groups of the surface, ``f`` faces, ``k`` points.
+    ``m`` modes, ``p`` ports, ``g`` groups of the surface, ``f`` faces, ``k`` points.  Surface
+    integrals know ``b = m + p + 1`` fields in this order: the modes, the static rests ``r_p`` of
+    the ports, and a unit axial motion of the whole body.
 
     Parameters
     ----------
@@ -40,10 +60,11 @@ class Structure:
     group_names : tuple of str
         Named surfaces that meet the air.
     group_area : array, shape (g,) [m^2]
-    group_gram : array, shape (g, m, m) [m^2/kg]
-        ``int (n . phi_i)(n . phi_j) dA`` over each group, by the quadrature of the elements.
-    group_volume : array, shape (g, m) [m^2/sqrt(kg)]
-        ``int n . phi_i dA``: volume displaced per modal displacement.
+    group_gram : array, shape (g, b, b) [m^2/kg for two modes]
+        ``int (n . u_i)(n . u_j) dA`` of two fields over each group, by the quadrature of the
+        elements; symmetric.
+    group_volume : array, shape (g, b) [m^2/sqrt(kg) for a mode]
+        ``int n . u_i dA``: volume displaced per displacement of a field.
     points : array, shape (k, dimension) [m]
         Corners of the faces; (r, z) or (x, y, z).
     faces : int array, shape (f, 2), (f, 3) or (f, 4)
@@ -85,6 +106,29 @@ class Structure:
     def highest_frequency(self) -> float:
         """Highest kept mode [Hz]: above it the response is that of the static rest alone."""
         return float(self.omega.max() / (2.0 * np.pi)) if self.omega.size else 0.0
+
+    @property
+    def residual_compliance(self) -> NDArray[np.float64]:
+        """What the modes miss of the static compliance [m/N], shape (p, p)."""
+        scaled = self.port_shapes / self.omega[:, None]
+        return self.static_compliance - scaled.T @ scaled
+
+    def port_index(self, name: str) -> int:
+        """Column of a port.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if name not in self.port_names:
+            raise InputError(
+                f"body '{self.name}': port '{name}'",
+                got="a name that the body does not have",
+                expected=f"one of: {', '.join(self.port_names)}",
+                hint="a contact port is named like its surface; of klack impact 'contact'.",
+            )
+        return self.port_names.index(name)
 
     @property
     def area(self) -> float:

@@ -48,6 +48,7 @@ from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 from klack.workflow.section import section_picture
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.structures import impact_structures
 from klack.workflow.study import (
     BodySummary,
     ContactSummary,
@@ -133,6 +134,9 @@ def run_impact(
         transfer: tuple[TransferComparison, ...] = ()
         if case.run.transfer is not None:
             transfer = compare_transfer(problem, pools, own.ports, progress=clock)
+        clock("radiating surfaces", 0.0)
+        structures = impact_structures(problem, pools, own)
+        clock("radiating surfaces", 1.0)
         ratio = check_resolution(problem.static, peak)
         problem.close()
         sections: tuple[SectionPicture, ...] = ()
@@ -166,6 +170,7 @@ def run_impact(
         estimates=certificate.estimates,
         estimate_basis=certificate.basis,
         estimate_spread=certificate.spread,
+        structures=structures,
     )
 
 

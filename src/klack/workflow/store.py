@@ -5,12 +5,14 @@
 
 from pathlib import Path
 
+from klack.reduction.structure import STRUCTURE_UNITS
 from klack.workflow.record_store import RESULT_NAME, RecordFormat, load_record, save_record
 from klack.workflow.study import ImpactStudy
 
 __all__ = ["IMPACT_FORMAT", "RESULT_NAME", "load_study", "save_study"]
 
 _UNITS = {
+    **STRUCTURE_UNITS,
     "time": "s",
     "force": "N",
     "peak_force": "N",

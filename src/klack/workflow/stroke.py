@@ -96,6 +96,7 @@ def run_stroke(
         stops=stops,
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
+        structures=valve.structures,
         warnings=tuple(notes),
     )
 

@@ -6,6 +6,7 @@ run; its unit stands beside it as ``unit``.
 
 from pathlib import Path
 
+from klack.reduction.structure import STRUCTURE_UNITS
 from klack.workflow.record_store import RecordFormat, load_record, save_record
 from klack.workflow.stroke_study import StrokeStudy
 
@@ -17,6 +18,7 @@ STROKE_FORMAT = RecordFormat(
     kind=StrokeStudy,
     command="klack stroke",
     units={
+        **STRUCTURE_UNITS,
         "time": "s",
         "step": "s",
         "contact_force": "N",

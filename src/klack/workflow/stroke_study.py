@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.reduction.structure import Structure
 from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
 from klack.workflow.study import BodySummary
 
@@ -226,6 +227,8 @@ class StrokeStudy:
     fluid : FluidSummary or None
         None for a case without fluid.
     lines : tuple of LineSummary
+    structures : tuple of Structure
+        Held bodies as sources of sound, their stops by the names of the end stops.
     warnings : tuple of str
     """
 
@@ -249,6 +252,7 @@ class StrokeStudy:
     stops: tuple[StopSummary, ...]
     fluid: FluidSummary | None = None
     lines: tuple[LineSummary, ...] = ()
+    structures: tuple[Structure, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property

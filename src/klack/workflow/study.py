@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures
+from klack.reduction.structure import Structure
 from klack.reduction.transfer import TransferComparison
 
 __all__ = [
@@ -246,6 +247,8 @@ class ImpactStudy:
     estimate_spread : float [-]
         Difference of its force history (as ``history_l2``) from a run with half as many modes.
         Above :data:`SETTLED` the run is no reference, and the estimates say little.
+    structures : tuple of Structure
+        Held bodies as sources of sound; their stop is called ``"contact"``.
     transfer : tuple of TransferComparison
     sections : tuple of SectionPicture
     warnings : tuple of str
@@ -274,6 +277,7 @@ class ImpactStudy:
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     estimate_basis: str = ""
     estimate_spread: float = 0.0
+    structures: tuple[Structure, ...] = ()
 
     @property
     def estimates_settled(self) -> bool:

@@ -22,10 +22,12 @@ from klack.network.network import Network
 from klack.reduction.ports import Port, pressure_port, surface_port
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.structure import Structure
 from klack.workflow.bodies import assemble_body, find_touch, mesh_body
 from klack.workflow.levels import damping_of, mode_pool, selection_of
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stops import StopContact, build_stop, split_law, stop_law
+from klack.workflow.structures import valve_structures
 
 __all__ = ["Valve", "build_valve"]
 
@@ -46,6 +48,8 @@ class Valve:
         Consistent laws, of the end stops that have one.
     network : Network
         With the bodies and laws filled in: the variant ``wet``.
+    structures : tuple of Structure
+        Held bodies as sources of sound.
     """
 
     case: ValveCase
@@ -54,6 +58,7 @@ class Valve:
     contacts: Mapping[str, StopContact]
     laws: Mapping[str, LocalLaw]
     network: Network
+    structures: tuple[Structure, ...] = ()
 
 
 def build_valve(
@@ -75,18 +80,21 @@ def build_valve(
     contacts = {
         name: build_stop(case, name, bodies, flexibilities, pools, progress) for name in case.stops
     }
+    ports = {name: _ports(case, body, contacts) for name, body in bodies.items()}
     reduced = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("reduced", i / len(bodies))
         reduced[name] = reduce_body(
             body,
-            _ports(case, body, contacts),
+            ports[name],
             modes=selection_of(case.reduction.choice(name)),
             correction=case.reduction.correction,
             damping=damping_of(case.bodies[name].damping),
             modes_pool=pools[name],
             flexibility=flexibilities[name],
         )
+    progress("radiating surfaces", 0.0)
+    structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
     for flexibility in flexibilities.values():
         flexibility.close()
     laws = {
@@ -97,7 +105,13 @@ def build_valve(
     network = case.network.network()
     network = network.with_components(_filled_in(network, reduced, laws))
     return Valve(
-        case=case, bodies=bodies, reduced=reduced, contacts=contacts, laws=laws, network=network
+        case=case,
+        bodies=bodies,
+        reduced=reduced,
+        contacts=contacts,
+        laws=laws,
+        network=network,
+        structures=structures,
     )
 
 
