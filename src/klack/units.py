@@ -352,16 +352,19 @@ def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
 
 def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
     """Metadata of a temperature in K; a file may also write ``20 degC``."""
-
-    def read(value: object, info: ValidationInfo) -> float:
-        if isinstance(value, str):
-            match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
-            if match:
-                return round(float(match[1]) + 273.15, 6)
-        return _read(value, info, kind=TEMPERATURE)
-
     metadata = {"type": ["string", "number"], "description": "a temperature, e.g. 20 degC"}
-    return BeforeValidator(read), WithJsonSchema({**metadata, "examples": ["20 degC", "293 K"]})
+    return (
+        BeforeValidator(partial(_read_temperature, kind=TEMPERATURE)),
+        WithJsonSchema({**metadata, "examples": ["20 degC", "293 K"]}),
+    )
+
+
+def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> float:
+    if isinstance(value, str):
+        match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
+        if match:
+            return round(float(match[1]) + 273.15, 6)
+    return _read(value, info, kind=kind)
 
 
 def _length_unit(value: object) -> float:

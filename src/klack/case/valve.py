@@ -6,6 +6,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
+from klack.case.calibration import CaseCalibration, free_parameters
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.case.schema import Lumped
@@ -141,10 +142,14 @@ class ValveCase(CaseFile):
         default=None, description="How strokes of this valve were measured."
     )
     noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
+    calibration: CaseCalibration | None = Field(
+        default=None, description="What klack calibrate fits to measured strokes."
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         check_valve(self)
+        free_parameters(self)
         return self
 
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:

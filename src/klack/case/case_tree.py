@@ -1,0 +1,60 @@
+"""A case as it was written, with single values exchanged and the whole checked again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from klack.case.reader import Lines, parse, text_of, validated
+from klack.case.valve import ValveCase
+from klack.input.problem import Key
+
+__all__ = ["CaseTree", "read_case_tree"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseTree:
+    """Text of the case of a whole valve, and the plain data in it.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+    data : mapping
+    lines : Lines
+    """
+
+    path: Path
+    text: str
+    data: Any
+    lines: Lines
+
+    def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
+        """Check the case with other values at some keys that it has.
+
+        Raises
+        ------
+        InputError
+            With file, line and key, as when the case is read.
+        """
+        data = self.data
+        for key, value in (values or {}).items():
+            data = _exchanged(data, key, value)
+        return validated(ValveCase, self.text, self.path, data, self.lines)
+
+
+def read_case_tree(path: Path) -> CaseTree:
+    """Read the file of a case."""
+    text = text_of(path)
+    data, lines = parse(text, path)
+    return CaseTree(path=path, text=text, data=data, lines=lines)
+
+
+def _exchanged(data: Any, key: Key, value: object) -> Any:
+    """Copy of the data with another value; all that is not on the way is shared."""
+    if not key:
+        return value
+    head, rest = key[0], key[1:]
+    copy: Any = dict(data) if isinstance(data, dict) else list(data)
+    copy[head] = _exchanged(data[head], rest, value)
+    return copy

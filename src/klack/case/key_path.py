@@ -1,0 +1,165 @@
+"""Places in a case by their path, as people write it: ``network.components.spring.preload``."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Annotated, Any, get_args
+
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.section import Section
+from klack.units import RATIO, Kind
+
+__all__ = ["Quantity", "quantity_at", "split_path", "written_at"]
+
+
+class Quantity:
+    """A number with a unit in a checked case, found by its path.
+
+    Parameters
+    ----------
+    key : tuple of str and int
+    kind : Kind
+        Of quantity; its unit is that of all values here.
+    value : float
+        In the case as it is.
+    """
+
+    def __init__(self, key: Key, kind: Kind, value: float, field: FieldInfo) -> None:
+        self.key, self.kind, self.value, self._field = key, kind, value, field
+
+    def parse(self, text: object) -> float:
+        """SI value of what somebody wrote for this key, under the limits of the schema.
+
+        Raises
+        ------
+        InputError
+            For another kind of quantity, a missing unit, a value out of its limits.
+        """
+        info = self._field
+        adapter: TypeAdapter[float] = TypeAdapter(Annotated[info.annotation, *info.metadata])  # type: ignore[name-defined]
+        try:
+            return float(adapter.validate_python(text, context={}))
+        except ValidationError as error:
+            details = error.errors(include_url=False)[0]
+            own = details.get("ctx", {}).get("error")
+            if isinstance(own, InputError):
+                raise InputError(
+                    str(self), got=own.got, expected=own.expected, hint=own.hint
+                ) from None
+            words = details["msg"].removeprefix("Input should be ")
+            raise InputError(
+                str(self),
+                got=f"'{text}'",
+                expected=f"a value {words}" if words != details["msg"] else words,
+                hint="the limits of the key itself hold for its bounds as well.",
+            ) from None
+
+    def written(self, value: float) -> str | float:
+        """Write a value [SI] as a case file has it, with its unit and all digits."""
+        return float(value) if self.kind.bare else f"{float(value)!r} {self.kind.unit}"
+
+    def __str__(self) -> str:
+        return ".".join(map(str, self.key))
+
+
+def split_path(text: str) -> Key:
+    """Turn ``a.b.0.c`` into ``("a", "b", 0, "c")``; whole numbers count list entries from 0."""
+    parts = text.split(".")
+    if not all(part.strip() == part and part for part in parts):
+        raise CaseProblem(
+            (),
+            got=f"'{text}'",
+            expected="keys joined with points, e.g. network.components.spring.preload",
+            hint="write the path of the key from the top of the case.",
+        )
+    return tuple(int(part) if part.isdigit() else part for part in parts)
+
+
+def quantity_at(case: Section, key: Key) -> Quantity:
+    """Find a number with a unit in a checked case.
+
+    Raises
+    ------
+    CaseProblem
+        If a part of the path does not exist, or no such number stands there.
+    """
+    node: Any = case
+    field: FieldInfo | None = None
+    for depth, part in enumerate(key):
+        known, found = _below(node)
+        if part not in found:
+            raise CaseProblem(
+                (),
+                got=f"'{'.'.join(map(str, key))}', but there is no '{part}'"
+                + (f" in '{'.'.join(map(str, key[:depth]))}'" if depth else ""),
+                expected=f"one of: {one_of(map(str, known))}",
+                hint=nearest(str(part), map(str, known), "write the path from the top."),
+            )
+        if isinstance(node, Section):
+            field = _fields(node)[str(part)]
+        node = found[part]
+    kind = None if field is None else _kind_in(field.annotation, field.metadata)
+    if kind is None and isinstance(node, float):
+        kind = RATIO  # a plain number
+    if kind is None or field is None or isinstance(node, bool) or not isinstance(node, float | int):
+        got = "no value" if node is None else "no number with a unit"
+        raise CaseProblem(
+            (),
+            got=f"'{'.'.join(map(str, key))}', which holds {got}",
+            expected="a key that holds one number with a unit, such as a force or a share",
+            hint="write a start value there, or name another key."
+            if node is None
+            else "klack schema tells what each key holds.",
+        )
+    return Quantity(key, kind, float(node), field)
+
+
+def written_at(data: Any, key: Key) -> Any:
+    """What stands in the parsed file at this path; None if nothing does."""
+    for part in key:
+        if isinstance(data, Mapping) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            return None
+    return data
+
+
+def _below(node: Any) -> tuple[list[str | int], dict[str | int, Any]]:
+    """Names of what is in a node, and what they lead to."""
+    found: dict[str | int, Any] = {}
+    if isinstance(node, Section):
+        found = {
+            info.alias or name: getattr(node, name)
+            for name, info in type(node).model_fields.items()
+        }
+    elif isinstance(node, Mapping):
+        found = dict(node)
+    elif isinstance(node, Sequence) and not isinstance(node, str):
+        found = dict(enumerate(node))
+    return list(found), found
+
+
+def _fields(node: Section) -> dict[str, FieldInfo]:
+    return {info.alias or name: info for name, info in type(node).model_fields.items()}
+
+
+def _kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
+    """Kind of quantity that a type takes, wherever it is nested."""
+    for item in metadata:
+        if isinstance(item, BeforeValidator) and isinstance(item.func, partial):
+            kind = item.func.keywords.get("kind")
+            if isinstance(kind, Kind):
+                return kind
+    arguments = get_args(annotation)
+    if getattr(annotation, "__metadata__", None):
+        return _kind_in(arguments[0], annotation.__metadata__)
+    for argument in arguments:
+        kind = _kind_in(argument, ())
+        if kind is not None:
+            return kind
+    return None
