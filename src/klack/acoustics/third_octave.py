@@ -38,7 +38,8 @@ class ThirdOctaves:
         ``k``: 0 is the band at 1 kHz.
     middle, low, high : array, shape (n,) [Hz]
     energy : array, shape (n,) [unit^2 s]
-        Integral of the energy spectral density over the band, N^2 s for a force.
+        Integral of the energy spectral density over the band, N^2 s for a force, Pa^2 s for a
+        sound.
     """
 
     number: NDArray[np.int64]
@@ -50,8 +51,18 @@ class ThirdOctaves:
     @property
     def level(self) -> NDArray[np.float64]:
         """Level of each band [dB re 1e-12 N^2 s], shape (n,)."""
+        return self.level_re(ENERGY_REFERENCE)
+
+    def level_re(self, reference: float) -> NDArray[np.float64]:
+        """Level of each band [dB re ``reference``], shape (n,).
+
+        Parameters
+        ----------
+        reference : float [unit^2 s]
+            Of a sound (20 uPa)^2 s.
+        """
         smallest = np.finfo(float).tiny
-        return 10.0 * np.log10(np.maximum(self.energy, smallest) / ENERGY_REFERENCE)
+        return 10.0 * np.log10(np.maximum(self.energy, smallest) / reference)
 
 
 def middle_frequencies(number: NDArray[np.int64]) -> NDArray[np.float64]:

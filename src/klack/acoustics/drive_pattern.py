@@ -1,0 +1,47 @@
+"""One click, repeated as the valve is driven."""
+
+from math import ceil, floor, pi
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.special import diric
+
+from klack.errors import require_positive
+from klack.signals import TimeSeries
+
+__all__ = ["drive_pattern"]
+
+
+def drive_pattern(click: TimeSeries, rate: float, duration: float) -> TimeSeries:
+    r"""Repeat a click; tails that overlap are added.
+
+    .. math:: p(t) = \sum_{i=0}^{n-1} p_1(t - i/r), \qquad
+              \hat p = \hat p_1\, e^{-i \pi f (n-1)/r}\, \frac{\sin(\pi n f/r)}{\sin(\pi f/r)}
+
+    The sum is taken over the spectrum, so clicks fall between samples where their rate demands it:
+    rounding to samples would be heard as jitter.  The click should be band limited, as that of
+    :func:`klack.acoustics.sound.click_pressure` is.
+
+    Parameters
+    ----------
+    click : TimeSeries
+        Its first value comes first in the pattern.
+    rate : float [Hz]
+        Clicks per second, ``r``.
+    duration : float [s]
+        Of the pattern; clicks that begin before its end are in it, tails beyond are cut off.
+    """
+    require_positive("drive_pattern: rate", rate, "Hz")
+    require_positive("drive_pattern: duration", duration, "s")
+    count = max(floor(duration / click.step + 0.5), 1)
+    clicks = max(ceil(duration * rate * (1.0 - 1e-12)), 1)
+    whole = count + click.values.size + ceil(1.0 / (rate * click.step))
+    n = next_fast_len(whole, real=True)
+    f = rfftfreq(n, click.step)
+    comb = clicks * diric(2.0 * pi * f / rate, clicks) * np.exp(-1j * pi * f * (clicks - 1) / rate)
+    return TimeSeries(
+        step=click.step,
+        values=irfft(rfft(click.values, n) * comb, n)[:count],
+        unit=click.unit,
+        name=f"{click.name} at {rate:.4g} Hz",
+    )

@@ -1,0 +1,135 @@
+r"""How loud and how sharp a sound is: ISO 532-1 (Zwicker), time varying, and DIN 45692.
+
+The loudness follows one-third-octave levels every 0.5 ms through the ear's masking and its slow
+decay after a click; one value every 2 ms is given.  The method is that of the package MoSQITo.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.signals import TimeSeries
+
+__all__ = ["Loudness", "loudness_level", "time_varying_loudness"]
+
+_RATE = 48_000
+_STEP = 2e-3  # [s] of the loudness
+_AFTER = 0.1  # [s] of silence appended, so that the end cannot reach the beginning
+_BARK = 0.1  # [Bark] steps of the specific loudness
+_QUIET = 0.1  # [sone] below this sharpness is not defined in DIN 45692
+_SILENT = "below the threshold of hearing: 0 sone"
+_FAINT = "fainter than 0.1 sone at its loudest: no sharpness is given"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Loudness:
+    """Loudness over time and what is said of it in single numbers.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Every 2 ms, on the time axis of the sound.
+    loudness : array, shape (n,) [sone]
+    maximum : float [sone]
+        The loudest moment, ``N_max``.
+    percentile_5 : float [sone]
+        ``N_5``, exceeded in 5 % of the time.  Of a single click it depends on how much silence is
+        recorded with it; compare drive patterns.
+    level : float [phon]
+        Loudness level of the maximum.
+    sharpness : float [acum]
+        DIN 45692 of the specific loudness summed over the whole sound; 0 where the sound is too
+        faint for it.
+    note : str
+        Empty, or what is to be said beside the numbers.
+    """
+
+    time: NDArray[np.float64]
+    loudness: NDArray[np.float64]
+    maximum: float
+    percentile_5: float
+    level: float
+    sharpness: float
+    note: str = ""
+
+
+def time_varying_loudness(pressure: TimeSeries) -> Loudness:
+    """Loudness of a sound in a free field from the front, ISO 532-1:2017 method for time varying.
+
+    The filters start from silence: a sound that begins at once needs 0.3 s to its final loudness.
+
+    Parameters
+    ----------
+    pressure : TimeSeries [Pa]
+        At 48 kHz; its level counts, so it must be in pascal.
+
+    Raises
+    ------
+    InputError
+        Another rate.
+    """
+    if abs(pressure.rate / _RATE - 1.0) > 1e-6:
+        raise InputError(
+            f"time_varying_loudness of '{pressure.name}'",
+            got=f"a rate of {pressure.rate:.6g} Hz",
+            expected=f"{_RATE} Hz, which the filters of ISO 532-1 are made for",
+            hint="make the sound with click_pressure(..., rate=48000).",
+        )
+    total, specific = _zwicker(pressure.values)
+    count = max(round(pressure.values.size * pressure.step / _STEP), 1)
+    total, specific = total[:count], specific[:, :count]
+    maximum = float(total.max())
+    note = _SILENT if maximum == 0.0 else _FAINT if maximum < _QUIET else ""
+    return Loudness(
+        time=np.asarray(pressure.start + _STEP * np.arange(total.size), dtype=float),
+        loudness=total,
+        maximum=maximum,
+        percentile_5=float(np.percentile(total, 95.0)),
+        level=loudness_level(maximum),
+        sharpness=0.0 if note else _sharpness(specific.sum(axis=1)),
+        note=note,
+    )
+
+
+def loudness_level(loudness: float) -> float:
+    r"""Loudness level [phon] of a loudness [sone].
+
+    .. math:: L_N = 40 + 10 \log_2 N \ (N \ge 1), \qquad
+              L_N = \max(3,\ 40 (N + 0.0005)^{0.35}) \ (N < 1)
+
+    ISO 532-1:2017, 5.8; 3 phon is the least that is given.
+
+    Parameters
+    ----------
+    loudness : float [sone]
+
+    Examples
+    --------
+    >>> loudness_level(4.0), loudness_level(0.0)
+    (60.0, 3.0)
+    """
+    if loudness >= 1.0:
+        return float(40.0 + 10.0 * np.log2(loudness))
+    return float(max(3.0, 40.0 * (loudness + 0.0005) ** 0.35))
+
+
+def _zwicker(pressure: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Loudness, shape (n,) [sone], and specific loudness, shape (240, n) [sone/Bark]."""
+    from mosqito.sq_metrics.loudness.loudness_zwtv.loudness_zwtv import loudness_zwtv
+
+    silence = np.zeros(int(_AFTER * _RATE))
+    total, specific, _, _ = loudness_zwtv(np.concatenate((pressure, silence)), _RATE)
+    return total, specific
+
+
+def _sharpness(specific: NDArray[np.float64]) -> float:
+    r"""Sharpness [acum] of a specific loudness, shape (240,), of any scale.
+
+    .. math:: S = 0.11\, \frac{\int N' g(z) z\,\mathrm dz}{\int N'\,\mathrm dz}, \qquad
+              g = 1\ (z \le 15.8), \quad 0.15\, e^{0.42 (z - 15.8)} + 0.85\ (z > 15.8)
+    """
+    z = _BARK * (np.arange(specific.size) + 1.0)
+    g = np.where(z > 15.8, 0.15 * np.exp(0.42 * (z - 15.8)) + 0.85, 1.0)
+    return float(0.11 * np.sum(specific * g * z) / np.sum(specific))

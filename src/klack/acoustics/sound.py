@@ -1,0 +1,219 @@
+r"""From a contact force to a sound pressure that can be listened to: an estimate.
+
+The structure radiates the power ``T(f) |F|^2``.  All of it is given to a monopole in a free field:
+
+.. math:: |\hat p(f)|^2 = \frac{\rho c}{4 \pi r^2}\, T(f)\, |\hat F(f)|^2
+
+``T`` has no phase, so the filter from force to pressure is given minimum phase: causal, and as
+early as possible.  Directivity, reflections and the travel time ``r/c`` are left out.
+"""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len
+from scipy.interpolate import PchipInterpolator
+from scipy.signal import zoom_fft
+
+from klack.acoustics.minimum_phase import minimum_phase_filter
+from klack.errors import InputError, require_positive
+from klack.signals import TimeSeries
+
+__all__ = ["audio_band", "click_pressure", "pressure_transfer"]
+
+_FINE = 0.25e-6  # [s] step to which finer forces are averaged
+_COARSE = 0.5  # largest force step in steps of the sound
+_LEAD = 5e-3  # [s] of silence before the record of the force begins
+_PASS, _STOP = 20.0 / 48.0, 23.5 / 48.0  # band limit in sampling rates
+_FLOOR = 1e-6  # amplitude beyond the band limit (-120 dB)
+_DEEPEST = 1e-18  # of the largest transfer: zeros have no logarithm
+_LONG = 4.0  # length of the filter in lengths of the record
+
+
+def click_pressure(
+    force: TimeSeries,
+    frequency: NDArray[np.float64],
+    transfer: NDArray[np.float64],
+    *,
+    distance: float,
+    density: float,
+    sound_speed: float,
+    rate: float = 48_000.0,
+    tail: float = 0.5,
+) -> TimeSeries:
+    r"""Sound pressure of contact forces at a distance: monopole, free field, minimum phase.
+
+    .. math:: \hat p(f) = H(f)\, \frac{\widehat{\dot F}(f)}{2 \pi i f}, \qquad
+              |H(f)| = \sqrt{\frac{\rho c\, T(f)}{4 \pi r^2}}
+
+    The force is taken by its changes within the record: one that is there from the beginning, or
+    stays to the end (a valve held closed), makes no sound at the ends.  The Fourier integral is
+    evaluated below half the rate of the sound alone, so nothing is folded into it; the band is
+    limited between 20 and 23.5 kHz (at 48 kHz), as part of the minimum-phase filter.  All impacts
+    of the record keep their times; time is that of the force, without the travel time ``r/c``.
+
+    Parameters
+    ----------
+    force : TimeSeries [N]
+        Means over its steps; at most half a step of the sound each.
+    frequency : array, shape (k,) [Hz]
+        Increasing; a value at 0 is passed over.
+    transfer : array, shape (k,) [W/N^2]
+        Radiated power per mean square force ``T``, zero or more.  In between it is interpolated
+        monotonically in logarithms; below the first frequency it falls with ``f^4`` (surface held
+        by a stiffness, smaller than the wave length), above the last it stays.
+    distance : float [m]
+    density : float [kg/m^3]
+    sound_speed : float [m/s]
+    rate : float [Hz]
+        Of the sound.
+    tail : float [s]
+        Sound after the end of the force record.
+
+    Returns
+    -------
+    TimeSeries [Pa]
+        Begins 5 ms before the force record, so that the onset of a first impact is in it.
+
+    Raises
+    ------
+    InputError
+        Force too coarse, frequencies not increasing, negative or vanishing transfer.
+    """
+    for name, value, unit in (
+        ("distance", distance, "m"),
+        ("density", density, "kg/m^3"),
+        ("sound_speed", sound_speed, "m/s"),
+        ("rate", rate, "Hz"),
+        ("tail", tail, "s"),
+    ):
+        require_positive(f"click_pressure: {name}", value, unit)
+    _require_fine(force, rate)
+    _require_transfer(frequency, transfer)
+    span = force.values.size * force.step
+    count = int(np.ceil((_LEAD + span + tail) * rate))
+    n = next_fast_len(int(_LONG * count), real=True)
+    n += n % 2
+    f = np.arange(n // 2 + 1) * rate / n
+    strength = density * sound_speed / (4.0 * pi * distance**2)
+    start = force.start - _LEAD
+    filtered = pressure_transfer(f, frequency, strength * transfer, rate=rate)
+    filtered[1:] *= _rate_of_change(force, f, origin=start)[1:] / (2j * pi * f[1:])
+    return TimeSeries(
+        step=1.0 / rate,
+        values=irfft(filtered, n)[:count] * rate,
+        unit="Pa",
+        start=start,
+        name=f"sound of {force.name}" if force.name else "sound",
+    )
+
+
+def pressure_transfer(
+    f: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    squared: NDArray[np.float64],
+    *,
+    rate: float,
+) -> NDArray[np.complex128]:
+    r"""Minimum-phase filter with a given squared magnitude, band limited.
+
+    Of the magnitude ``(2 sin(pi f / rate))^2`` is taken out before the logarithm is transformed and
+    put back as ``(1 - z^-1)^2``, which is of minimum phase itself: at 0 Hz the rest is finite.
+
+    Parameters
+    ----------
+    f : array, shape (N/2 + 1,) [Hz]
+        Evenly from 0 to half the rate.
+    frequency, squared : array, shape (k,) [Hz], [Pa^2/N^2]
+        Interpolated as in :func:`click_pressure`.
+    rate : float [Hz]
+    """
+    first = f[1]
+    level = _interpolated(np.maximum(f, first), frequency, squared)
+    double = 2.0 * np.sin(pi * np.maximum(f, first) / rate)
+    rest = np.sqrt(level) * audio_band(f, rate=rate) / double**2
+    rest[0] = rest[1]  # f^4 of the power below: flat
+    high_pass = (1.0 - np.exp(-2j * pi * f / rate)) ** 2
+    return minimum_phase_filter(rest) * high_pass
+
+
+def audio_band(f: NDArray[np.float64], *, rate: float = 48_000.0) -> NDArray[np.float64]:
+    """Magnitude of the band limit: 1 up to 20 kHz, half a cosine down to 1e-6 at 23.5 kHz.
+
+    Parameters
+    ----------
+    f : array [Hz]
+    rate : float [Hz]
+        Other rates than 48 kHz shift the limits in proportion.
+    """
+    x = np.clip((f / rate - _PASS) / (_STOP - _PASS), 0.0, 1.0)
+    band: NDArray[np.float64] = np.maximum(0.5 * (1.0 + np.cos(pi * x)), _FLOOR)
+    return band
+
+
+def _interpolated(
+    f: NDArray[np.float64], frequency: NDArray[np.float64], squared: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Monotone in logarithms; ``f^4`` below, constant above."""
+    known = frequency > 0.0
+    x, y = np.log(frequency[known]), squared[known]
+    y = np.log(np.maximum(y, _DEEPEST * y.max()))
+    within = np.clip(np.log(f), x[0], x[-1])
+    middle = PchipInterpolator(x, y)(within) if x.size > 1 else np.full(f.shape, y[0])
+    out: NDArray[np.float64] = np.exp(middle) * np.minimum(f / frequency[known][0], 1.0) ** 4
+    return out
+
+
+def _rate_of_change(
+    force: TimeSeries, f: NDArray[np.float64], *, origin: float
+) -> NDArray[np.complex128]:
+    """Fourier integral of ``dF/dt`` within the record [N], at even frequencies from 0."""
+    many = max(int(_FINE / force.step), 1)
+    missing = -force.values.size % many
+    held = np.concatenate((force.values, np.full(missing, force.values[-1])))
+    means = held.reshape(-1, many).mean(axis=1)
+    step = many * force.step
+    jumps = np.diff(means)
+    if not np.any(jumps):
+        return np.zeros(f.shape, dtype=complex)
+    first = force.start - 0.5 * force.step + step - origin  # time of the first jump
+    spectrum = zoom_fft(jumps, (0.0, f[-1]), m=f.size, fs=1.0 / step, endpoint=True)
+    turned = spectrum * np.exp(-2j * pi * f * first)
+    whole: NDArray[np.complex128] = turned / np.sinc(f * step) ** 2
+    return whole
+
+
+def _require_fine(force: TimeSeries, rate: float) -> None:
+    if force.step * rate > _COARSE:
+        raise InputError(
+            f"click_pressure: force '{force.name}'",
+            got=f"a step of {force.step * 1e6:.3g} us",
+            expected=f"at most {_COARSE / rate * 1e6:.3g} us for sound at {rate / 1e3:g} kHz",
+            hint="record the force in finer steps.",
+        )
+
+
+def _require_transfer(frequency: NDArray[np.float64], transfer: NDArray[np.float64]) -> None:
+    where = "click_pressure: frequency and transfer"
+    if frequency.ndim != 1 or frequency.shape != transfer.shape or not np.any(frequency > 0.0):
+        raise InputError(
+            where,
+            got=f"arrays of shapes {frequency.shape} and {transfer.shape}",
+            expected="two of the same length, with at least one frequency above 0",
+            hint="give the transfer at each frequency.",
+        )
+    if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
+        raise InputError(
+            where,
+            got="frequencies out of order",
+            expected="increasing frequencies from 0 Hz up",
+            hint="sort both arrays by frequency.",
+        )
+    if not np.all(transfer >= 0.0) or not np.any(transfer[frequency > 0.0] > 0.0):
+        raise InputError(
+            where,
+            got=f"a transfer from {transfer.min():g} to {transfer.max():g} W/N^2",
+            expected="zero or more, and somewhere above zero",
+            hint="a power is never negative; look for an empty set of surfaces.",
+        )
