@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 
 __all__ = [
+    "AREA_OPACITY",
     "COLOURS",
     "DASHES",
     "LABEL_STEP",
@@ -53,6 +54,8 @@ DASHES: dict[Style, tuple[float, ...]] = {
     "sparse": (2, 6),
 }
 """Lengths in px of strokes and spaces."""
+
+AREA_OPACITY = 0.3
 
 LABEL_STEP = 0.13
 """Labels of upright marks stand below each other, this share of the panel apart."""
@@ -93,7 +96,8 @@ class AxisSpec:
 class Curve:
     """One line: x and y in the units of the axes; nan breaks the line.
 
-    ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1) or ``points``.
+    ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1), ``points``, or ``area``: the
+    points go round it.
     A curve without ``label`` has no entry in the legend and no number under the pointer; one that
     is not ``listed`` has the number alone.  ``names`` are words for the single points, shown under
     the pointer with both numbers.
@@ -105,7 +109,7 @@ class Curve:
     style: Style = "solid"
     colour: Colour = "black"
     width: float = 1.8
-    drawn: Literal["line", "steps", "points"] = "line"
+    drawn: Literal["line", "steps", "points", "area"] = "line"
     listed: bool = True
     names: tuple[str, ...] = ()
 

@@ -11,7 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from klack.report.chart import COLOURS, DASHES, LABEL_STEP, AxisSpec, BarChart, Chart, Curve, Panel
+from klack.report.chart import (
+    AREA_OPACITY,
+    COLOURS,
+    DASHES,
+    LABEL_STEP,
+    AxisSpec,
+    BarChart,
+    Chart,
+    Curve,
+    Panel,
+)
 
 __all__ = ["plotly_bars", "plotly_chart"]
 
@@ -153,6 +163,15 @@ def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) 
     colour = COLOURS[curve.colour]
     if curve.drawn == "points":
         trace |= {"mode": "markers", "marker": {"color": colour, "size": 4 * curve.width}}
+    elif curve.drawn == "area":
+        red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+        trace |= {
+            "mode": "none",
+            "fill": "toself",
+            "fillcolor": f"rgba({red},{green},{blue},{AREA_OPACITY})",
+            "hoverinfo": "skip",
+        }
+        trace.pop("hovertemplate", None)
     else:
         dash = ",".join(f"{length:g}px" for length in DASHES[curve.style])
         trace |= {

@@ -8,7 +8,17 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from klack.report.chart import COLOURS, DASHES, LABEL_STEP, AxisSpec, BarChart, Chart, Curve, Panel
+from klack.report.chart import (
+    AREA_OPACITY,
+    COLOURS,
+    DASHES,
+    LABEL_STEP,
+    AxisSpec,
+    BarChart,
+    Chart,
+    Curve,
+    Panel,
+)
 
 __all__ = ["STYLE", "plain", "svg", "svg_bars", "svg_chart"]
 
@@ -124,6 +134,9 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
     if curve.drawn == "points":
         size = 2.0 * curve.width
         axes.plot(curve.x, curve.y, "o", color=colour, markersize=size, label=label)
+        return
+    if curve.drawn == "area":
+        axes.fill(curve.x, curve.y, color=colour, alpha=AREA_OPACITY, linewidth=0, label=label)
         return
     line = axes.plot(
         curve.x,
