@@ -1,0 +1,88 @@
+"""Which of the arrays of a file is its time, and in which unit."""
+
+import re
+
+from klack.errors import InputError
+from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
+from klack.units import TIME
+
+__all__ = ["SLOWEST", "clock_factor", "is_clock", "unique_names"]
+
+SLOWEST = 1e-3  # [s]
+"""Longest step at which a time without unit passes as seconds: lift is measured faster."""
+
+_NAME = re.compile(
+    r"(t|time|zeit|timestamps?|time[ _-]?stamp|timechannel|abtastzeit|messzeit|abszisse|abscissa)"
+    r"([ _-]?(s|sec|ms|us|ns|abs|rel|axis|vector|\#?\d+))?",
+    re.IGNORECASE,
+)
+_TIME_UNITS = {"s", "sec", "ms", "us", "ns", "msec", "usec", "seconds", "Sekunden", "second"}
+
+
+def is_clock(name: str, unit: str) -> bool:
+    """True for a time by its name, or by a unit of time.
+
+    Examples
+    --------
+    >>> is_clock("Time", ""), is_clock("t_rel", "ms"), is_clock("x", "s"), is_clock("lift", "um")
+    (True, True, True, False)
+    """
+    plain = plain_unit(unit)
+    if plain in _TIME_UNITS:
+        return True
+    return no_unit(unit) and _NAME.fullmatch(name.strip()) is not None
+
+
+def clock_factor(unit: str, step: float, where: str) -> tuple[float, str]:
+    """Seconds per unit of a stored time, and a note if the unit was assumed.
+
+    Parameters
+    ----------
+    unit : str
+        As the file says; may be empty.
+    step : float [unit]
+        Mean step of the time.
+
+    Raises
+    ------
+    InputError
+        If there is no unit and seconds would make a recording slower than 1 kHz.
+    """
+    if not no_unit(unit):
+        return unit_factor(unit, TIME, where).factor, ""
+    if step <= SLOWEST:
+        return 1.0, f"{where}: the time has no unit; taken as seconds."
+    raise InputError(
+        where,
+        got=f"a time without unit, with steps of {step:g}",
+        expected="a time with its unit, e.g. 'time [ms]'",
+        hint="write the unit into the header of the file, or give 'time_step' in the section "
+        "'measurement' of the case.",
+    )
+
+
+def unique_names(names: list[str]) -> list[str]:
+    """Number those names that come several times: ``lift #1``, ``lift #2``.
+
+    Examples
+    --------
+    >>> unique_names(["lift", "lift", "current"])
+    ['lift #1', 'lift #2', 'current']
+    """
+    seen: dict[str, int] = {}
+    result = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if names.count(name) == 1 else f"{name} #{seen[name]}")
+    return result
+
+
+def no_clock(where: str) -> InputError:
+    """Error of a file without any time."""
+    return InputError(
+        where,
+        got="no time",
+        expected="a channel of time with its unit, e.g. 'time [s]'",
+        hint="add it to the file, or give 'time_step: 10 us' in the section 'measurement' of the "
+        "case.",
+    )

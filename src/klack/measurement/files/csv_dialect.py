@@ -1,0 +1,243 @@
+"""How a text table is written: encoding, separator, decimal mark, and what its header says.
+
+Separator and decimal mark are those with which the most lines, looked at in the beginning, the
+middle and the end of the file, become rows of numbers of the same length.  The header is what
+stands above the first such row.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from klack.measurement.files.number_kernel import WHITESPACE
+from klack.measurement.unit_text import is_unit, no_unit, plain_unit
+
+__all__ = [
+    "Column",
+    "Dialect",
+    "encoding_of",
+    "find_dialect",
+    "first_row",
+    "read_columns",
+    "split_label",
+]
+
+_SEPARATORS = (";", "\t", ",", "|", "")
+_NAMES = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", "": "blanks"}
+_MISSING = {"", "nan", "na", "n/a", "null", "inf", "-inf", "-", "--", "#n/a", "-nan", "+inf"}
+_COMMENTS = "#%!;"
+_FOLLOWING = 3  # rows of numbers that end a header
+_NUMBERS = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
+}
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*(?P<open>[\[({])(?P<unit>[^\[\]{}]*)[\])}]")
+_SLASH = re.compile(r"(?P<name>.*\S)(?:\s+/\s*|/\s+|\s+in\s+)(?P<unit>\S+)")
+_SUFFIX = re.compile(r"(?P<name>.*[^_])_(?P<unit>[A-Za-zµμ][A-Za-zµμ0-9]*)")
+_NO_SUFFIX = re.compile(r"(ch|channel|kanal|phase|probe|sensor|input|trace)", re.IGNORECASE)
+_WORDS = re.compile(r"[^\s\[({]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?|\[[^\]]*\]|\([^)]*\)")
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """Separator ("" for runs of blanks), decimal mark, and number of columns."""
+
+    separator: str
+    decimal: str
+    width: int
+
+    @property
+    def separator_byte(self) -> int:
+        """For the compiled reader."""
+        return ord(self.separator) if self.separator else WHITESPACE
+
+    @property
+    def comments(self) -> str:
+        """Signs that begin a comment."""
+        return _COMMENTS.replace(self.separator, "") if self.separator else _COMMENTS
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        return f"{_NAMES[self.separator]}, decimal {'point' if self.decimal == '.' else 'comma'}"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Name, unit and text of the header of one column."""
+
+    name: str
+    unit: str
+    label: str
+
+
+def encoding_of(head: bytes) -> str:
+    """Encoding of a text by its first bytes: UTF-8, UTF-16 (also without mark), or Latin-1."""
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    if head[:3] == b"\xef\xbb\xbf":
+        return "utf-8-sig"
+    if head[1:60:2].count(0) > len(head[1:60:2]) // 2:
+        return "utf-16-le"
+    if head[0:60:2].count(0) > len(head[0:60:2]) // 2:
+        return "utf-16-be"
+    try:
+        head[: max(len(head) - 4, 1)].decode("utf-8")  # the last sign may be cut
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Cells of a line without their quotes."""
+    cells = line.split(separator) if separator else line.split()
+    return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
+    """Choose separator and decimal mark; None if no line is a row of numbers.
+
+    Parameters
+    ----------
+    head : sequence of str
+        First lines of the file.
+    samples : iterable of str
+        Complete lines from anywhere in the file.
+    """
+    lines = [line for line in samples if line.strip() and line.lstrip()[0] not in "#%!"]
+    best, most = None, (0, 0, 0)
+    for separator in _SEPARATORS:
+        for decimal in ".,":
+            if decimal == separator:
+                continue
+            widths = Counter(_width(line, separator, decimal) for line in lines)
+            widths.pop(0, None)
+            if not widths:
+                continue
+            rows = sum(widths.values())
+            # rows that end early miss their last values: the widest row counts, unless it is alone
+            width = max(w for w in widths if widths[w] >= min(2, max(widths.values())))
+            score = (rows, max(widths.values()), width)
+            if score > most:
+                best, most = Dialect(separator, decimal, width), score
+    if best is not None and best.separator == "," and best.width == 2:
+        return _one_or_two(head, lines, best)
+    return best
+
+
+def _one_or_two(head: Sequence[str], lines: Sequence[str], found: Dialect) -> Dialect:
+    """Tell ``0,5`` as one column with a decimal comma from two columns, by the header."""
+    alone = Dialect("", ",", 1)
+    if any(_width(line, "", ",") != 1 for line in lines):
+        return found
+    names = [line for line in head[: first_row(head, alone)] if line.strip(" #%!;\t")]
+    return alone if names and all("," not in line for line in names) else found
+
+
+def _width(line: str, separator: str, decimal: str) -> int:
+    """Cells of a row of numbers, without empty ones at its end; 0 if it is none."""
+    cells = _cells(line, separator)
+    while cells and not cells[-1]:
+        cells.pop()
+    pattern, numbers = _NUMBERS[decimal], 0
+    for cell in cells:
+        if pattern.fullmatch(cell):
+            numbers += 1
+        elif cell.lower() not in _MISSING:
+            return 0
+    return len(cells) if numbers else 0
+
+
+def first_row(lines: Sequence[str], dialect: Dialect) -> int:
+    """Index of the first row of numbers that is followed by more; their count if there is none."""
+    at = [
+        k
+        for k, line in enumerate(lines)
+        if line.strip() and line.lstrip()[0] not in dialect.comments
+    ]
+    good = [0 < _width(lines[k], dialect.separator, dialect.decimal) <= dialect.width for k in at]
+    for n, k in enumerate(at):
+        if all(good[n : n + _FOLLOWING]):
+            return k
+    return len(lines)
+
+
+def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] | None:
+    """Names and units from the lines above the numbers; None without a row of names.
+
+    A row of names has a cell for every column.  Below it there may be a row of units; without it
+    units are looked for in the names: ``lift [um]``, ``lift (um)``, ``lift / um``, ``lift_um``.
+    """
+    rows = [cells for line in header if (cells := _header_cells(line, dialect)) is not None]
+    if not rows:
+        return None
+    units: list[str] = [""] * dialect.width
+    names = rows.pop()
+    if rows and _is_unit_row(names):
+        units, names = [plain_unit(cell) for cell in names], rows.pop()
+    return tuple(_column(name, unit) for name, unit in zip(names, units, strict=True))
+
+
+def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
+    """Cells of a header line if it has one for every column, else None."""
+    text = line.strip().lstrip(dialect.comments + "/").strip()
+    tried = [dialect.separator, *(s for s in _SEPARATORS if s != dialect.separator)]
+    for separator in tried:
+        if separator == "" and dialect.separator != "":
+            continue
+        stripped = text if separator == "" else line.strip("\r\n ")
+        if line.lstrip()[:1] in tuple(dialect.comments) and separator:
+            stripped = text
+        cells = _words(stripped) if separator == "" else _cells(stripped, separator)
+        while len(cells) > dialect.width and not cells[-1]:
+            cells.pop()
+        if len(cells) == dialect.width - 1 and dialect.width > 2 and separator:
+            cells.append("")  # the last column has no name
+        if len(cells) == dialect.width and any(cells):
+            return cells
+    return None
+
+
+def _words(text: str) -> list[str]:
+    """Blank-separated names, a unit in brackets staying with its name."""
+    return [word.strip('"') for word in _WORDS.findall(text)]
+
+
+def _is_unit_row(cells: Sequence[str]) -> bool:
+    written = [cell for cell in cells if not no_unit(cell)]
+    return bool(written) and all(is_unit(cell) or _in_brackets(cell) for cell in written)
+
+
+def _in_brackets(cell: str) -> bool:
+    return re.fullmatch(r"[\[(].*[\])]", cell) is not None
+
+
+def split_label(label: str) -> tuple[str, str]:
+    """Name and unit of ``lift [um]``, ``lift (um)``, ``lift / um``, ``lift in um``, ``lift_um``.
+
+    The last form keeps its unit in the name.
+
+    Examples
+    --------
+    >>> split_label("lift [µm]"), split_label("p_rail_bar"), split_label("Channel A")
+    (('lift', 'um'), ('p_rail_bar', 'bar'), ('Channel A', ''))
+    """
+    match = _BRACKETS.fullmatch(label)
+    if match and match["name"]:
+        unit = match["unit"]
+        if no_unit(unit):
+            return match["name"], ""
+        if match["open"] == "[" or is_unit(unit):
+            return match["name"], plain_unit(unit)
+    match = _SLASH.fullmatch(label)
+    if match and is_unit(match["unit"]):
+        return match["name"], plain_unit(match["unit"])
+    match = _SUFFIX.fullmatch(label)
+    if match and is_unit(match["unit"]) and not _NO_SUFFIX.fullmatch(match["name"]):
+        return label, plain_unit(match["unit"])
+    return label, ""
+
+
+def _column(label: str, unit: str) -> Column:
+    name, found = split_label(label)
+    return Column(name, unit or found, label)

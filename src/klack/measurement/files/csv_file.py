@@ -1,0 +1,196 @@
+"""Text tables: CSV and its relatives, any separator and either decimal mark."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.measurement.files.clock import SLOWEST, clock_factor, is_clock, no_clock, unique_names
+from klack.measurement.files.csv_dialect import (
+    Column,
+    Dialect,
+    encoding_of,
+    find_dialect,
+    first_row,
+    read_columns,
+)
+from klack.measurement.files.number_table import NumberTable
+from klack.measurement.recording import ChannelInfo, Recording
+
+__all__ = ["CsvFile"]
+
+Vector = NDArray[np.float64]
+
+_HEAD = 1 << 18  # bytes in which the header must end
+_SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
+_TRIED = 1000  # rows by which a first column without name is recognised as time
+
+
+class CsvFile(Recording):
+    """Table of a text file.
+
+    A column is a time by its name or unit and holds for the columns right of it, up to the next
+    one.  Missing values at the end of a column end the channel; others are nan.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        If the file has no time, or a time without unit.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        data = _bytes_of(path)
+        dialect, columns, start = _survey(path, data)
+        self._table = NumberTable(path, data, start, dialect)
+        self._column: dict[str, int] = {}
+        self._factor: dict[str, float] = {}
+        self._clock_column: dict[str, int] = {}
+        notes: list[str] = []
+        if columns is None:
+            notes.append(f"{path.name}: no names; columns are called column 1, column 2, ...")
+            columns = tuple(Column(f"column {k + 1}", "", "") for k in range(dialect.width))
+            clocks = _first_as_clock(path, self._table, time_step, notes)
+        else:
+            clocks = _named_clocks(path, self._table, columns, time_step, notes)
+        super().__init__(path, self._channels(columns, clocks, time_step), tuple(notes))
+
+    def _channels(
+        self, columns: tuple[Column, ...], clocks: dict[int, float], time_step: float | None
+    ) -> tuple[ChannelInfo, ...]:
+        times = {k for k, c in enumerate(columns) if k in clocks or is_clock(c.name, c.unit)}
+        names = unique_names([c.name or f"column {k + 1}" for k, c in enumerate(columns)])
+        channels = []
+        for k, column in enumerate(columns):
+            count = int(self._table.filled[k])
+            if k in times or count == 0:
+                continue
+            start, step, clock = 0.0, time_step, ""
+            if clocks:
+                of = max((c for c in clocks if c < k), default=min(clocks))
+                count, clock = min(count, int(self._table.filled[of])), names[of]
+                self._clock_column[clock], self._factor[clock] = of, clocks[of]
+                start, step = self._mean_step(of, clocks[of], count)
+            if step is None:
+                raise no_clock(str(self._table.path))
+            self._column[names[k]] = k
+            channels.append(
+                ChannelInfo(
+                    name=names[k],
+                    unit=column.unit,
+                    count=count,
+                    start=start,
+                    step=step,
+                    clock=clock,
+                    label=column.label,
+                )
+            )
+        return tuple(channels)
+
+    def _mean_step(self, clock: int, factor: float, count: int) -> tuple[float, float | None]:
+        first = factor * float(self._table.column(clock, 0, 1)[0])
+        last = factor * float(self._table.column(clock, count - 1, count)[0])
+        return first, (last - first) / max(count - 1, 1)
+
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        return self._table.column(self._column[channel.name], first, last)
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        if not channel.clock:
+            return super()._time(channel, first, last)
+        clock = channel.clock
+        return self._factor[clock] * self._table.column(self._clock_column[clock], first, last)
+
+
+def _bytes_of(path: Path) -> NDArray[np.uint8]:
+    """Text of the file as bytes that agree with ASCII; mapped, not loaded, but for UTF-16."""
+    with path.open("rb") as file:
+        encoding = encoding_of(file.read(_HEAD))
+    if encoding.startswith("utf-16"):
+        text = path.read_bytes().decode(encoding, errors="replace")
+        return np.frombuffer(text.encode("utf-8"), np.uint8)
+    return np.asarray(np.memmap(path, np.uint8, "r"))
+
+
+def _survey(path: Path, data: NDArray[np.uint8]) -> tuple[Dialect, tuple[Column, ...] | None, int]:
+    """Dialect, columns (None without header) and first byte of the rows."""
+    raw = data[:_HEAD].tobytes()
+    encoding = encoding_of(raw)
+    mark = 3 if raw[:3] == b"\xef\xbb\xbf" else 0
+    lines = _complete_lines(raw[mark:], data.size > _HEAD)
+    texts = [
+        line.decode("latin-1" if encoding == "latin-1" else "utf-8", "replace") for line in lines
+    ]
+    middle = data.size // 2
+    dialect = find_dialect(
+        texts,
+        [
+            *texts[-200:],
+            *_lines_at(data, middle, middle + _SAMPLE),
+            *_lines_at(data, max(data.size - _SAMPLE, mark), data.size),
+        ],
+    )
+    if dialect is None:
+        raise InputError(
+            str(path),
+            got="no line of numbers",
+            expected="a table: values separated by commas, semicolons, tabs or blanks",
+            hint="check the file; MDF4, TDMS, UFF, HDF5 and MATLAB files are recognised as well.",
+        )
+    row = first_row(texts, dialect)
+    start = mark + sum(len(line) for line in lines[:row])
+    return dialect, read_columns(texts[:row], dialect), start
+
+
+def _complete_lines(raw: bytes, cut: bool) -> list[bytes]:
+    lines = raw.splitlines(keepends=True)
+    return lines[:-1] if cut and len(lines) > 1 else lines
+
+
+def _lines_at(data: NDArray[np.uint8], first: int, last: int) -> list[str]:
+    """Complete lines between two bytes, unless that is the beginning of the file."""
+    if data.size <= _HEAD:
+        return []
+    lines = data[first:last].tobytes().splitlines()[1:]
+    if last < data.size:
+        lines = lines[:-1]
+    return [line.decode("latin-1") for line in lines]
+
+
+def _named_clocks(
+    path: Path,
+    table: NumberTable,
+    columns: tuple[Column, ...],
+    time_step: float | None,
+    notes: list[str],
+) -> dict[int, float]:
+    """Columns that are times, with their seconds per unit."""
+    found = {}
+    for k, column in enumerate(columns):
+        if not is_clock(column.name, column.unit) or table.filled[k] < 2:
+            continue
+        if not column.unit and time_step is not None:
+            notes.append(f"{path.name}: time without unit replaced by time_step of the case.")
+            continue
+        count = int(table.filled[k])
+        ends = table.column(k, 0, 1)[0], table.column(k, count - 1, count)[0]
+        step = float(ends[1] - ends[0]) / (count - 1)
+        found[k], note = clock_factor(column.unit, step, f"{path.name}: '{column.label}'")
+        if note:
+            notes.append(note)
+    return found
+
+
+def _first_as_clock(
+    path: Path, table: NumberTable, time_step: float | None, notes: list[str]
+) -> dict[int, float]:
+    """Take an evenly rising first column of a table without names as time in seconds."""
+    if time_step is not None or table.rows < 3 or table.filled.size < 2:
+        return {}
+    steps = np.diff(table.column(0, 0, min(table.rows, _TRIED)))
+    mean = float(np.mean(steps))
+    if not 0 < mean <= SLOWEST or np.max(np.abs(steps - mean)) > 0.01 * mean:
+        return {}
+    notes.append(f"{path.name}: column 1 rises evenly; taken as time in seconds.")
+    return {0: 1.0}

@@ -1,0 +1,240 @@
+"""Which channel of a recording is the lift, which the current.
+
+Channels named in the section ``measurement`` are taken as named.  The others are looked for by
+their names in English and German, together with their units, then by their units alone.  Names
+that differ in their numbers only (``lift_01``, ``lift_02``, ...) are the strokes of a series.
+"""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from klack.errors import InputError
+from klack.measurement.channels import ChannelChoice
+from klack.measurement.recording import ChannelInfo, Recording, some_names
+from klack.measurement.roles import ROLES, Role
+from klack.measurement.unit_text import no_unit, roles_of_unit, unit_factor
+
+__all__ = ["FoundChannel", "find_channels"]
+
+_WORDS: Mapping[Role, str] = {
+    "velocity": r"velocity|speed|geschwindigkeit|schnelle|v(el)?|v_?needle|v_?nadel|v_?armature|"
+    r"v_?anker",
+    "acceleration": r"acc\w*|beschl\w*|vibration|körperschall|koerperschall|a_\w+",
+    "lift": r"lift|\w*hub|weg|displacement|position|travel|stroke|x|x_?needle|x_?nadel|"
+    r"x_?armature|x_?anker|s_?needle|s_?nadel",
+    "current": r"current|\w*strom|ampere|i|i_?\w{1,10}",
+    "voltage": r"voltage|\w*spannung|volt|u|u_?\w{1,10}",
+    "pressure": r"pressure|\w*druck|p|p_?\w{1,10}",
+    "force": r"force|\w*kraft|load|f|f_?\w{1,10}",
+}
+_SHORT = re.compile(r"[a-z](_\w+)?")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundChannel:
+    """A channel whose meaning is known: SI value = ``factor * value + offset``.
+
+    Parameters
+    ----------
+    name : str
+        In the recording.
+    unit : str
+        Of its values in the file.
+    factor : float [SI unit per unit of the file]
+        With the scale of the section.
+    offset : float [SI unit]
+    note : str
+        What was assumed; empty if the channel was named.
+    """
+
+    name: str
+    unit: str
+    factor: float
+    offset: float = 0.0
+    note: str = ""
+
+
+def find_channels(
+    recording: Recording,
+    channels: Mapping[Role, ChannelChoice] | None = None,
+    *,
+    needed: Collection[Role] = (),
+) -> list[dict[Role, FoundChannel]]:
+    """Tell what the channels of a recording mean.
+
+    Parameters
+    ----------
+    recording : Recording
+    channels : mapping of role to ChannelChoice, optional
+        From the section ``measurement``; patterns may match several channels.
+    needed : collection of roles
+        What the recording must have.
+
+    Returns
+    -------
+    list of dict
+        One for each stroke-record: usually a single one; one per stroke if a role matches several
+        channels.  A role that matches one channel is shared by all.
+
+    Raises
+    ------
+    InputError
+        If a named or needed channel is missing, several could be meant, units do not fit or
+        series differ in length.
+    """
+    named: dict[Role, Sequence[ChannelInfo]] = {
+        role: _matching(recording, role, choice) for role, choice in (channels or {}).items()
+    }
+    taken = {info.name for infos in named.values() for info in infos}
+    free = [info for info in recording.channels if info.name not in taken]
+    series: dict[Role, list[FoundChannel]] = {}
+    for role in ROLES:
+        if role in named:
+            choice = (channels or {})[role]
+            series[role] = [_as_named(recording, role, choice, info) for info in named[role]]
+        elif infos := _guess(recording, role, free, role in needed or role == "lift"):
+            series[role] = [_as_guessed(recording, role, info) for info in infos]
+        elif role in needed:
+            raise _not_found(recording, role)
+    if not series:
+        raise _not_found(recording, "lift")
+    return _pair(recording, series)
+
+
+def matches(pattern: str, text: str) -> bool:
+    """Compare with ``*`` and ``?`` as the only special signs.
+
+    Examples
+    --------
+    >>> matches("lift_?? [um]", "lift_01 [um]"), matches("lift*", "current")
+    (True, False)
+    """
+    parts = (".*" if c == "*" else "." if c == "?" else re.escape(c) for c in pattern)
+    return re.fullmatch("".join(parts), text, re.DOTALL) is not None
+
+
+def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[ChannelInfo]:
+    """Channels of a name or pattern; the part behind the last ``/`` is enough."""
+    found = [info for info in recording.channels if matches(choice.name, info.name)]
+    found = found or [
+        info
+        for info in recording.channels
+        if matches(choice.name, info.label) or matches(choice.name, _last_part(info.name))
+    ]
+    if not found:
+        raise InputError(
+            f"{recording.path.name}: measurement.channels.{role}",
+            got=f"no channel '{choice.name}'",
+            expected=f"one of: {some_names(recording.channels)}",
+            hint="correct the name; * and ? stand for anything.",
+        )
+    if len(found) > 1 and not re.search(r"[*?]", choice.name):
+        raise _ambiguous(recording, role, found)
+    return found
+
+
+def _last_part(name: str) -> str:
+    """Name without group and without the number of a repeated name."""
+    return re.sub(r" #\d+$", "", name.rsplit("/", 1)[-1])
+
+
+def _as_named(
+    recording: Recording, role: Role, choice: ChannelChoice, info: ChannelInfo
+) -> FoundChannel:
+    unit = info.unit if choice.unit is None else choice.unit
+    where = f"{recording.path.name}: channel '{info.name}' ({role})"
+    si = unit_factor(unit, role, where)
+    return FoundChannel(
+        name=info.name,
+        unit=unit,
+        factor=choice.scale * si.factor,
+        offset=choice.scale * si.offset,
+    )
+
+
+def _as_guessed(recording: Recording, role: Role, info: ChannelInfo) -> FoundChannel:
+    where = f"{recording.path.name}: channel '{info.name}' ({role})"
+    si = unit_factor(info.unit, role, where)
+    note = f"{recording.path.name}: '{info.name}' [{info.unit}] taken as {role}."
+    return FoundChannel(
+        name=info.name, unit=info.unit, factor=si.factor, offset=si.offset, note=note
+    )
+
+
+def _guess(
+    recording: Recording, role: Role, free: Sequence[ChannelInfo], must: bool
+) -> Sequence[ChannelInfo]:
+    """Channels found by name and unit; none if there is none, or several and none is a must."""
+    by_name = [info for info in free if _named_like(role, info)]
+    by_unit = [info for info in free if roles_of_unit(info.unit) == (role,)]
+    others = [info for info in by_unit if not any(_named_like(r, info) for r in ROLES if r != role)]
+    found = by_name or others
+    if len(found) > 1:
+        whole = [info for info in found if _last_part(info.name).lower() == role]
+        found = whole if len(whole) == 1 else found
+    if len(found) > 1 and not _is_series(found):
+        if must:
+            raise _ambiguous(recording, role, found)
+        return ()
+    return found
+
+
+def _named_like(role: Role, info: ChannelInfo) -> bool:
+    """True if the name means this role and the unit, if any, does not speak against it."""
+    name = re.sub(r"[\s.\-]+", "_", _last_part(info.name).strip().lower())
+    if no_unit(info.unit):
+        if _SHORT.fullmatch(name):
+            return False  # a letter without a unit says nothing
+    elif role not in roles_of_unit(info.unit):
+        return False
+    word = rf"(\w*_)?({_WORDS[role]})(_?\d+)?(_\w*)?"
+    return re.fullmatch(word, name) is not None
+
+
+def _is_series(infos: Sequence[ChannelInfo]) -> bool:
+    """True if the names differ in their numbers only."""
+    return len({re.sub(r"\d+", "#", info.name) for info in infos}) == 1
+
+
+def _pair(
+    recording: Recording, series: Mapping[Role, Sequence[FoundChannel]]
+) -> list[dict[Role, FoundChannel]]:
+    """One dict per stroke from series of channels; single channels are shared."""
+    count = max(len(found) for found in series.values())
+    for role, found in series.items():
+        if len(found) not in (1, count):
+            longest = next(r for r, f in series.items() if len(f) == count)
+            raise InputError(
+                f"{recording.path.name}: channels",
+                got=f"{count} channels of {longest} and {len(found)} of {role}",
+                expected=f"one of {role} for all, or {count}",
+                hint="choose with patterns in the section 'measurement' of the case.",
+            )
+    return [
+        {role: found[k if len(found) > 1 else 0] for role, found in series.items()}
+        for k in range(count)
+    ]
+
+
+def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -> InputError:
+    candidates = some_names(tuple(infos))
+    return InputError(
+        f"{recording.path.name}: channels",
+        got=f"several that could be the {role}: {candidates}",
+        expected=f"one channel of {role}, or a series that differs in its numbers only",
+        hint=f"name it in the case: measurement: {{channels: {{{role}: {infos[0].name}}}}}.",
+    )
+
+
+def _not_found(recording: Recording, role: Role) -> InputError:
+    listed = [
+        f"{info.name} [{info.unit}]" if info.unit else info.name for info in recording.channels[:12]
+    ]
+    return InputError(
+        f"{recording.path.name}: channels",
+        got=f"none that could be the {role}: {', '.join(listed)}",
+        expected=f"a channel of {ROLES[role].name} that is called '{role}' or the like",
+        hint=f"name it in the case: measurement: {{channels: {{{role}: "
+        f"{{name: {recording.channels[0].name}, unit: {ROLES[role].common[0]}}}}}}}.",
+    )

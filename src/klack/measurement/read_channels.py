@@ -1,0 +1,220 @@
+"""Channels of a recording in SI on one uniform time, whole or in windows.
+
+The fastest channel gives the time; the others are brought onto it along straight lines, which add
+no overshoot at a touch.  A channel whose samples lie on that time already stays as it was measured.
+"""
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import AccuracyWarning, InputError
+from klack.measurement.find_channels import FoundChannel
+from klack.measurement.recording import Recording
+from klack.measurement.roles import ROLES, Role
+from klack.measurement.time_base import TimeBase
+from klack.signals import TimeSeries
+
+__all__ = ["CommonTime", "common_time", "read_channels", "windows"]
+
+Vector = NDArray[np.float64]
+
+_SAME = 0.01  # of a step
+_MOST_MISSING = 5  # samples in a row
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonTime:
+    """The uniform time of several channels, where all of them have values.
+
+    Parameters
+    ----------
+    start, step : float [s]
+    count : int
+    notes : tuple of str
+        How channels were brought onto it, and what was assumed of them.
+    """
+
+    start: float
+    step: float
+    count: int
+    notes: tuple[str, ...] = ()
+
+
+def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> CommonTime:
+    """Time of the fastest channel, cut to what all channels cover.
+
+    Raises
+    ------
+    InputError
+        If channels do not overlap in time, or a stored time is unusable.
+    """
+    bases = {channel.name: recording.time_base(channel.name) for channel in found.values()}
+    fastest = min(bases.values(), key=lambda base: base.step)
+    begin = max(base.start for base in bases.values())
+    end = min(base.end for base in bases.values())
+    slack = _SAME * fastest.step
+    skipped = max(int(np.ceil((begin - fastest.start - slack) / fastest.step)), 0)
+    start = fastest.start + skipped * fastest.step
+    count = int(np.floor((end - start + slack) / fastest.step)) + 1
+    if count < 2:
+        raise InputError(
+            f"{recording.path.name}: channels",
+            got=f"no common time of {', '.join(bases)}",
+            expected="channels that were recorded at the same time",
+            hint="choose channels of one measurement in the section 'measurement' of the case.",
+        )
+    notes = [*recording.notes, *(channel.note for channel in found.values())]
+    for name, base in bases.items():
+        notes.append(base.note)
+        if base.uniform and not _on_grid(base, start, fastest.step):
+            notes.append(
+                f"{recording.path.name}: '{name}' (step {base.step:.4g} s) brought onto steps of "
+                f"{fastest.step:.4g} s along straight lines."
+            )
+    kept = tuple(dict.fromkeys(note for note in notes if note))
+    return CommonTime(start=start, step=fastest.step, count=count, notes=kept)
+
+
+def read_channels(
+    recording: Recording,
+    found: Mapping[Role, FoundChannel],
+    first: int = 0,
+    last: int | None = None,
+) -> dict[Role, TimeSeries]:
+    """Read a window of all channels [SI].
+
+    Parameters
+    ----------
+    recording : Recording
+    found : mapping of role to FoundChannel
+        One entry of :func:`klack.measurement.find_channels.find_channels`.
+    first, last : int
+        Samples of the common time, ``last`` not included; the whole of it by default.
+
+    Returns
+    -------
+    dict of role to TimeSeries
+        All of the same start, step and length.
+
+    Raises
+    ------
+    InputError
+        If the window is empty or more than five values in a row are missing.
+    """
+    clock = common_time(recording, found)
+    last = clock.count if last is None else min(last, clock.count)
+    first = max(first, 0)
+    if last <= first:
+        raise InputError(
+            f"{recording.path.name}: read_channels",
+            got=f"samples {first} to {last} of {clock.count}",
+            expected="at least one sample",
+            hint="check the window.",
+        )
+    start = clock.start + clock.step * first
+    return {
+        role: TimeSeries(
+            step=clock.step,
+            values=channel.offset
+            + channel.factor * _values_at(recording, channel.name, start, clock.step, last - first),
+            unit=ROLES[role].unit,
+            start=start,
+            name=channel.name,
+        )
+        for role, channel in found.items()
+    }
+
+
+def windows(
+    recording: Recording,
+    found: Mapping[Role, FoundChannel],
+    length: float,
+    overlap: float = 0.0,
+) -> Iterator[dict[Role, TimeSeries]]:
+    """Go through a long recording in windows, so that memory stays small.
+
+    Parameters
+    ----------
+    recording : Recording
+    found : mapping of role to FoundChannel
+    length : float [s]
+        Of each window; the last may be shorter.
+    overlap : float [s]
+        Time that a window shares with the one before; a stroke not longer than this lies whole
+        in at least one window.
+
+    Yields
+    ------
+    dict of role to TimeSeries
+        As :func:`read_channels` gives them.
+    """
+    clock = common_time(recording, found)
+    size = max(round(length / clock.step), 2)
+    shared = round(overlap / clock.step)
+    if shared >= size:
+        raise InputError(
+            "windows: overlap",
+            got=f"{overlap:g} s of {length:g} s",
+            expected="less than the length of a window",
+            hint="use longer windows.",
+        )
+    first = 0
+    while first < clock.count:
+        last = min(first + size, clock.count)
+        yield read_channels(recording, found, first, last)
+        if last == clock.count:
+            return
+        first = last - shared
+
+
+def _on_grid(base: TimeBase, start: float, step: float) -> bool:
+    """True if samples of a uniform channel fall onto the common time."""
+    if abs(base.step - step) * base.count > _SAME * step:
+        return False
+    shift = (start - base.start) / step
+    return abs(shift - round(shift)) <= _SAME
+
+
+def _values_at(recording: Recording, name: str, start: float, step: float, count: int) -> Vector:
+    """Values of a channel [unit of the file] at ``start + step * k``."""
+    base = recording.time_base(name)
+    if base.uniform and _on_grid(base, start, step):
+        begin = round((start - base.start) / step)
+        _, values = recording.read(name, begin, begin + count)
+        if np.all(np.isfinite(values)):
+            return values
+        time = np.arange(values.size, dtype=np.float64)
+        return _filled(recording, name, time, values, start + step * time)
+    time, values = recording.read(name, *base.samples(start, start + step * (count - 1)))
+    if base.uniform:
+        time = base.start + base.step * np.round((time - base.start) / base.step)
+    if not np.all(np.isfinite(values)):
+        values = _filled(recording, name, time, values, time)
+    return np.interp(start + step * np.arange(count), time, values)
+
+
+def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: Vector) -> Vector:
+    """Bridge a few missing values along straight lines; refuse many."""
+    missing = ~np.isfinite(values)
+    edges = np.diff(np.concatenate(([0], missing.astype(np.int8), [0])))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    longest = int(np.argmax(ends - begins))
+    if ends[longest] - begins[longest] > _MOST_MISSING:
+        raise InputError(
+            f"{recording.path.name}: channel '{name}'",
+            got=f"{ends[longest] - begins[longest]} missing values in a row at "
+            f"{time[begins[longest]]:.6g} s",
+            expected="at most five",
+            hint="leave this part out of the file, or choose another channel.",
+        )
+    warnings.warn(
+        f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' bridged "
+        "along straight lines.",
+        AccuracyWarning,
+        stacklevel=4,
+    )
+    return np.interp(at, at[~missing], values[~missing])

@@ -1,0 +1,270 @@
+"""A measured file: named channels, each read in windows of its samples.
+
+Every format has one class in :mod:`klack.measurement.files`; :func:`open_recording` chooses by the
+content of the file, and by its suffix where the content does not tell.  What a file of a stranger
+holds is data: nothing of it is executed, no object of another program is rebuilt from it, and
+its sizes are checked before memory is asked for.
+"""
+
+import re
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.measurement.time_base import TimeBase, survey_time
+
+__all__ = ["ChannelInfo", "Recording", "open_recording"]
+
+Vector = NDArray[np.float64]
+
+_LARGEST_WINDOW = 200_000_000  # samples, 1.6 GB
+_UFF_SET = re.compile(rb"(15|55|58b?|82|151|164|18|24\d\d)\b")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelInfo:
+    """One channel of a recording.
+
+    Parameters
+    ----------
+    name : str
+        As in the file, without its unit; different for every channel.
+    unit : str
+        As the file says; empty if it does not.
+    count : int
+        Number of samples.
+    start : float [s]
+        Time of the first sample.
+    step : float [s]
+        Mean time from sample to sample.
+    clock : str
+        Name of the stored time; empty if the file gives start and step alone.
+    label : str
+        Name and unit as the file writes them, ``"lift [um]"``.
+    """
+
+    name: str
+    unit: str
+    count: int
+    start: float
+    step: float
+    clock: str = ""
+    label: str = ""
+
+
+class Recording(ABC):
+    """Channels of one open file; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    path : Path
+    channels : tuple of ChannelInfo
+        In the order of the file, without its time.
+    notes : tuple of str
+        What was assumed on opening.
+    """
+
+    def __init__(
+        self, path: Path, channels: tuple[ChannelInfo, ...], notes: tuple[str, ...] = ()
+    ) -> None:
+        self.path, self.channels, self.notes = path, channels, notes
+        self._time_bases: dict[tuple[str, int], TimeBase] = {}
+        self._by_name = {channel.name: channel for channel in channels}
+        if not channels:
+            raise InputError(
+                str(path),
+                got="no channel of numbers over time",
+                expected="at least one channel",
+                hint="check that the file was exported completely.",
+            )
+
+    def channel(self, name: str) -> ChannelInfo:
+        """Find a channel by its name; raise :class:`InputError` with the names there are."""
+        if name in self._by_name:
+            return self._by_name[name]
+        raise InputError(
+            f"{self.path.name}: channels",
+            got=f"no channel '{name}'",
+            expected=f"one of: {some_names(self.channels)}",
+            hint="correct the name in the section 'measurement' of the case.",
+        )
+
+    def read(self, name: str, first: int = 0, last: int | None = None) -> tuple[Vector, Vector]:
+        """Time [s] and values [unit of the file] of samples ``first`` to before ``last``.
+
+        Samples outside the recording are left out; missing values are nan.
+        """
+        channel = self.channel(name)
+        begin, end = self._window(channel, first, last)
+        return self._time(channel, begin, end), self._values(channel, begin, end)
+
+    def time(self, name: str, first: int = 0, last: int | None = None) -> Vector:
+        """Time [s] alone of the same samples."""
+        channel = self.channel(name)
+        return self._time(channel, *self._window(channel, first, last))
+
+    def time_base(self, name: str) -> TimeBase:
+        """Compare the time of a channel with a uniform one; its stored time is read once."""
+        channel = self.channel(name)
+        if not channel.clock:
+            return TimeBase(
+                start=channel.start,
+                end=channel.start + channel.step * (channel.count - 1),
+                step=channel.step,
+                count=channel.count,
+                uniform=True,
+                marks=np.empty(0),
+            )
+        key = (channel.clock, channel.count)
+        if key not in self._time_bases:
+            self._time_bases[key] = survey_time(
+                lambda first, last: self._time(channel, first, last),
+                channel.count,
+                f"{self.path.name}: time of '{name}'",
+            )
+        return self._time_bases[key]
+
+    def _window(self, channel: ChannelInfo, first: int, last: int | None) -> tuple[int, int]:
+        end = channel.count if last is None else min(last, channel.count)
+        begin = min(max(first, 0), end)
+        if end - begin > _LARGEST_WINDOW:
+            raise InputError(
+                f"{self.path.name}: channel '{channel.name}'",
+                got=f"{end - begin} samples at once",
+                expected=f"at most {_LARGEST_WINDOW}",
+                hint="read it in windows; give a trigger in the section 'measurement'.",
+            )
+        return begin, end
+
+    @abstractmethod
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        """Values of samples that exist, in the unit of the file."""
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        """Time of samples that exist [s]; formats that store it override this."""
+        return channel.start + channel.step * np.arange(first, last, dtype=np.float64)
+
+    def close(self) -> None:  # noqa: B027  # many formats hold nothing open
+        """Let go of the file."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def some_names(channels: tuple[ChannelInfo, ...], most: int = 12) -> str:
+    """Names of channels for an error text; the first of them if there are many."""
+    names = [channel.name for channel in channels[:most]]
+    more = f", ... ({len(channels)} in all)" if len(channels) > most else ""
+    return ", ".join(names) + more
+
+
+def open_recording(path: str | Path, *, time_step: float | None = None) -> Recording:
+    """Open a measured file of any known format.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV and other text tables, MDF 3 and 4, TDMS, UFF (sets 58 and 58b), HDF5, MATLAB.
+    time_step : float, optional [s]
+        Sampling step, used where the file has no time of its own.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist, is of no known format, is damaged or has no time.
+    MissingExtraError
+        If the package that reads this format is not installed.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError as error:
+        raise InputError(
+            str(path),
+            got=(error.strerror or "no access").lower(),
+            expected="a measured file",
+            hint="check the path and the rights of the file.",
+        ) from error
+    if not head:
+        raise InputError(
+            str(path),
+            got="an empty file",
+            expected="a measured file",
+            hint="export the measurement again.",
+        )
+    return _open(path, head, time_step)
+
+
+def _open(path: Path, head: bytes, time_step: float | None) -> Recording:
+    """Open by content; readers are imported when they are needed."""
+    if head[:8] in (b"MDF     ", b"UnFinMF "):
+        from klack.measurement.files.mdf_file import MdfFile
+
+        return MdfFile(path)
+    if head[:4] == b"TDSm":
+        from klack.measurement.files.tdms_file import TdmsFile
+
+        return TdmsFile(path, time_step)
+    if head[:8] == b"\x89HDF\r\n\x1a\n" or head[512:520] == b"\x89HDF\r\n\x1a\n":
+        from klack.measurement.files.hdf5_file import Hdf5File
+
+        return Hdf5File(path, time_step)
+    if head[:6] == b"MATLAB" or path.suffix.lower() == ".mat":
+        from klack.measurement.files.matlab_file import MatlabFile
+
+        return MatlabFile(path, time_step)
+    if path.suffix.lower() in (".uff", ".unv", ".uf58") or _is_uff(head):
+        from klack.measurement.files.uff_file import UffFile
+
+        return UffFile(path)
+    _refuse_foreign(path, head)
+    from klack.measurement.files.csv_file import CsvFile
+
+    return CsvFile(path, time_step)
+
+
+def _is_uff(head: bytes) -> bool:
+    lines = [line.strip() for line in head.splitlines()[:2]]
+    return len(lines) == 2 and lines[0] == b"-1" and _UFF_SET.match(lines[1]) is not None
+
+
+_FOREIGN = {
+    b"PK\x03\x04": ("a zip archive or an Excel workbook", "export it as CSV, or unpack it."),
+    b"\x1f\x8b": ("a compressed file", "unpack it first."),
+    b"\xd0\xcf\x11\xe0": ("an old Office file", "export it as CSV."),
+    b"%PDF": ("a PDF", "give the measured data."),
+    b"PAR1": ("a Parquet file", "export it as CSV or HDF5."),
+    b"\x93NUMPY": ("a numpy array without names and units", "save it as CSV with a header."),
+}
+
+
+def _refuse_foreign(path: Path, head: bytes) -> None:
+    """Raise for files that are no text."""
+    known = next((about for start, about in _FOREIGN.items() if head.startswith(start)), None)
+    if known is None:
+        nulls = head.count(b"\x00")  # UTF-16 has one in nearly every pair of bytes
+        odd = head[1::2].count(b"\x00")
+        if nulls == 0 or (nulls > len(head) // 3 and odd in (0, nulls)):
+            return
+        known = "binary data of an unknown format", "export it as CSV, MDF4, TDMS or HDF5."
+    raise InputError(
+        str(path),
+        got=known[0],
+        expected="text (CSV), MDF, TDMS, UFF, HDF5 or MATLAB",
+        hint=known[1],
+    )

@@ -1,0 +1,143 @@
+"""Is a stored time uniform?  How a recording is brought onto one uniform time.
+
+Stored times jitter because clocks do, because they are written with few digits, or because samples
+were lost.  The first two are told apart by the steps: rounding makes steps of two lengths only.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["TimeBase", "survey_time"]
+
+Vector = NDArray[np.float64]
+
+_BLOCK = 1 << 20
+_UNIFORM = 0.01  # of a step
+_GAP = 1.5  # steps
+_LARGE_GAP = 5.5  # steps: more than five samples lost
+_LENGTHS = 6  # distinct lengths of steps that are kept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeBase:
+    """Times of a channel, compared with ``start + step * k``.
+
+    Parameters
+    ----------
+    start, end : float [s]
+        Time of the first and the last sample.
+    step : float [s]
+        Mean step of a uniform time, median step of an uneven one.
+    count : int
+    uniform : bool
+        True if the samples can be taken as they are.
+    note : str
+        What was found if it is not perfect.
+    marks : array, shape (m,) [s]
+        Time of every 2^20th sample, by which windows of uneven times are found.
+    """
+
+    start: float
+    end: float
+    step: float
+    count: int
+    uniform: bool
+    note: str = ""
+    marks: Vector
+
+    def samples(self, begin: float, end: float) -> tuple[int, int]:
+        """Range of samples that covers the times ``begin`` to ``end``, and a few more."""
+        if self.uniform:
+            first = int(np.floor((begin - self.start) / self.step)) - 1
+            last = int(np.ceil((end - self.start) / self.step)) + 2
+        else:
+            first = (int(np.searchsorted(self.marks, begin, "right")) - 1) * _BLOCK - 1
+            last = int(np.searchsorted(self.marks, end, "left")) * _BLOCK + 2
+        return max(first, 0), min(max(last, 0), self.count)
+
+
+def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> TimeBase:
+    """Go through a stored time once, in blocks.
+
+    Parameters
+    ----------
+    read : callable
+        Times [s] of samples first to before last.
+    count : int
+    where : str
+        File and channel, for errors.
+
+    Raises
+    ------
+    InputError
+        If the time stands still, goes back, has no value, or leaves out more than five samples.
+    """
+    if count < 2:
+        raise InputError(
+            where,
+            got=f"{count} sample",
+            expected="at least two",
+            hint="check that the file was exported completely.",
+        )
+    start, end = float(read(0, 1)[0]), float(read(count - 1, count)[0])
+    step = (end - start) / (count - 1)
+    marks, lengths = [], set[float]()
+    deviation, longest, usual, previous = 0.0, 0.0, step, np.empty(0)
+    for first in range(0, count, _BLOCK):
+        time = read(first, min(first + _BLOCK, count))
+        steps = np.diff(np.concatenate((previous, time)))
+        _check_order(steps, time, first, where)
+        if first == 0:
+            usual = float(np.median(steps))
+        marks.append(float(time[0]))
+        previous = time[-1:]
+        uniform = start + step * np.arange(first, first + time.size)
+        deviation = max(deviation, float(np.max(np.abs(time - uniform))) / step)
+        longest = max(longest, float(np.max(steps, initial=0.0)) / usual)
+        if len(lengths) <= _LENGTHS:
+            lengths.update(np.unique(np.round(steps / usual, 4)).tolist()[: _LENGTHS + 1])
+    base = TimeBase(
+        start=start, end=end, step=step, count=count, uniform=True, marks=np.array(marks)
+    )
+    if deviation <= _UNIFORM:
+        return base
+    if longest > _LARGE_GAP:
+        raise InputError(
+            where,
+            got=f"a gap of {longest * usual:.3g} s in its time, with steps of {usual:.3g} s",
+            expected="gaps of at most five samples",
+            hint="export the parts between the gaps into files or channels of their own.",
+        )
+    if _two_lengths(sorted(lengths)) and deviation < 1.0 and longest < _GAP:
+        return replace(base, note=f"{where}: time is rounded in the file; taken as uniform.")
+    what = "leaves out samples" if longest > _GAP else "jitters"
+    note = (
+        f"{where}: time {what} (longest step {longest:.2f} of the usual one); resampled along "
+        "straight lines."
+    )
+    return replace(base, step=usual, uniform=False, note=note)
+
+
+def _check_order(steps: Vector, time: Vector, first: int, where: str) -> None:
+    """Raise where the time stands still, goes back or is missing."""
+    wrong = np.flatnonzero(~(steps > 0))
+    if wrong.size == 0:
+        return
+    k = int(wrong[0]) + time.size - steps.size
+    came = "no value" if np.isnan(time[k]) else f"{time[k]:.9g} s"
+    raise InputError(
+        where,
+        got=f"a time that does not rise: {came} at sample {first + k + 1}",
+        expected="times that rise from sample to sample",
+        hint="write each stroke into its own file or channel; a time that starts again is not cut.",
+    )
+
+
+def _two_lengths(lengths: list[float]) -> bool:
+    """True if all steps are of two lengths, as rounding makes them."""
+    return len(lengths) <= _LENGTHS and np.count_nonzero(np.diff(lengths) > 2e-3) == 1
