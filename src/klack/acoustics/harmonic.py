@@ -1,0 +1,101 @@
+r"""Answer of a structure to a harmonic force of 1 N, ``exp(+i omega t)``.
+
+With :math:`H_i = 1/(\omega_i^2 - \omega^2 + 2 i \zeta_i \omega_i \omega)` and the mobility
+:math:`Y_s` of the support (zero for a rigid hold) the blocked force and the apparent mass are
+
+.. math:: B = 1 + \omega^2 \sum_i p_i \varphi_i H_i, \qquad
+          A = M + \omega^2 \sum_i p_i^2 H_i
+
+and the held surfaces move with :math:`v = B Y_s / (1 + i \omega A Y_s)`, the modes with
+:math:`\dot q_i = i \omega H_i (\varphi_i - i \omega p_i v)`.  Exact for the kept modes; those left
+out answer statically to the force, and move with the support.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.mount import Mount, moved_mass, support_mobility
+from klack.acoustics.plate import Plate
+from klack.errors import InputError
+from klack.reduction.structure import Structure
+
+__all__ = ["HarmonicResponse", "harmonic_response", "response_axis"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HarmonicResponse:
+    """Velocities per force at one port.
+
+    Parameters
+    ----------
+    frequency : array, shape (k,) [Hz]
+    fields : complex array, shape (k, b)
+        Of the surface fields of the structure: ``q'`` of the modes [1/(sqrt(kg) ...)], ``i omega``
+        of the static rest of the loaded port, and the velocity of the support.
+    support_velocity : complex array, shape (k,) [m/(N s)]
+    support_force : complex array, shape (k,) [-]
+        Axial force on the support: of a rigid hold the blocked force.
+    """
+
+    frequency: NDArray[np.float64]
+    fields: NDArray[np.complex128]
+    support_velocity: NDArray[np.complex128]
+    support_force: NDArray[np.complex128]
+
+
+def harmonic_response(
+    structure: Structure,
+    frequency: NDArray[np.float64],
+    port: str,
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+) -> HarmonicResponse:
+    """Velocities of modes, static rest and support under 1 N along +z at a port.
+
+    Parameters
+    ----------
+    structure : Structure
+    frequency : array, shape (k,) [Hz]
+        Zero or above.
+    port : str
+    mount, plate : Mount, Plate or None
+        What is below the held surfaces.
+    """
+    f, at = response_axis(frequency), structure.port_index(port)
+    m, count = len(structure.omega), len(structure.port_names)
+    omega = 2.0 * np.pi * f[:, None]
+    w, zeta = structure.omega, structure.damping
+    receptance = 1.0 / (w**2 - omega**2 + 2j * zeta * w * omega)
+    phi, p = structure.port_shapes[:, at], structure.participation
+    omega = omega[:, 0]
+    blocked = np.asarray(1.0 + omega**2 * (receptance @ (p * phi)), dtype=complex)
+    velocity, force = np.zeros(f.size, dtype=complex), blocked
+    if mount is not None or plate is not None:
+        apparent = moved_mass(structure, mount) + omega**2 * (receptance @ p**2)
+        below = support_mobility(f, mount, plate)
+        force = blocked / (1.0 + 1j * omega * apparent * below)
+        velocity = force * below
+    fields = np.zeros((f.size, m + count + 1), dtype=complex)
+    driven = phi - 1j * (omega * velocity)[:, None] * p
+    fields[:, :m] = 1j * omega[:, None] * receptance * driven
+    fields[:, m + at] = 1j * omega
+    fields[:, -1] = velocity
+    return HarmonicResponse(
+        frequency=f, fields=fields, support_velocity=velocity, support_force=force
+    )
+
+
+def response_axis(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Check frequencies [Hz]: one row, none below zero."""
+    f = np.asarray(frequency, dtype=float)
+    if f.ndim != 1 or not f.size or not np.all(f >= 0.0):
+        raise InputError(
+            "frequency",
+            got=f"an array of shape {f.shape}, lowest {np.min(f, initial=np.inf):g} Hz",
+            expected="one row of frequencies, none below 0 Hz",
+            hint="for example numpy.geomspace(20.0, 2e5, 2000).",
+        )
+    return f

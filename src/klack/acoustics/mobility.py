@@ -1,0 +1,88 @@
+r"""Mobility: velocity per force between the ports of a structure.
+
+.. math:: Y_{pq} = i\omega \left( \sum_i \frac{\varphi_{ip} \varphi_{iq}}
+          {\omega_i^2 - \omega^2 + 2 i \zeta_i \omega_i \omega} + R_{pq} \right)
+
+``R`` is what the modes miss of the static compliance; its share is a spring and takes up no power.
+On a mount the motion of the support is added.  Symmetric (reciprocity), and the real part at the
+driven port is never below zero.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.harmonic import harmonic_response
+from klack.acoustics.mount import Mount
+from klack.acoustics.plate import Plate
+from klack.reduction.structure import Structure
+
+__all__ = ["drive_point_mobility", "support_force_transfer", "transfer_mobility"]
+
+
+def drive_point_mobility(
+    structure: Structure,
+    port: str,
+    frequency: NDArray[np.float64],
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+    residual: bool = True,
+) -> NDArray[np.complex128]:
+    """Velocity of a port per force on it [m/(N s)], shape (k,); see :func:`transfer_mobility`."""
+    return transfer_mobility(
+        structure, port, port, frequency, mount=mount, plate=plate, residual=residual
+    )
+
+
+def transfer_mobility(
+    structure: Structure,
+    output: str,
+    source: str,
+    frequency: NDArray[np.float64],
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+    residual: bool = True,
+) -> NDArray[np.complex128]:
+    """Velocity of one port per force at another [m/(N s)], ``exp(+i omega t)``.
+
+    Parameters
+    ----------
+    structure : Structure
+    output, source : str
+        Names of ports.
+    frequency : array, shape (k,) [Hz]
+    mount, plate : Mount, Plate or None
+        What is below the held surfaces.
+    residual : bool
+        Add the static rest of the modes left out.
+
+    Returns
+    -------
+    complex array, shape (k,)
+    """
+    answer = harmonic_response(structure, frequency, source, mount=mount, plate=plate)
+    i, j = structure.port_index(output), structure.port_index(source)
+    m = len(structure.omega)
+    velocity = answer.fields[:, :m] @ structure.port_shapes[:, i] + answer.support_velocity
+    if residual:
+        omega = 2.0 * np.pi * answer.frequency
+        velocity = velocity + 1j * omega * structure.residual_compliance[i, j]
+    return velocity
+
+
+def support_force_transfer(
+    structure: Structure,
+    port: str,
+    frequency: NDArray[np.float64],
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+) -> NDArray[np.complex128]:
+    """Axial force on the support per force at a port [-], shape (k,).
+
+    Of a rigid hold that is the blocked force; it goes to 1 towards 0 Hz.  Above the kept modes it
+    goes to the share of the force that they do not carry away, and means nothing.
+    """
+    answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
+    return answer.support_force

@@ -1,0 +1,140 @@
+r"""Elastic mount: the held surfaces move along the axis on a spring, and all with them.
+
+One rigid boundary mode ``s`` joins the modes of the held body (Craig & Bampton 1968):
+
+.. math:: \begin{pmatrix} 1 & p \\ p^T & M \end{pmatrix}
+          \begin{pmatrix} \ddot q \\ \ddot s \end{pmatrix} +
+          \begin{pmatrix} \omega^2 & 0 \\ 0 & k (1 + i\eta) \end{pmatrix}
+          \begin{pmatrix} q \\ s \end{pmatrix} =
+          \begin{pmatrix} \varphi^T F \\ \sum F \end{pmatrix}
+
+with the participations ``p = R_z^T M phi``.  What the kept modes miss of the mass moves with the
+mount.  The force of the impacts stays that of the rigidly held body.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from klack.acoustics.plate import Plate
+from klack.errors import InputError, require_nonnegative, require_positive
+from klack.reduction.structure import Structure
+
+__all__ = ["Mount", "mounted", "moved_mass", "support_mobility"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mount:
+    """Spring below the held surfaces.
+
+    Parameters
+    ----------
+    stiffness : float [N/m]
+        Along the axis.
+    loss_factor : float [-]
+    mass : float [kg] or None
+        Of all that moves on it; the mass of the structure without.
+    """
+
+    stiffness: float
+    loss_factor: float = 0.05
+    mass: float | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("Mount.stiffness", self.stiffness, "N/m")
+        require_nonnegative("Mount.loss_factor", self.loss_factor, "-")
+
+
+def moved_mass(structure: Structure, mount: Mount | None) -> float:
+    """Mass that moves with the support [kg].
+
+    Raises
+    ------
+    InputError
+        If it is less than what the modes of the structure carry.
+    """
+    mass = structure.mass if mount is None or mount.mass is None else mount.mass
+    carried = float(structure.participation @ structure.participation)
+    if not mass > carried:
+        raise InputError(
+            f"mount of '{structure.name}': mass",
+            got=f"{mass:g} kg",
+            expected=f"more than {carried:g} kg, which the modes of the body move",
+            hint=f"the body alone has {structure.mass:g} kg; leave the mass out to take that.",
+        )
+    return mass
+
+
+def support_mobility(
+    frequency: NDArray[np.float64], mount: Mount | None, plate: Plate | None
+) -> NDArray[np.complex128]:
+    r"""Velocity of the held surfaces per force on what is below [m/(N s)], shape (k,).
+
+    .. math:: Y_s = \frac{i \omega}{k (1 + i \eta)} + \frac{1}{8 \sqrt{D m''}}
+
+    Spring and plate are in series; zero for a rigid hold.
+
+    Parameters
+    ----------
+    frequency : array, shape (k,) [Hz]
+    mount, plate : Mount, Plate or None
+    """
+    omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+    total = np.zeros(omega.shape, dtype=complex)
+    if mount is not None:
+        total += 1j * omega / (mount.stiffness * (1.0 + 1j * mount.loss_factor))
+    if plate is not None:
+        total += plate.mobility
+    return total
+
+
+def mounted(structure: Structure, mount: Mount) -> Structure:
+    r"""The same structure on an elastic mount, in its new modes.
+
+    The equations of the module text are solved for their eigenmodes without further neglect; all
+    that a :class:`Structure` tells of modes is carried over to the new ones.  Their damping ratios
+    share the losses of the old modes and of the mount in proportion to the energy in each (modal
+    strain energy, Johnson & Kienholz 1982), which holds as long as damped modes do not overlap.
+
+    Parameters
+    ----------
+    structure : Structure
+        Rigidly held.
+    mount : Mount
+    """
+    mass, m = moved_mass(structure, mount), len(structure.omega)
+    M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])
+    M[m, :m] = M[:m, m] = structure.participation
+    M[m, m] = mass
+    squares, psi = scipy.linalg.eigh(K, M)
+    omega = np.sqrt(squares)
+    fixed, motion = psi[:m], psi[m]
+    lost = fixed.T**2 @ (structure.damping * structure.omega) / omega
+    lost = lost + mount.loss_factor * mount.stiffness * motion**2 / (2.0 * squares)
+    carried = _carried_fields(structure, psi)
+    return replace(
+        structure,
+        mass=mass,
+        omega=omega,
+        damping=lost,
+        port_shapes=fixed.T @ structure.port_shapes + motion[:, None],
+        static_compliance=structure.static_compliance + 1.0 / mount.stiffness,
+        participation=fixed.T @ structure.participation + mass * motion,
+        group_gram=carried.T @ structure.group_gram @ carried,
+        group_volume=structure.group_volume @ carried,
+        face_shapes=(
+            structure.face_shapes @ fixed + structure.axial_normals[:, None] * motion
+        ).astype(np.float32),
+    )
+
+
+def _carried_fields(structure: Structure, psi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Old surface fields in terms of the new ones, shape (b, b + 1)."""
+    m, b = len(structure.omega), structure.group_gram.shape[1]
+    carried = np.zeros((b, b + 1))
+    carried[:m, : m + 1] = psi[:m]
+    carried[-1, : m + 1] = psi[m]
+    carried[m:, m + 1 :] = np.eye(b - m)
+    return carried
