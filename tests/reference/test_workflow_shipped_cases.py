@@ -35,6 +35,7 @@ def test_all_shipped_cases_are_tested():
         "demo-stroke",  # in test_workflow_stroke.py
         "demo-valve",
         "demo-valve-axisymmetric",
+        "measured",  # in test_measured_strokes.py
         "needle-from-inp",
         "sphere-on-rod",
         "two-rods",
