@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.nonlinear_decay import nonlinear_decay
 from klack.errors import InputError
 from klack.signals import TimeSeries
 
 __all__ = ["Loudness", "loudness_level", "time_varying_loudness"]
 
 _RATE = 48_000
-_STEP = 2e-3  # [s] of the loudness
-_AFTER = 0.1  # [s] of silence appended, so that the end cannot reach the beginning
+_STEP, _EVERY = 2e-3, 4  # [s] of the loudness given, steps of 0.5 ms
 _BARK = 0.1  # [Bark] steps of the specific loudness
 _QUIET = 0.1  # [sone] below this sharpness is not defined in DIN 45692
 _SILENT = "below the threshold of hearing: 0 sone"
@@ -116,12 +116,20 @@ def loudness_level(loudness: float) -> float:
 
 
 def _zwicker(pressure: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Loudness, shape (n,) [sone], and specific loudness, shape (240, n) [sone/Bark]."""
-    from mosqito.sq_metrics.loudness.loudness_zwtv.loudness_zwtv import loudness_zwtv
+    """Loudness, shape (n,) [sone], and specific loudness, shape (240, n) [sone/Bark].
 
-    silence = np.zeros(int(_AFTER * _RATE))
-    total, specific, _, _ = loudness_zwtv(np.concatenate((pressure, silence)), _RATE)
-    return total, specific
+    The steps of MoSQITo's ``loudness_zwtv``, with our own decay of hearing: there it takes three
+    quarters of the time, and lets the end of a sound act on its beginning.
+    """
+    from mosqito.sq_metrics.loudness.loudness_zwst._calc_slopes import _calc_slopes
+    from mosqito.sq_metrics.loudness.loudness_zwst._main_loudness import _main_loudness
+    from mosqito.sq_metrics.loudness.loudness_zwtv._temporal_weighting import _temporal_weighting
+    from mosqito.sq_metrics.loudness.loudness_zwtv._third_octave_levels import _third_octave_levels
+
+    levels = _third_octave_levels(pressure, _RATE)[0]
+    core = nonlinear_decay(_main_loudness(levels, "free"))
+    total, specific = _calc_slopes(core)
+    return _temporal_weighting(total)[::_EVERY], specific[:, ::_EVERY]
 
 
 def _sharpness(specific: NDArray[np.float64]) -> float:

@@ -14,16 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len
 from scipy.interpolate import PchipInterpolator
-from scipy.signal import zoom_fft
 
 from klack.acoustics.minimum_phase import minimum_phase_filter
+from klack.acoustics.spectrum import change_spectrum
 from klack.errors import InputError, require_positive
 from klack.signals import TimeSeries
 
 __all__ = ["audio_band", "click_pressure", "pressure_transfer"]
 
-_FINE = 0.25e-6  # [s] step to which finer forces are averaged
-_COARSE = 0.5  # largest force step in steps of the sound
 _LEAD = 5e-3  # [s] of silence before the record of the force begins
 _PASS, _STOP = 20.0 / 48.0, 23.5 / 48.0  # band limit in sampling rates
 _FLOOR = 1e-6  # amplitude beyond the band limit (-120 dB)
@@ -56,7 +54,7 @@ def click_pressure(
     Parameters
     ----------
     force : TimeSeries [N]
-        Means over its steps; at most half a step of the sound each.
+        Means over its steps; no longer than those of the sound.
     frequency : array, shape (k,) [Hz]
         Increasing; a value at 0 is passed over.
     transfer : array, shape (k,) [W/N^2]
@@ -89,7 +87,6 @@ def click_pressure(
         ("tail", tail, "s"),
     ):
         require_positive(f"click_pressure: {name}", value, unit)
-    _require_fine(force, rate)
     _require_transfer(frequency, transfer)
     span = force.values.size * force.step
     count = int(np.ceil((_LEAD + span + tail) * rate))
@@ -99,7 +96,8 @@ def click_pressure(
     strength = density * sound_speed / (4.0 * pi * distance**2)
     start = force.start - _LEAD
     filtered = pressure_transfer(f, frequency, strength * transfer, rate=rate)
-    filtered[1:] *= _rate_of_change(force, f, origin=start)[1:] / (2j * pi * f[1:])
+    changes = change_spectrum(force, high=0.5 * rate, count=f.size, origin=start)
+    filtered[1:] *= changes[1:] / (2j * pi * f[1:])
     return TimeSeries(
         step=1.0 / rate,
         values=irfft(filtered, n)[:count] * rate,
@@ -163,35 +161,6 @@ def _interpolated(
     middle = PchipInterpolator(x, y)(within) if x.size > 1 else np.full(f.shape, y[0])
     out: NDArray[np.float64] = np.exp(middle) * np.minimum(f / frequency[known][0], 1.0) ** 4
     return out
-
-
-def _rate_of_change(
-    force: TimeSeries, f: NDArray[np.float64], *, origin: float
-) -> NDArray[np.complex128]:
-    """Fourier integral of ``dF/dt`` within the record [N], at even frequencies from 0."""
-    many = max(int(_FINE / force.step), 1)
-    missing = -force.values.size % many
-    held = np.concatenate((force.values, np.full(missing, force.values[-1])))
-    means = held.reshape(-1, many).mean(axis=1)
-    step = many * force.step
-    jumps = np.diff(means)
-    if not np.any(jumps):
-        return np.zeros(f.shape, dtype=complex)
-    first = force.start - 0.5 * force.step + step - origin  # time of the first jump
-    spectrum = zoom_fft(jumps, (0.0, f[-1]), m=f.size, fs=1.0 / step, endpoint=True)
-    turned = spectrum * np.exp(-2j * pi * f * first)
-    whole: NDArray[np.complex128] = turned / np.sinc(f * step) ** 2
-    return whole
-
-
-def _require_fine(force: TimeSeries, rate: float) -> None:
-    if force.step * rate > _COARSE:
-        raise InputError(
-            f"click_pressure: force '{force.name}'",
-            got=f"a step of {force.step * 1e6:.3g} us",
-            expected=f"at most {_COARSE / rate * 1e6:.3g} us for sound at {rate / 1e3:g} kHz",
-            hint="record the force in finer steps.",
-        )
 
 
 def _require_transfer(frequency: NDArray[np.float64], transfer: NDArray[np.float64]) -> None:

@@ -4,29 +4,41 @@ r"""Spectra of transients: how much impulse an impact carries at each frequency.
           E(f) = 2\,|\hat F(f)|^2 \quad [\mathrm{N^2 s/Hz}]
 
 so that the integral of the one-sided energy spectral density ``E`` from 0 to infinity is the
-integral of ``F^2`` over time (Parseval), and ``F(0)`` is the impulse.  Levels are ``20 lg(|F| / 1
-uN s)``.  A transient that starts and ends at zero needs no window; one that is cut off gets a
-half-cosine tail, whose length is the caller's decision.
+integral of ``F^2`` over time (Parseval), and ``F(0)`` is the impulse. Levels: of the spectrum ``20
+lg(|F| / 1 uN s)``, of the density ``10 lg(E / ((1 uN)^2 s/Hz))``; a band energy is levelled re ``(1
+uN)^2 s``, so it has the level re 1 uN of a steady force with the same energy in one second. A
+transient that starts and ends at zero needs no window; one that is cut off gets a half-cosine tail,
+whose length is the caller's decision.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
+from scipy.signal import zoom_fft
 
 from klack.contact.history import ImpactHistory
-from klack.errors import InputError
+from klack.errors import InputError, require_positive
 from klack.signals import Spectrum, TimeSeries
 
 __all__ = [
+    "DENSITY_REFERENCE",
     "IMPULSE_REFERENCE",
+    "change_spectrum",
+    "density_level",
     "energy_spectral_density",
     "force_series",
+    "force_spectrum",
     "half_cosine_tail",
     "impulse_level",
     "impulse_spectrum",
 ]
 
 IMPULSE_REFERENCE = 1e-6  # [N s] of levels in dB
+DENSITY_REFERENCE = 1e-12  # [N^2 s/Hz], (1 uN)^2 s/Hz
+_FINE = 160.0  # values per period of the highest frequency that finer series are averaged to
+_COARSE = 2.0  # values per period at least
+_OVERSAMPLED = 8.0  # frequencies per inverse length of the record
+_FINEST, _WIDEST = 0.1, 2.0  # [Hz] resolution chosen without one
 _ENDS_AT_ZERO = 1e-3  # of the peak: accepted at the ends of an unwindowed transient
 
 
@@ -111,6 +123,91 @@ def impulse_spectrum(
     return Spectrum(frequency=frequency, values=spectrum, unit=f"{series.unit} s", name=series.name)
 
 
+def change_spectrum(
+    series: TimeSeries, *, high: float, count: int, origin: float = 0.0
+) -> NDArray[np.complex128]:
+    r"""Fourier integral of the rate of change within a record, at even frequencies.
+
+    .. math:: \int \dot F(t)\, e^{-2\pi i f (t - t_0)}\,\mathrm dt
+
+    A force that is there from the beginning, or that stays to the end, does not count as a change
+    there.  Values are means over their steps; far finer ones than ``high`` needs are averaged, and
+    the ``sinc^2`` of means and straight changes is divided out.
+
+    Parameters
+    ----------
+    series : TimeSeries [unit]
+        At least two values per period of ``high``.
+    high : float [Hz]
+    count : int
+        Of the frequencies, from 0 to ``high``.
+    origin : float [s]
+        Time ``t_0`` that phases belong to.
+
+    Returns
+    -------
+    complex array, shape (count,) [unit]
+
+    Raises
+    ------
+    InputError
+        Series too coarse for ``high``.
+    """
+    require_positive("change_spectrum: high", high, "Hz")
+    if series.step * high * _COARSE > 1.0 + 1e-9:
+        raise InputError(
+            f"spectrum of '{series.name}' up to {high:g} Hz",
+            got=f"a step of {series.step * 1e6:.3g} us",
+            expected=f"at most {1e6 / (_COARSE * high):.3g} us",
+            hint="record in finer steps, or ask for less.",
+        )
+    many = max(int(1.0 / (_FINE * high * series.step)), 1)
+    missing = -series.values.size % many
+    held = np.concatenate((series.values, np.full(missing, series.values[-1])))
+    step = many * series.step
+    changes = np.diff(held.reshape(-1, many).mean(axis=1))
+    if not np.any(changes):
+        return np.zeros(count, dtype=complex)
+    f = np.linspace(0.0, high, count)
+    first = series.start + step - 0.5 * series.step - origin  # time of the first change
+    spectrum = zoom_fft(changes, (0.0, high), m=count, fs=1.0 / step, endpoint=True)
+    whole: NDArray[np.complex128] = (
+        spectrum * np.exp(-2j * np.pi * f * first) / np.sinc(f * step) ** 2
+    )
+    return whole
+
+
+def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None = None) -> Spectrum:
+    r"""Fourier integral of a record that may begin or stay loaded, one-sided, [unit s].
+
+    .. math:: \hat F(f) = \frac{1}{2\pi i f} \int \dot F(t)\, e^{-2\pi i f t}\,\mathrm dt
+
+    The same as :func:`impulse_spectrum` where the record begins and ends at zero.  A force that
+    stays adds its ``1/f`` at low frequencies; it cannot be given at 0 Hz, where the value of the
+    next frequency is put.
+
+    Parameters
+    ----------
+    series : TimeSeries
+        Means over its steps.
+    high : float [Hz]
+        Last frequency; record at least twice as many values per second.
+    resolution : float [Hz] or None
+        Largest distance of the frequencies; ``None``: an eighth of the inverse length of the
+        record, within 0.1 and 2 Hz.
+    """
+    span = series.values.size * series.step
+    wanted = 1.0 / (_OVERSAMPLED * span)
+    distance = min(max(wanted, _FINEST), _WIDEST) if resolution is None else resolution
+    require_positive("force_spectrum: resolution", distance, "Hz")
+    count = int(np.ceil(high / distance)) + 1
+    values = change_spectrum(series, high=high, count=count)
+    f = np.linspace(0.0, high, count)
+    values[1:] /= 2j * np.pi * f[1:]
+    values[0] = values[1]
+    return Spectrum(frequency=f, values=values, unit=f"{series.unit} s", name=series.name)
+
+
 def energy_spectral_density(spectrum: Spectrum) -> Spectrum:
     """One-sided energy spectral density ``2 |F(f)|^2`` [unit^2 / Hz * s^0], real.
 
@@ -137,3 +234,15 @@ def impulse_level(spectrum: Spectrum) -> NDArray[np.float64]:
     """
     smallest = np.finfo(float).tiny
     return 20.0 * np.log10(np.maximum(np.abs(spectrum.values), smallest) / IMPULSE_REFERENCE)
+
+
+def density_level(density: Spectrum) -> NDArray[np.float64]:
+    """Level of an energy spectral density of a force [dB re (1 uN)^2 s/Hz], shape (k,).
+
+    Parameters
+    ----------
+    density : Spectrum
+        From :func:`energy_spectral_density`, in N^2 s/Hz.
+    """
+    smallest = np.finfo(float).tiny
+    return 10.0 * np.log10(np.maximum(np.real(density.values), smallest) / DENSITY_REFERENCE)

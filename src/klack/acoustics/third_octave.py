@@ -25,7 +25,7 @@ __all__ = [
 
 _G = 10.0**0.3
 _R10 = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
-ENERGY_REFERENCE = 1e-12  # [N^2 s], 1 uN s squared per second
+ENERGY_REFERENCE = 1e-12  # [N^2 s], (1 uN)^2 over 1 s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,7 +50,7 @@ class ThirdOctaves:
 
     @property
     def level(self) -> NDArray[np.float64]:
-        """Level of each band [dB re 1e-12 N^2 s], shape (n,)."""
+        """Level of each band of a force [dB re (1 uN)^2 s = 1e-12 N^2 s], shape (n,)."""
         return self.level_re(ENERGY_REFERENCE)
 
     def level_re(self, reference: float) -> NDArray[np.float64]:

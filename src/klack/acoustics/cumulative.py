@@ -1,0 +1,91 @@
+"""Where over frequency the energy of a transient lies, added up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.signals import Spectrum
+
+__all__ = ["CumulativeEnergy", "cumulative_energy"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CumulativeEnergy:
+    r"""Share of the energy below each frequency.
+
+    .. math:: s(f) = \frac{\int_{f_1}^{f} E\,\mathrm df}{\int_{f_1}^{f_2} E\,\mathrm df}
+
+    Parameters
+    ----------
+    frequency : array, shape (k,) [Hz]
+        From ``f_1`` to ``f_2``.
+    share : array, shape (k,) [-]
+        From 0 to 1.
+    total : float [unit^2 s]
+        Energy between ``f_1`` and ``f_2``, N^2 s for a force.
+    """
+
+    frequency: NDArray[np.float64]
+    share: NDArray[np.float64]
+    total: float
+
+    def frequency_below(self, share: float) -> float:
+        """Frequency [Hz] below which a share of the energy lies, e.g. 0.9.
+
+        Parameters
+        ----------
+        share : float [-]
+            Above 0 and below 1.
+        """
+        if not 0.0 < share < 1.0:
+            raise InputError(
+                "CumulativeEnergy.frequency_below",
+                got=f"a share of {share:g}",
+                expected="a value above 0 and below 1",
+                hint="0.5, 0.9 and 0.99 are usual.",
+            )
+        i = int(np.searchsorted(self.share, share))
+        low, high = self.share[i - 1], self.share[i]
+        part = (share - low) / (high - low)
+        return float(self.frequency[i - 1] + part * (self.frequency[i] - self.frequency[i - 1]))
+
+
+def cumulative_energy(density: Spectrum, *, low: float, high: float) -> CumulativeEnergy:
+    """Add the energy of a transient up over frequency, by trapezia.
+
+    Parameters
+    ----------
+    density : Spectrum
+        One-sided, from :func:`klack.acoustics.spectrum.energy_spectral_density`.
+    low, high : float [Hz]
+        Limits ``f_1`` and ``f_2``; say them beside a share, which depends on them.  A force that
+        stays has no energy of finite size from 0 Hz on.
+
+    Raises
+    ------
+    InputError
+        Limits out of order or out of the density; no energy between them.
+    """
+    frequency, values = density.frequency, np.real(density.values)
+    if not 0.0 <= low < high <= frequency[-1] * (1.0 + 1e-12):
+        raise InputError(
+            f"cumulative_energy of '{density.name}'",
+            got=f"{low:g} to {high:g} Hz",
+            expected=f"limits in rising order within 0 and {frequency[-1]:g} Hz",
+            hint="20 Hz to 200 kHz covers valves.",
+        )
+    inner = (frequency > low) & (frequency < high)
+    f = np.concatenate(([low], frequency[inner], [high]))
+    e = np.interp(f, frequency, values)
+    gathered = np.concatenate(([0.0], np.cumsum(0.5 * (e[1:] + e[:-1]) * np.diff(f))))
+    total = float(gathered[-1])
+    if not total > 0.0:
+        raise InputError(
+            f"cumulative_energy of '{density.name}'",
+            got="a density without energy",
+            expected="some energy between the limits",
+            hint="is there an impact in the record?",
+        )
+    return CumulativeEnergy(frequency=f, share=gathered / total, total=total)
