@@ -39,7 +39,7 @@ class Quantity:
             For another kind of quantity, a missing unit, a value out of its limits.
         """
         info = self._field
-        adapter: TypeAdapter[float] = TypeAdapter(Annotated[info.annotation, *info.metadata])  # type: ignore[name-defined]
+        adapter = TypeAdapter[float](Annotated[info.annotation, *info.metadata])  # type: ignore[arg-type]
         try:
             return float(adapter.validate_python(text, context={}))
         except ValidationError as error:

@@ -1,0 +1,156 @@
+r"""Parameters of a model by weighted least squares, inside bounds.
+
+.. math:: S(z) = \sum_i w_i (y_i - f_i(z))^2, \qquad 0 \le z_j \le 1
+
+The parameters are scaled by their bounds, ``theta = lower + z (upper - lower)``, so that all of
+them are of one size.  The search is scipy's trust region reflective method (Branch, Coleman & Li
+1999); the derivatives are central differences, whose steps are chosen so that each moves the model
+about as far as the data scatter: large against the rounding of a computed motion with its impacts,
+small against its curvature.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+__all__ = ["Fit", "Model", "fit_within_bounds", "sensitivities"]
+
+Vector = NDArray[np.float64]
+Model = Callable[[Sequence[Vector]], list[Vector]]
+"""From several scaled parameter vectors (p,) to the model vectors (m,), in the same order."""
+
+_FIRST_STEP = 0.01
+_SMALLEST_STEP, _LARGEST_STEP = 1e-3, 0.03
+_MOVED = 0.5
+"""Root mean square change of the model that a step aims at, in standard deviations."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Where the search ended.
+
+    Parameters
+    ----------
+    z : array, shape (p,) [-]
+        Scaled parameters.
+    model : array, shape (m,)
+        Of the data there.
+    jacobian : array, shape (m, p)
+        Derivatives of the model by ``z``.
+    cost : float [-]
+        Weighted sum of squares ``S``.
+    converged : bool
+    iterations : int
+    """
+
+    z: Vector
+    model: Vector
+    jacobian: NDArray[np.float64]
+    cost: float
+    converged: bool
+    iterations: int
+
+
+def fit_within_bounds(
+    model: Model,
+    data: Vector,
+    weights: Vector,
+    start: Vector,
+    *,
+    free: NDArray[np.bool_] | None = None,
+    most: int = 30,
+    tolerance: float = 1e-6,
+    progress: Callable[[int], None] = lambda iteration: None,
+) -> Fit:
+    """Find the parameters with the smallest weighted sum of squares.
+
+    Parameters
+    ----------
+    model : callable
+        See :data:`Model`.
+    data : array, shape (m,)
+    weights : array, shape (m,)
+        Inverse variances of the data; 0 leaves a sample out.
+    start : array, shape (p,) [-]
+        Scaled parameters, 0 to 1.
+    free : bool array, shape (p,), optional
+        Parameters that may move; the others stay at their start.
+    most : int
+        Most iterations.
+    tolerance : float
+        Relative change of the sum of squares at which it ends.
+
+    Returns
+    -------
+    Fit
+        Its Jacobian covers all parameters, also those that did not move.
+    """
+    free = np.ones(start.size, dtype=bool) if free is None else free
+    root = np.sqrt(weights)
+    steps = np.full(start.size, _FIRST_STEP)
+    rounds = 0
+
+    def whole(part: Vector) -> Vector:
+        z = start.copy()
+        z[free] = np.clip(part, 0.0, 1.0)
+        return z
+
+    def residual(part: Vector) -> Vector:
+        return np.asarray(root * (model([whole(part)])[0] - data))
+
+    def slopes(part: Vector) -> NDArray[np.float64]:
+        nonlocal rounds
+        rounds += 1
+        progress(rounds)
+        J = sensitivities(model, whole(part), steps, free)
+        moved = np.sqrt(np.mean((root[:, None] * J) ** 2, axis=0))
+        steps[free] = np.clip(
+            _MOVED / np.maximum(moved[free], 1e-12), _SMALLEST_STEP, _LARGEST_STEP
+        )
+        return np.asarray(root[:, None] * J[:, free])
+
+    if not free.any():
+        z = start.copy()
+    else:
+        found = least_squares(
+            residual,
+            np.clip(start[free], 1e-6, 1.0 - 1e-6),  # the method begins inside
+            jac=slopes,
+            bounds=(0.0, 1.0),
+            method="trf",
+            ftol=tolerance,
+            xtol=1e-7,
+            gtol=1e-12,
+            max_nfev=most,
+        )
+        z = whole(found.x)
+    values = model([z])[0]
+    return Fit(
+        z=z,
+        model=values,
+        jacobian=sensitivities(model, z, steps, np.ones(start.size, dtype=bool)),
+        cost=float(np.sum(weights * (values - data) ** 2)),
+        converged=bool(not free.any() or found.status > 0),
+        iterations=rounds,
+    )
+
+
+def sensitivities(
+    model: Model, z: Vector, steps: Vector, free: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Central differences of the model, one-sided at a bound, shape (m, p); 0 where not free."""
+    columns = np.flatnonzero(free)
+    pairs = []
+    for j in columns:
+        low, high = z.copy(), z.copy()
+        low[j], high[j] = max(z[j] - steps[j], 0.0), min(z[j] + steps[j], 1.0)
+        pairs += [low, high]
+    values = model(pairs)
+    result = np.zeros((values[0].size, z.size))
+    for i, j in enumerate(columns):
+        low, high = pairs[2 * i], pairs[2 * i + 1]
+        result[:, j] = (values[2 * i + 1] - values[2 * i]) / (high[j] - low[j])
+    return result

@@ -1,0 +1,164 @@
+r"""How uncertain fitted parameters are when whole strokes differ, not single samples.
+
+Noise of the samples averages out over the thousands of them in a stroke; what makes one stroke open
+later than the next does not: all residuals of one stroke move together.  The usual covariance
+``s^2 (J^T J)^-1`` takes samples for independent and is far too small.  Strokes, however, are
+independent of each other, so each one is asked alone where it would have put the parameters,
+
+.. math:: \theta_s = \theta + (J^T W J)^{-1} J^T W r_s, \qquad
+          C = \frac{1}{n (n - 1)} \sum_s (\theta_s - \bar\theta)(\theta_s - \bar\theta)^T ,
+
+one Gauss-Newton step per stroke with residuals ``r_s = y_s - f(theta)``.  This is the "sandwich" of
+White (1980) with whole strokes as clusters (Liang & Zeger 1986): right for any weights *W*, and for
+any correlation within a stroke.  Intervals take Student's t with ``n - 1`` degrees of freedom.
+Since all strokes share *J*, their sum of squares and that of their mean have the same normal
+equations: fitting the mean stroke is fitting all strokes.
+
+Limits: strokes scatter little enough for one linear step; with few strokes (n near the number of
+parameters) the correlations, not the single errors, become unreliable.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+__all__ = [
+    "ShotCovariance",
+    "correlation_of",
+    "noise_covariance",
+    "seen_by_data",
+    "shot_covariance",
+    "shot_estimates",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_NOTHING = 1e-9
+"""Sensitivity relative to the largest one below which the data do not see a parameter."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotCovariance:
+    """Uncertainty of the parameters, in the units of the Jacobian.
+
+    Parameters
+    ----------
+    covariance : array, shape (p, p)
+        inf on the diagonal of parameters that the data do not see.
+    degrees : int
+        Degrees of freedom of Student's t.
+    estimates : array, shape (n, p)
+        Parameters of every stroke alone; empty when they are not known.
+    """
+
+    covariance: Matrix
+    degrees: int
+    estimates: Matrix
+
+    @property
+    def standard_error(self) -> Vector:
+        """Of every parameter, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def quantile(self) -> float:
+        """Standard errors from the value to each end of the 95 % interval."""
+        return float(student.ppf(0.975, self.degrees))
+
+    @property
+    def correlation(self) -> Matrix:
+        """Correlation of the estimates, shape (p, p); 0 with what the data do not see."""
+        return correlation_of(self.covariance)
+
+
+def correlation_of(covariance: Matrix) -> Matrix:
+    """Correlation matrix of a covariance; 0 where a variance is 0 or infinite."""
+    deviation = np.sqrt(np.diag(covariance))
+    known = np.isfinite(deviation) & (deviation > 0.0)
+    scale = np.where(known, 1.0 / np.where(known, deviation, 1.0), 0.0)
+    result = np.where(np.isfinite(covariance), covariance, 0.0) * np.outer(scale, scale)
+    np.fill_diagonal(result, 1.0)
+    return np.asarray(np.clip(result, -1.0, 1.0))
+
+
+def seen_by_data(jacobian: Matrix, weights: Vector) -> NDArray[np.bool_]:
+    """Parameters that the data respond to at all, shape (p,)."""
+    size = np.sqrt(weights @ jacobian**2)
+    return np.asarray(size > _NOTHING * max(float(size.max(initial=0.0)), 1e-300))
+
+
+def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matrix:
+    """Step of the parameters that each stroke alone asks for.
+
+    Parameters
+    ----------
+    jacobian : array, shape (m, p)
+    weights : array, shape (m,)
+    residuals : array, shape (n, m)
+        Measured less computed, stroke by stroke.
+
+    Returns
+    -------
+    array, shape (n, p)
+        nan for parameters that the data do not see.
+    """
+    root = np.sqrt(weights)
+    seen = seen_by_data(jacobian, weights)
+    steps = np.full((residuals.shape[0], jacobian.shape[1]), np.nan)
+    A = root[:, None] * jacobian[:, seen]
+    scale = np.linalg.norm(A, axis=0)
+    solution = np.linalg.lstsq(A / scale, (root * residuals).T, rcond=1e-12)[0]
+    steps[:, seen] = (solution / scale[:, None]).T
+    return steps
+
+
+def shot_covariance(jacobian: Matrix, weights: Vector, residuals: Matrix) -> ShotCovariance:
+    """Covariance of the parameters from the scatter of two or more strokes.
+
+    Parameters are as for :func:`shot_estimates`.
+    """
+    steps = shot_estimates(jacobian, weights, residuals)
+    seen = ~np.isnan(steps[0])
+    n, p = steps.shape
+    covariance = np.full((p, p), np.nan)
+    covariance[np.ix_(seen, seen)] = np.atleast_2d(np.cov(steps[:, seen].T)) / n
+    covariance[~seen, ~seen] = np.inf
+    return ShotCovariance(covariance=covariance, degrees=n - 1, estimates=steps)
+
+
+def noise_covariance(jacobian: Matrix, weights: Vector, residual: Vector) -> ShotCovariance:
+    """Covariance from the residuals of a single stroke: its own noise, no scatter of strokes.
+
+    ``C = s^2 tau (J^T W J)^-1`` with the number ``tau`` of samples that move together, taken from
+    the autocorrelation of the weighted residuals up to its first zero.  Too small as soon as
+    strokes differ, which one stroke cannot tell.
+    """
+    seen = seen_by_data(jacobian, weights)
+    used = weights > 0.0
+    r = np.sqrt(weights[used]) * residual[used]
+    degrees = max(r.size - int(seen.sum()), 1)
+    p = jacobian.shape[1]
+    A = np.sqrt(weights)[:, None] * jacobian[:, seen]
+    covariance = np.full((p, p), np.nan)
+    inverse = np.linalg.pinv(A.T @ A, rcond=1e-15, hermitian=True)
+    variance = float(r @ r) / degrees * _together(r)
+    covariance[np.ix_(seen, seen)] = variance * inverse
+    covariance[~seen, ~seen] = np.inf
+    empty = np.empty((0, p))
+    return ShotCovariance(covariance=covariance, degrees=degrees, estimates=empty)
+
+
+def _together(r: Vector) -> float:
+    """Number of neighbouring samples that count as one."""
+    n = r.size
+    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n]
+    if not correlation[0] > 0.0:
+        return 1.0
+    correlation /= correlation[0]
+    below = np.flatnonzero(correlation <= 0.0)
+    last = int(below[0]) if below.size else n
+    return float(1.0 + 2.0 * correlation[1:last].sum())
