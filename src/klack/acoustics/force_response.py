@@ -1,0 +1,231 @@
+r"""Vibration of a held body under the forces of its stops, exactly, step by step.
+
+The forces are constant over each interval (contact forces are recorded as means), so every mode is
+propagated without error, from its static equilibrium under the first force:
+
+.. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p
+
+The energy injected at a port is :math:`\int F v\,\mathrm dt = \sum_k F_k\,(y_{k+1} - y_k)` with the
+motion ``y`` of the modes at the port, exactly.  The loss :math:`\int 2 \zeta \omega \dot q^2
+\mathrm dt` is integrated over the exact motion in each interval, not taken as a difference, so the
+balance of both with the energy of the modes is a check.  The static rest of the modes left out is a
+massless spring in the contact, which gives back what it takes; it is not among them.
+
+The force on the rigid hold follows from the momentum of the whole body,
+
+.. math:: R = \sum_p F_p - \frac{\mathrm d}{\mathrm dt} \sum_i p_i \dot q_i,
+
+which is exact at rest, whatever the number of modes, because the modes left out are in static
+equilibrium with the force.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from klack.acoustics.port_forces import aligned_forces
+from klack.errors import InputError
+from klack.reduction.structure import Structure
+from klack.signals import TimeSeries
+from klack.simulation.propagator import damping_loss, modal_propagator
+
+__all__ = ["ModalResponse", "modal_response", "surface_velocity"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalResponse:
+    """What forces did to a structure.
+
+    Parameters
+    ----------
+    body : str
+    port_names : tuple of str
+    injected : array, shape (p,) [J]
+        Work of each port's force on the modes.
+    energy_before : float [J]
+        Of the static equilibrium at the start.
+    modal_energy : array, shape (m,) [J]
+        Kinetic and strain energy of each mode at the end.
+    dissipated : array, shape (m,) [J]
+        Lost in the damping of each mode.
+    ringing : array, shape (m,) [J]
+        Energy of each mode at the end about its equilibrium under the last force: what it will
+        still lose if that force stays.
+    stored : array, shape (n + 1,) [J]
+        Energy of all modes at the ends of the intervals.
+    blocked_force : TimeSeries [N]
+        Axial force on the hold, means over the intervals; along +z from the forces.
+    sample_time : array, shape (k,) [s]
+    modal_displacement, modal_velocity : array, shape (k, m) [m sqrt(kg)], [m sqrt(kg)/s]
+        States at the sample times.
+    """
+
+    body: str
+    port_names: tuple[str, ...]
+    injected: Floats
+    energy_before: float
+    modal_energy: Floats
+    dissipated: Floats
+    ringing: Floats
+    stored: Floats
+    blocked_force: TimeSeries
+    sample_time: Floats
+    modal_displacement: Floats
+    modal_velocity: Floats
+
+    @property
+    def injected_energy(self) -> float:
+        """Work of all forces [J]."""
+        return float(self.injected.sum())
+
+    @property
+    def vibration_energy(self) -> float:
+        """Energy that went into vibration [J]: lost so far, or still ringing."""
+        return float(self.dissipated.sum() + self.ringing.sum())
+
+    @property
+    def residual(self) -> float:
+        """What does not balance, over the energy turned over [-]."""
+        held = float(self.modal_energy.sum()) - self.energy_before
+        lost = float(self.dissipated.sum())
+        scale = max(float(np.abs(self.injected).sum()), self.energy_before, float(self.stored[-1]))
+        return (held + lost - self.injected_energy) / scale if scale > 0.0 else 0.0
+
+
+def modal_response(
+    structure: Structure, forces: Mapping[str, TimeSeries], *, sample: float | None = None
+) -> ModalResponse:
+    """Propagate the modes of a structure exactly under forces at its ports.
+
+    Parameters
+    ----------
+    structure : Structure
+        Rigidly held, or on a mount (:func:`klack.acoustics.mount.mounted`).
+    forces : mapping of port name to TimeSeries [N]
+        Along +z, means over intervals whose middles are their times, all on one grid.  The first
+        value has acted for ever.
+    sample : float [s], optional
+        Spacing of recorded states; none are recorded without.
+    """
+    axis, values = aligned_forces(structure, forces)
+    every = _interval(sample, axis)
+    w, zeta, phi = structure.omega, structure.damping, structure.port_shapes
+    P, D = modal_propagator(w, zeta, axis.step), damping_loss(w, zeta, axis.step)
+    q = phi @ values[0] / w**2
+    before = float(0.5 * np.sum((w * q) ** 2))
+    n, m, count = len(values), len(w), (len(values) // every + 1 if every else 0)
+    states = np.zeros((count, 2, m))
+    stored, momentum, lost = np.zeros(n + 1), np.zeros(n + 1), np.zeros(m)
+    work = np.zeros(phi.shape[1])
+    v = np.zeros(m)
+    _march(
+        np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]),
+        np.array([D.Q11, D.Q12, D.Q22, D.L1, D.L2, D.S]),
+        w**2,
+        np.ascontiguousarray(phi),
+        structure.participation,
+        np.ascontiguousarray(values),
+        q,
+        v,
+        every,
+        states,
+        stored,
+        momentum,
+        work,
+        lost,
+    )
+    begin = axis.start - 0.5 * axis.step
+    reaction = values.sum(axis=1) - np.diff(momentum) / axis.step
+    return ModalResponse(
+        body=structure.name,
+        port_names=structure.port_names,
+        injected=work,
+        energy_before=before,
+        modal_energy=0.5 * (v**2 + (w * q) ** 2),
+        dissipated=lost,
+        ringing=0.5 * (v**2 + (w * q - phi @ values[-1] / w) ** 2),
+        stored=stored,
+        blocked_force=TimeSeries(
+            step=axis.step,
+            values=reaction,
+            unit=axis.unit,
+            start=axis.start,
+            name=f"{structure.name} blocked force",
+        ),
+        sample_time=begin + axis.step * every * np.arange(count, dtype=np.float64),
+        modal_displacement=states[:, 0],
+        modal_velocity=states[:, 1],
+    )
+
+
+def surface_velocity(structure: Structure, response: ModalResponse) -> Floats:
+    """Mean normal velocity of every face at the sample times [m/s], shape (k, f).
+
+    That of the modes: the static rest follows the force, and its velocity the rate of the force.
+
+    Parameters
+    ----------
+    structure : Structure
+    response : ModalResponse
+        With samples.
+    """
+    return np.asarray(response.modal_velocity @ structure.face_shapes.T.astype(np.float64))
+
+
+def _interval(sample: float | None, axis: TimeSeries) -> int:
+    """Intervals between recorded states; 0 for none."""
+    if sample is None:
+        return 0
+    every = round(sample / axis.step)
+    if every < 1 or abs(every * axis.step / sample - 1.0) > 1e-6:
+        raise InputError(
+            "modal_response: sample",
+            got=f"{sample:g} s for intervals of {axis.step:g} s",
+            expected="a multiple of the interval",
+            hint=f"for example {10 * axis.step:g} s.",
+        )
+    return every
+
+
+@njit(cache=True)
+def _march(  # type: ignore[no-untyped-def]
+    A, Q, squares, phi, part, force, q, v, every, states, stored, momentum, work, lost
+):  # pragma: no cover - compiled
+    """Propagate all modes; ``q`` and ``v`` are the states at the start, and then at the end."""
+    m, ports = phi.shape
+    moved = np.zeros(ports)
+    for k in range(len(force) + 1):
+        if every > 0 and k % every == 0:
+            states[k // every, 0] = q
+            states[k // every, 1] = v
+        total, carried = 0.0, 0.0
+        for i in range(m):
+            total += v[i] * v[i] + squares[i] * q[i] * q[i]
+            carried += part[i] * v[i]
+        stored[k] = 0.5 * total
+        momentum[k] = carried
+        if k == len(force):
+            break
+        for p in range(ports):
+            moved[p] = 0.0
+        for i in range(m):
+            x, u, f = q[i], v[i], 0.0
+            for p in range(ports):
+                f += phi[i, p] * force[k, p]
+            lost[i] += (
+                Q[0, i] * x * x
+                + Q[1, i] * x * u
+                + Q[2, i] * u * u
+                + f * (Q[3, i] * x + Q[4, i] * u + Q[5, i] * f)
+            )
+            q[i] = A[0, i] * x + A[1, i] * u + A[4, i] * f
+            v[i] = A[2, i] * x + A[3, i] * u + A[5, i] * f
+            for p in range(ports):
+                moved[p] += phi[i, p] * (q[i] - x)
+        for p in range(ports):
+            work[p] += force[k, p] * moved[p]
