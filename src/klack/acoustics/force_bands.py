@@ -1,0 +1,175 @@
+r"""One-third-octave energies of a force from 20 Hz to 200 kHz, as it is or weighted over frequency.
+
+A needle that sits on its seat presses before and after the stroke, so the spectrum is that of a
+force that is held at both ends (:func:`klack.acoustics.spectrum.force_spectrum`).  Four decades of
+bands ask for fine frequencies at the low end and for short steps at the high end; each decade has a
+spectrum of its own.
+
+A weight over frequency makes other energies of the same force: with the radiated power per mean
+square force ``T`` [W/N^2]
+
+.. math:: E_b = \int_b T(f)\, 2 |\hat F(f)|^2\,\mathrm df \quad [\mathrm J]
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.spectrum import force_spectrum
+from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
+from klack.signals import Spectrum, TimeSeries
+
+__all__ = [
+    "BandDensity",
+    "averaged",
+    "density_bands",
+    "force_bands",
+    "force_densities",
+    "weighted_bands",
+]
+
+Floats = NDArray[np.float64]
+
+LOWEST, HIGHEST = 17.0, 224e3
+"""Limits [Hz] that hold the bands from 20 Hz to 200 kHz with their edges."""
+_MARGIN = 1.0 + 1e-9  # so that the bands at both ends are within their own edges
+_LEAST_PER_BAND, _MOST_PER_BAND = 8.0, 200.0  # frequencies in the lowest band of a decade
+_RATE = 100.0  # of the sampling over the highest frequency, where a coarser step will do
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BandDensity:
+    """Energy spectral density over some bands.
+
+    Parameters
+    ----------
+    low, high : float [Hz]
+        The bands within these limits.
+    frequency, values : array, shape (k,) [Hz], [N^2 s/Hz]
+        A little beyond both limits.
+    """
+
+    low: float
+    high: float
+    frequency: Floats
+    values: Floats
+
+
+def averaged(force: TimeSeries, step: float) -> TimeSeries:
+    """Means over longer intervals, so that the impulse stays.
+
+    The first and the last value are held for one interval each, so that the ends stay as they are.
+
+    Parameters
+    ----------
+    force : TimeSeries
+        Means over intervals.
+    step : float [s]
+        Rounded to a multiple of the step of the force.
+    """
+    size = max(1, round(step / force.step))
+    if size == 1:
+        return force
+    after = size + -force.values.size % size
+    values = np.pad(force.values, (size, after), mode="edge")
+    return TimeSeries(
+        step=size * force.step,
+        values=values.reshape(-1, size).mean(axis=1),
+        unit=force.unit,
+        start=force.start - 0.5 * (size + 1) * force.step,
+        name=force.name,
+    )
+
+
+def force_densities(
+    force: TimeSeries, *, low: float = LOWEST, high: float = HIGHEST
+) -> tuple[BandDensity, ...]:
+    """Energy spectral densities of a force, one for each decade of one-third-octave bands.
+
+    Parameters
+    ----------
+    force : TimeSeries
+        Means over intervals; held at its first and last value outside.
+    low, high : float [Hz]
+        Bands within these limits; at most a tenth of the sampling rate.
+    """
+    numbers = band_numbers(low, min(high, 0.1 / force.step))
+    lows, highs = band_edges(numbers)
+    parts = []
+    for first in range(0, numbers.size, 10):
+        last = min(first + 10, numbers.size) - 1
+        bottom, top = float(lows[first]), float(highs[last])
+        series = averaged(force, 1.0 / (_RATE * top))
+        width = float(highs[first] - lows[first])
+        # fine enough for what a record of this length can hold; many points average anyway
+        fine = max(1.0 / (20.0 * series.values.size * series.step), width / _MOST_PER_BAND)
+        resolution = min(width / _LEAST_PER_BAND, fine)
+        spectrum = force_spectrum(series, high=top + 2.0 * resolution, resolution=resolution)
+        seen = spectrum.frequency >= bottom - 2.0 * resolution
+        parts.append(
+            BandDensity(
+                low=bottom / _MARGIN,
+                high=top * _MARGIN,
+                frequency=spectrum.frequency[seen],
+                values=2.0 * np.abs(spectrum.values[seen]) ** 2,
+            )
+        )
+    return tuple(parts)
+
+
+def density_bands(densities: Sequence[BandDensity]) -> ThirdOctaves:
+    """One-third-octave energies of densities of :func:`force_densities` [N^2 s]."""
+    return _joined([_energies(item, item.frequency, item.values) for item in densities])
+
+
+def weighted_bands(
+    densities: Sequence[BandDensity], frequency: Floats, weight: Floats
+) -> ThirdOctaves:
+    """Energies of densities times a weight, for example radiated energy per band [J].
+
+    Density and weight are both taken as straight lines between their own frequencies, so narrow
+    resonances count in full if the weight resolves them.
+
+    Parameters
+    ----------
+    densities : sequence of BandDensity
+    frequency : array, shape (k,) [Hz]
+        Rising, over all bands.
+    weight : array, shape (k,)
+    """
+    parts = []
+    for item in densities:
+        inside = (frequency > item.frequency[0]) & (frequency < item.frequency[-1])
+        both = np.union1d(item.frequency, frequency[inside])
+        values = np.interp(both, item.frequency, item.values) * np.interp(both, frequency, weight)
+        parts.append(_energies(item, both, values))
+    return _joined(parts)
+
+
+def force_bands(force: TimeSeries, *, low: float = LOWEST, high: float = HIGHEST) -> ThirdOctaves:
+    """One-third-octave energies of a force, from the band at 20 Hz to that at 200 kHz [N^2 s].
+
+    Parameters
+    ----------
+    force : TimeSeries
+        See :func:`force_densities`.
+    low, high : float [Hz]
+    """
+    return density_bands(force_densities(force, low=low, high=high))
+
+
+def _energies(item: BandDensity, frequency: Floats, values: Floats) -> ThirdOctaves:
+    density = Spectrum(frequency=frequency, values=values, unit="(N s)^2")
+    return band_energies(density, low=item.low, high=item.high)
+
+
+def _joined(parts: Sequence[ThirdOctaves]) -> ThirdOctaves:
+    return ThirdOctaves(
+        number=np.concatenate([part.number for part in parts]),
+        middle=np.concatenate([part.middle for part in parts]),
+        low=np.concatenate([part.low for part in parts]),
+        high=np.concatenate([part.high for part in parts]),
+        energy=np.concatenate([part.energy for part in parts]),
+    )
