@@ -29,7 +29,7 @@ from klack.workflow.progress import Progress, silent
 from klack.workflow.stops import StopContact, build_stop, split_law, stop_law
 from klack.workflow.structures import valve_structures
 
-__all__ = ["Valve", "build_valve"]
+__all__ = ["Valve", "build_valve", "filled_network"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,8 +102,7 @@ def build_valve(
         for name, contact in contacts.items()
         if is_consistent(case.network.components[name])
     }
-    network = case.network.network()
-    network = network.with_components(_filled_in(network, reduced, laws))
+    network = filled_network(case, reduced, laws)
     return Valve(
         case=case,
         bodies=bodies,
@@ -183,6 +182,14 @@ def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
             hint="name a surface all round the axis, or take load: axial.",
         )
     return Port(point, np.sign(axial) * port.pattern)
+
+
+def filled_network(
+    case: ValveCase, reduced: Mapping[str, ReducedBody], laws: Mapping[str, LocalLaw]
+) -> Network:
+    """Network of a case with its reduced bodies and computed laws."""
+    network = case.network.network()
+    return network.with_components(_filled_in(network, reduced, laws))
 
 
 def _filled_in(
