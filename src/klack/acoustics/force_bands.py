@@ -1,14 +1,9 @@
-r"""One-third-octave energies of a force from 20 Hz to 200 kHz, as it is or weighted over frequency.
+"""One-third-octave energies of a force from 20 Hz to 200 kHz.
 
 A needle that sits on its seat presses before and after the stroke, so the spectrum is that of a
 force that is held at both ends (:func:`klack.acoustics.spectrum.force_spectrum`).  Four decades of
 bands ask for fine frequencies at the low end and for short steps at the high end; each decade has a
 spectrum of its own.
-
-A weight over frequency makes other energies of the same force: with the radiated power per mean
-square force ``T`` [W/N^2]
-
-.. math:: E_b = \int_b T(f)\, 2 |\hat F(f)|^2\,\mathrm df \quad [\mathrm J]
 """
 
 from collections.abc import Sequence
@@ -17,17 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.force_spectrum import averaged
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
 from klack.signals import Spectrum, TimeSeries
 
 __all__ = [
     "BandDensity",
-    "averaged",
     "density_bands",
     "force_bands",
     "force_densities",
-    "weighted_bands",
 ]
 
 Floats = NDArray[np.float64]
@@ -55,32 +49,6 @@ class BandDensity:
     high: float
     frequency: Floats
     values: Floats
-
-
-def averaged(force: TimeSeries, step: float) -> TimeSeries:
-    """Means over longer intervals, so that the impulse stays.
-
-    The first and the last value are held for one interval each, so that the ends stay as they are.
-
-    Parameters
-    ----------
-    force : TimeSeries
-        Means over intervals.
-    step : float [s]
-        Rounded to a multiple of the step of the force.
-    """
-    size = max(1, round(step / force.step))
-    if size == 1:
-        return force
-    after = size + -force.values.size % size
-    values = np.pad(force.values, (size, after), mode="edge")
-    return TimeSeries(
-        step=size * force.step,
-        values=values.reshape(-1, size).mean(axis=1),
-        unit=force.unit,
-        start=force.start - 0.5 * (size + 1) * force.step,
-        name=force.name,
-    )
 
 
 def force_densities(
@@ -122,30 +90,6 @@ def force_densities(
 def density_bands(densities: Sequence[BandDensity]) -> ThirdOctaves:
     """One-third-octave energies of densities of :func:`force_densities` [N^2 s]."""
     return _joined([_energies(item, item.frequency, item.values) for item in densities])
-
-
-def weighted_bands(
-    densities: Sequence[BandDensity], frequency: Floats, weight: Floats
-) -> ThirdOctaves:
-    """Energies of densities times a weight, for example radiated energy per band [J].
-
-    Density and weight are both taken as straight lines between their own frequencies, so narrow
-    resonances count in full if the weight resolves them.
-
-    Parameters
-    ----------
-    densities : sequence of BandDensity
-    frequency : array, shape (k,) [Hz]
-        Rising, over all bands.
-    weight : array, shape (k,)
-    """
-    parts = []
-    for item in densities:
-        inside = (frequency > item.frequency[0]) & (frequency < item.frequency[-1])
-        both = np.union1d(item.frequency, frequency[inside])
-        values = np.interp(both, item.frequency, item.values) * np.interp(both, frequency, weight)
-        parts.append(_energies(item, both, values))
-    return _joined(parts)
 
 
 def force_bands(force: TimeSeries, *, low: float = LOWEST, high: float = HIGHEST) -> ThirdOctaves:
