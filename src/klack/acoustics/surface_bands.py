@@ -1,0 +1,232 @@
+r"""Motion of a surface and the sound it radiates, band by band, under the forces of all ports.
+
+With the velocity spectra :math:`y_i(f)` of the surface fields under all forces together, one matrix
+per band holds everything,
+
+.. math:: C_{ij} = \int_{band} 2\,\mathrm{Re}(y_i\, y_j^*)\,\mathrm df:
+
+the squared normal velocity of a face, integrated over time, is :math:`\phi^T C \phi`, and a group
+with the Gram matrix ``G`` radiates :math:`\rho c\, \mathrm{tr}(G C)` if its efficiency is 1.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.air import Air
+from klack.acoustics.harmonic import harmonic_response
+from klack.acoustics.mount import Mount
+from klack.acoustics.plate import Plate
+from klack.acoustics.port_forces import aligned_forces
+from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
+from klack.acoustics.spectrum import force_spectrum
+from klack.errors import InputError, require_positive
+from klack.reduction.structure import Structure
+from klack.signals import TimeSeries
+
+__all__ = ["RadiatedBands", "face_band_velocity", "radiated_bands"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+_DECADE = 12.6  # eleven third octaves
+_LEAST, _MOST = 8.0, 400.0  # frequencies in the lowest band of a decade
+_DECAY = 2.0  # inverse half widths zeta f of ringing after the record: all but exp(-4 pi)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RadiatedBands:
+    """Energy that a transient radiates.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Groups of the surface, then ``"plate"`` if there is one.
+    bands : array, shape (n, 2) [Hz]
+    energy : array, shape (g, n) [J]
+    """
+
+    names: tuple[str, ...]
+    bands: Floats
+    energy: Floats
+
+    @property
+    def total(self) -> Floats:
+        """Of all groups together [J], shape (n,)."""
+        return np.asarray(self.energy.sum(axis=0))
+
+
+def face_band_velocity(
+    structure: Structure,
+    forces: Mapping[str, TimeSeries],
+    bands: Floats,
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+    period: float = 1.0,
+) -> Floats:
+    """Normal velocity of every face in every band: rms over a period with one such transient.
+
+    Parameters
+    ----------
+    structure : Structure
+    forces : mapping of port name to TimeSeries [N]
+        Along +z, means over intervals; held at their first and last values outside.
+    bands : array, shape (n, 2) [Hz]
+        Lower and upper edges, ascending.
+    mount, plate : Mount, Plate or None
+        What is below the held surfaces.
+    period : float [s]
+        From click to click.
+
+    Returns
+    -------
+    array, shape (n, f) [m/s]
+    """
+    require_positive("face_band_velocity: period", period, "s")
+    shapes = np.hstack(
+        [structure.face_shapes, structure.face_residual, structure.axial_normals[:, None]]
+    ).astype(np.float64)
+    rows = []
+    for part in _decades(structure, forces, bands, mount, plate):
+        for weights in part.weights:
+            C = _products(part.fields, weights)
+            rows.append(np.einsum("fb,fb->f", shapes @ C, shapes))
+    return np.sqrt(np.maximum(rows, 0.0) / period)
+
+
+def radiated_bands(
+    structure: Structure,
+    forces: Mapping[str, TimeSeries],
+    bands: Floats,
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+    efficiency: Efficiency = "piston",
+    air: Air | None = None,
+) -> RadiatedBands:
+    """Energy that each group of the surface, and the plate, radiate in every band.
+
+    Unlike :func:`klack.acoustics.radiation.power_transfer` for one port, the forces of several
+    ports add with their phases here.  The same upper bound.
+
+    Parameters
+    ----------
+    structure, forces, bands, mount, plate
+        See :func:`face_band_velocity`.
+    efficiency : "piston" or "unity"
+    air : Air, optional
+    """
+    air = air or Air()
+    columns = []
+    for part in _decades(structure, forces, bands, mount, plate):
+        sigma = surface_efficiency(structure, part.frequency, efficiency, air)
+        for weights in part.weights:
+            C = air.impedance * _products(part.fields, weights * sigma)
+            column = np.einsum("gij,ij->g", structure.group_gram, C).tolist()
+            if plate is not None:
+                bending = plate.mobility * 2.0 * np.abs(part.support_force) ** 2
+                share = plate.radiated_share(part.frequency, air)
+                column.append(float(weights @ (bending * share)))
+            columns.append(column)
+    names = structure.group_names if plate is None else (*structure.group_names, PLATE)
+    energy = np.array(columns).reshape(len(columns), len(names)).T
+    return RadiatedBands(names=names, bands=np.asarray(bands, dtype=float), energy=energy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Decade:
+    """Spectra over some bands: frequency (k,), fields (k, b), force (k,), weights (n, k) [Hz]."""
+
+    frequency: Floats
+    fields: Complexes
+    support_force: Complexes
+    weights: Floats
+
+
+def _decades(
+    structure: Structure,
+    forces: Mapping[str, TimeSeries],
+    bands: Floats,
+    mount: Mount | None,
+    plate: Plate | None,
+) -> Iterator[_Decade]:
+    """Spectra of the surface fields, decade by decade: low bands need fine frequencies."""
+    aligned_forces(structure, forces)
+    edges = _edges(bands, forces)
+    first = 0
+    while first < len(edges):
+        within = edges[first:, 1] <= max(_DECADE * edges[first, 0], edges[first, 1]) * 1.0001
+        last = first + (len(edges) - first if within.all() else int(np.argmin(within)))
+        yield _decade(structure, forces, edges[first:last], mount, plate)
+        first = last
+
+
+def _decade(
+    structure: Structure,
+    forces: Mapping[str, TimeSeries],
+    edges: Floats,
+    mount: Mount | None,
+    plate: Plate | None,
+) -> _Decade:
+    length = max(force.values.size * force.step for force in forces.values())
+    spacing = _spacing(structure, edges, mount, length)
+    fields: Complexes | float = 0.0
+    support: Complexes | float = 0.0
+    for port, force in forces.items():
+        spectrum = force_spectrum(force, high=float(edges[-1, 1]), resolution=spacing)
+        df = spectrum.resolution
+        first = max(int(edges[0, 0] / df), 1)  # not 0 Hz, where a force that stays has no spectrum
+        frequency, own = spectrum.frequency[first:], spectrum.values[first:]
+        answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
+        fields = fields + answer.fields * own[:, None]
+        support = support + answer.support_force * own
+    low = np.maximum(frequency - df / 2, edges[:, :1])
+    high = np.minimum(frequency + df / 2, edges[:, 1:])
+    return _Decade(
+        frequency=frequency,
+        fields=np.asarray(fields),
+        support_force=np.asarray(support),
+        weights=np.maximum(high - low, 0.0),
+    )
+
+
+def _spacing(structure: Structure, edges: Floats, mount: Mount | None, length: float) -> float:
+    """Distance of frequencies [Hz] that resolves the bands, the record and the resonances."""
+    width = float(edges[0, 1] - edges[0, 0])
+    f = structure.omega / (2.0 * np.pi)
+    near = (f > 0.5 * edges[0, 0]) & (f < 2.0 * edges[-1, 1])
+    half_width = float(np.min((structure.damping * f)[near], initial=np.inf))
+    if mount is not None:
+        half_width = min(half_width, 0.25 * mount.loss_factor * float(edges[0, 0]))
+    wanted = 1.0 / (length + _DECAY / half_width) if half_width > 0.0 else 0.0
+    return min(width / _LEAST, max(width / _MOST, wanted))
+
+
+def _products(fields: Complexes, weights: Floats) -> Floats:
+    """Integral of ``2 Re(y y^*)`` with these weights, shape (b, b)."""
+    parts = (fields.real, fields.imag)
+    return np.asarray(2.0 * sum((y * weights[:, None]).T @ y for y in parts))
+
+
+def _edges(bands: Floats, forces: Mapping[str, TimeSeries]) -> Floats:
+    edges = np.atleast_2d(np.asarray(bands, dtype=float))
+    highest = 0.5 / next(iter(forces.values())).step
+    shaped = edges.ndim == 2 and edges.shape[1] == 2
+    if not shaped or not np.all((edges[:, 0] > 0.0) & (edges[:, 0] < edges[:, 1])):
+        raise InputError(
+            "bands",
+            got=f"an array of shape {edges.shape}",
+            expected="a lower and a higher edge above 0 Hz for each band",
+            hint="numpy.column_stack(band_edges(band_numbers(17.0, 224e3))) gives third octaves.",
+        )
+    if edges[-1, 1] > highest or np.any(np.diff(edges[:, 0]) <= 0.0):
+        raise InputError(
+            "bands",
+            got=f"edges up to {edges.max():g} Hz",
+            expected=f"ascending bands up to {highest:g} Hz, half the sampling rate",
+            hint="take fewer bands, or a force with a shorter step.",
+        )
+    return edges
