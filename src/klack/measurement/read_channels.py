@@ -184,7 +184,7 @@ def _values_at(recording: Recording, name: str, start: float, step: float, count
     base = recording.time_base(name)
     if base.uniform and _on_grid(base, start, step):
         begin = round((start - base.start) / step)
-        _, values = recording.read(name, begin, begin + count)
+        values = recording.values(name, begin, begin + count)
         if np.all(np.isfinite(values)):
             return values
         time = np.arange(values.size, dtype=np.float64)

@@ -104,6 +104,11 @@ class Recording(ABC):
         begin, end = self._window(channel, first, last)
         return self._time(channel, begin, end), self._values(channel, begin, end)
 
+    def values(self, name: str, first: int = 0, last: int | None = None) -> Vector:
+        """Values [unit of the file] alone of the same samples."""
+        channel = self.channel(name)
+        return self._values(channel, *self._window(channel, first, last))
+
     def time(self, name: str, first: int = 0, last: int | None = None) -> Vector:
         """Time [s] alone of the same samples."""
         channel = self.channel(name)
@@ -215,7 +220,7 @@ def _open(path: Path, head: bytes, time_step: float | None) -> Recording:
     if head[:8] in (b"MDF     ", b"UnFinMF "):
         from klack.measurement.files.mdf_file import MdfFile
 
-        return MdfFile(path)
+        return MdfFile(path, time_step)
     if head[:4] == b"TDSm":
         from klack.measurement.files.tdms_file import TdmsFile
 

@@ -1,0 +1,132 @@
+"""HDF5 files, among them those of MATLAB 7.3, read in parts through h5py.
+
+Links to other files and data that lie in other files are not followed: a measurement holds its
+own data.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.stored_arrays import ArrayRecording, StoredArray, StoredGroup
+
+__all__ = ["Hdf5File"]
+
+Vector = NDArray[np.float64]
+
+_DEEPEST = 8
+_LONGEST_TEXT = 200
+
+
+class Hdf5File(ArrayRecording):
+    """Data sets of numbers of an HDF5 file.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        Of data sets without time.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        self._file = _opened(path)
+        try:
+            super().__init__(path, _group(self._file, "", 0), time_step)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+
+def _opened(path: Path) -> Any:
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingExtraError("h5py", f"reading {path.name} (HDF5)", "measurement") from error
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise InputError(
+            str(path),
+            got=f"an HDF5 file that cannot be opened ({str(error)[:80]})",
+            expected="a complete HDF5 file",
+            hint="it may be cut off, or still be open in the program that writes it.",
+        ) from error
+
+
+def _group(node: Any, path: str, depth: int) -> StoredGroup:
+    """What lies in a group, without following links to other files."""
+    import h5py
+
+    arrays, groups = [], []
+    about = _attributes(node)
+    for key in node if depth < _DEEPEST else ():
+        if key.startswith("#") or isinstance(node.get(key, getlink=True), h5py.ExternalLink):
+            continue
+        try:
+            item = node[key]
+        except KeyError:  # a link to nothing
+            continue
+        if isinstance(item, h5py.Group):
+            groups.append(_group(item, f"{path}/{key}" if path else key, depth + 1))
+        elif isinstance(item, h5py.Dataset) and not (item.external or item.is_virtual):
+            value = _single(item)
+            if value is not None:
+                about[key.lower()] = value
+            elif item.dtype.kind in "iuf" and item.ndim in (1, 2) and item.size > 1:
+                arrays.append(_array(key, item))
+    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups)
+
+
+def _array(name: str, item: Any) -> StoredArray:
+    def read(line: int, axis: int, first: int, last: int) -> Vector:
+        if item.ndim == 1:
+            values = item[first:last]
+        else:
+            values = item[first:last, line] if axis == 0 else item[line, first:last]
+        return np.asarray(values, dtype=np.float64)
+
+    return StoredArray(name=name, shape=item.shape, read=read, about=_attributes(item))
+
+
+def _single(item: Any) -> str | float | None:
+    """Text or single number of a small data set; None if it is an array."""
+    if item.attrs.get("MATLAB_class") == b"char" and item.size <= _LONGEST_TEXT:
+        return "".join(chr(c) for c in np.asarray(item[()]).ravel())
+    if item.size != 1:
+        return None
+    return _plain(item[()])
+
+
+def _attributes(node: Any) -> dict[str, str | float]:
+    about = {}
+    for key in node.attrs:
+        try:
+            value = _plain(node.attrs[key])
+        except (OSError, TypeError, ValueError):  # of a type that h5py does not know
+            continue
+        if value is not None:
+            about[key.lower()] = value
+    return about
+
+
+def _plain(value: Any) -> str | float | None:
+    """Text or number, or None for anything else."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")[:_LONGEST_TEXT]
+    if isinstance(value, str):
+        return value[:_LONGEST_TEXT]
+    array = np.asarray(value)
+    if array.size != 1:
+        return None
+    if array.dtype.kind in "iuf":
+        return float(array.ravel()[0])
+    if array.dtype.kind in "SUO" and isinstance(array.ravel()[0], str | bytes):
+        return _plain(array.ravel()[0])
+    return None

@@ -1,0 +1,178 @@
+"""Measurement Data Format of ASAM, versions 3 and 4, read record by record through asammdf.
+
+Values come converted to physical units.  A conversion that is a formula written in the file is not
+computed: such channels are left out, with a note.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.clock import no_clock, unique_names
+from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
+from klack.units import TIME
+
+__all__ = ["MdfFile"]
+
+Vector = NDArray[np.float64]
+
+_NUMBERS_4 = range(6)  # whole and floating-point numbers in either byte order
+_NUMBERS_3 = (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16)
+_FORMULA_4, _TEXTS_4 = 3, (7, 8, 9, 10, 11)
+_FORMULA_3, _TEXTS_3 = 10, (11, 12)
+_SYNC_TIME = 1
+
+
+class MdfFile(Recording):
+    """Channels of all groups of an MDF file that are numbers over time.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        Of groups without time.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        self._file = path.open("rb")
+        try:
+            self._mdf = _opened(path, self._file)
+            self._place: dict[str, tuple[int, int]] = {}
+            self._second: dict[int, float] = {}
+            notes: list[str] = []
+            super().__init__(path, self._listed(path, time_step, notes), tuple(notes))
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _listed(
+        self, path: Path, time_step: float | None, notes: list[str]
+    ) -> tuple[ChannelInfo, ...]:
+        old = self._mdf.version < "4"
+        places = []
+        for g, group in enumerate(self._mdf.groups):
+            if group.channel_group.cycles_nr < 2:
+                continue
+            for c, channel in enumerate(group.channels):
+                if c == self._mdf.masters_db.get(g) or not _is_number(channel, old):
+                    continue
+                if group.channel_dependencies[c]:
+                    continue
+                kind = getattr(channel.conversion, "conversion_type", 0)
+                if kind == (_FORMULA_3 if old else _FORMULA_4):
+                    notes.append(f"{path.name}: '{channel.name}' left out, its unit is a formula.")
+                elif kind not in (_TEXTS_3 if old else _TEXTS_4):
+                    places.append((g, c))
+        names = unique_names([self._mdf.groups[g].channels[c].name for g, c in places])
+        self._place = dict(zip(names, places, strict=True))
+        times = {g: self._group_time(path, g, time_step, old) for g in {g for g, _ in places}}
+        return tuple(self._info(name, g, c, times[g]) for name, (g, c) in self._place.items())
+
+    def _group_time(
+        self, path: Path, g: int, time_step: float | None, old: bool
+    ) -> tuple[float, float, str]:
+        """Start, step and name of the time of a group."""
+        group = self._mdf.groups[g]
+        count = group.channel_group.cycles_nr
+        master = self._mdf.masters_db.get(g)
+        if master is None or (not old and group.channels[master].sync_type != _SYNC_TIME):
+            if time_step is None:
+                raise no_clock(f"{path.name}: group {g + 1}")
+            return 0.0, time_step, ""
+        channel = group.channels[master]
+        unit = _unit_of(channel)
+        name = channel.name or "time"
+        where = f"{path.name}: time '{name}'"
+        self._second[g] = 1.0 if no_unit(unit) else unit_factor(unit, TIME, where).factor
+        first = self._master(g, 0, 1)
+        last = self._master(g, count - 1, count)
+        if first.size != 1 or last.size != 1:
+            raise InputError(
+                where,
+                got=f"less than the {count} records that the file announces",
+                expected="a complete file",
+                hint="the recording was cut off; repair it with the program that wrote it.",
+            )
+        return float(first[0]), float(last[0] - first[0]) / (count - 1), f"{name} of group {g + 1}"
+
+    def _info(self, name: str, g: int, c: int, time: tuple[float, float, str]) -> ChannelInfo:
+        group = self._mdf.groups[g]
+        unit = _unit_of(group.channels[c])
+        return ChannelInfo(
+            name=name,
+            unit="" if no_unit(unit) else plain_unit(unit),
+            count=int(group.channel_group.cycles_nr),
+            start=time[0],
+            step=time[1],
+            clock=time[2],
+            label=group.channels[c].name,
+        )
+
+    def _master(self, g: int, first: int, last: int) -> Vector:
+        time = self._mdf.get_master(g, record_offset=first, record_count=last - first)
+        return self._second[g] * np.asarray(time, dtype=np.float64)
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        if not channel.clock:
+            return super()._time(channel, first, last)
+        return self._master(self._place[channel.name][0], first, last)
+
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        g, c = self._place[channel.name]
+        samples, invalid = self._mdf.get(
+            group=g,
+            index=c,
+            record_offset=first,
+            record_count=last - first,
+            samples_only=True,
+            ignore_invalidation_bits=True,
+        )
+        values = np.array(samples, dtype=np.float64)
+        if invalid is not None:
+            values[np.asarray(invalid, dtype=bool)] = np.nan
+        if values.size != last - first:
+            raise InputError(
+                f"{self.path.name}: channel '{channel.name}'",
+                got=f"{values.size} values from sample {first + 1} on",
+                expected=f"{last - first}",
+                hint="the recording was cut off; repair it with the program that wrote it.",
+            )
+        return values
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._mdf.close()
+        self._file.close()
+
+
+def _opened(path: Path, file: Any) -> Any:
+    try:
+        from asammdf import MDF
+    except ImportError as error:
+        raise MissingExtraError("asammdf", f"reading {path.name} (MDF)", "measurement") from error
+    try:
+        # of an open file asammdf reads only the records that are asked for
+        return MDF(file, raise_on_multiple_occurrences=False)
+    except Exception as error:  # a damaged file ends in any kind of error there
+        raise InputError(
+            str(path),
+            got=f"an MDF file that cannot be opened ({str(error)[:80]})",
+            expected="MDF version 3 or 4",
+            hint="repair or convert it with the program that wrote it.",
+        ) from error
+
+
+def _is_number(channel: Any, old: bool) -> bool:
+    return channel.data_type in (_NUMBERS_3 if old else _NUMBERS_4)
+
+
+def _unit_of(channel: Any) -> str:
+    conversion = channel.conversion
+    unit = getattr(channel, "unit", "") or getattr(conversion, "unit", "") or ""
+    if isinstance(unit, bytes):
+        unit = unit.decode("latin-1").rstrip(" \x00")
+    return str(unit)

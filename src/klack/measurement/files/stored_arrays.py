@@ -1,0 +1,281 @@
+"""Named arrays of HDF5 and MATLAB files become channels.
+
+Such files have no fixed form.  Understood are
+
+- vectors side by side, one of them the time: ``time``, ``lift``, ``current``;
+- a group or structure per channel: ``lift`` with ``time``, ``values``, ``unit``;
+- a sampling step or rate beside them or as attribute: ``dt``, ``fs``, ``sampling_rate``;
+- matrices with one stroke per row or column: ``lift #1``, ``lift #2``, ...;
+- units as attribute, as text beside (``unit``, ``lift_unit``) or in the name (``lift_um``).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.measurement.files.clock import clock_factor, is_clock, no_clock, unique_names
+from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.unit_text import no_unit, plain_unit
+
+__all__ = ["ArrayRecording", "StoredArray", "StoredGroup"]
+
+Vector = NDArray[np.float64]
+
+_VALUES = {"values", "value", "data", "y", "samples", "signal", "wert", "werte"}
+_TIMES = {"x", "t", "time", "times", "zeit"}
+_UNITS = ("unit", "units", "unit_string", "einheit")
+_STEPS = ("dt", "step", "time_step", "timestep", "ts", "wf_increment", "sample_time", "increment")
+_RATES = (
+    "fs",
+    "sampling_rate",
+    "sample_rate",
+    "samplerate",
+    "samplingrate",
+    "sampling_frequency",
+    "rate",
+    "abtastrate",
+)
+_STARTS = ("t0", "start", "start_time", "wf_start_offset")
+_MOST_STROKES = 100_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredArray:
+    """An array of numbers that can be read in parts.
+
+    Parameters
+    ----------
+    name : str
+    shape : tuple of int
+        One axis, or two for a matrix.
+    read : callable
+        Called with the index of a line (0 for a vector), the axis of time, first and last sample.
+    about : mapping of str to str or float
+        Attributes by name in lower case.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    read: Callable[[int, int, int, int], Vector]
+    about: Mapping[str, str | float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredGroup:
+    """Arrays, texts and single numbers that belong together, and groups below."""
+
+    path: str = ""
+    arrays: Sequence[StoredArray] = ()
+    about: Mapping[str, str | float] = field(default_factory=dict)
+    groups: Sequence["StoredGroup"] = ()
+
+
+_Clock = tuple[StoredArray, str]
+"""A stored time and its unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Line:
+    """One channel of a stored array."""
+
+    array: StoredArray
+    line: int
+    axis: int
+    name: str
+    unit: str
+    count: int
+    clock: tuple[StoredArray, float] | None
+    start: float
+    step: float
+
+
+class ArrayRecording(Recording):
+    """Channels of named arrays; the formats give the arrays.
+
+    Parameters
+    ----------
+    path : Path
+    root : StoredGroup
+    time_step : float, optional [s]
+    """
+
+    def __init__(self, path: Path, root: StoredGroup, time_step: float | None) -> None:
+        notes: list[str] = []
+        lines = _lines(path.name, root, None, {}, time_step, notes)
+        names = unique_names([line.name for line in lines])
+        self._line = dict(zip(names, lines, strict=True))
+        infos = tuple(
+            ChannelInfo(
+                name=name,
+                unit=line.unit,
+                count=line.count,
+                start=line.start,
+                step=line.step,
+                clock="" if line.clock is None else f"{id(line.clock[0])}",
+                label=line.array.name,
+            )
+            for name, line in self._line.items()
+        )
+        super().__init__(path, infos, tuple(dict.fromkeys(notes)))
+
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        line = self._line[channel.name]
+        return line.array.read(line.line, line.axis, first, last)
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        clock = self._line[channel.name].clock
+        if clock is None:
+            return super()._time(channel, first, last)
+        return clock[1] * clock[0].read(0, _long_axis(clock[0].shape), first, last)
+
+
+def _long_axis(shape: tuple[int, ...]) -> int:
+    return int(np.argmax(shape))
+
+
+def _is_vector(shape: tuple[int, ...]) -> bool:
+    return max(shape) > 1 and int(np.prod(shape)) == max(shape)
+
+
+def _split(name: str) -> tuple[str, str]:
+    return split_label(name.rsplit("/", 1)[-1])
+
+
+def _unit_of(array: StoredArray, group: StoredGroup) -> str:
+    name, in_name = _split(array.name)
+    for key in _UNITS:
+        for text in (array.about.get(key), group.about.get(f"{name.lower()}_{key}")):
+            if isinstance(text, str) and not no_unit(text):
+                return plain_unit(text)
+    if name.lower() in _VALUES:
+        for key in _UNITS:
+            text = group.about.get(key)
+            if isinstance(text, str) and not no_unit(text):
+                return plain_unit(text)
+    return in_name
+
+
+def _lines(
+    file: str,
+    group: StoredGroup,
+    clock: _Clock | None,
+    about: Mapping[str, str | float],
+    time_step: float | None,
+    notes: list[str],
+) -> list[_Line]:
+    """Channels of a group and of those below it; time and step are handed down."""
+    about = {**about, **group.about}
+    times = [array for array in group.arrays if _is_time(array, group)]
+    clock = (times[0], _unit_of(times[0], group)) if times else clock
+    lines = []
+    for array in group.arrays:
+        if array not in times:
+            lines += _lines_of(file, array, group, clock, about, time_step, notes)
+    for below in group.groups:
+        lines += _lines(file, below, clock, about, time_step, notes)
+    return lines
+
+
+def _is_time(array: StoredArray, group: StoredGroup) -> bool:
+    if not _is_vector(array.shape):
+        return False
+    name, unit = _split(array.name)[0], _unit_of(array, group)
+    has_values = any(_split(other.name)[0].lower() in _VALUES for other in group.arrays)
+    return is_clock(name, unit) or (has_values and name.lower() in _TIMES and no_unit(unit))
+
+
+def _lines_of(
+    file: str,
+    array: StoredArray,
+    group: StoredGroup,
+    clock: _Clock | None,
+    about: Mapping[str, str | float],
+    time_step: float | None,
+    notes: list[str],
+) -> list[_Line]:
+    """One channel of a vector, several of a matrix."""
+    if len(array.shape) > 2 or max(array.shape) < 2:
+        return []
+    axis = _long_axis(array.shape)
+    if clock is not None and max(clock[0].shape) in array.shape:
+        axis = array.shape.index(max(clock[0].shape))
+    count = array.shape[axis]
+    strokes = int(np.prod(array.shape)) // count
+    if strokes > _MOST_STROKES or (strokes > 1 and count < 2):
+        return []
+    unit = _unit_of(array, group)
+    name = _split(array.name)[0]
+    path = "/".join(part for part in (group.path, name) if part)
+    if name.lower() in _VALUES and group.path:
+        path = group.path
+    start, step, used = _time_of(file, path, array, count, clock, about, time_step, notes)
+    return [
+        _Line(
+            array=array,
+            line=line,
+            axis=axis,
+            name=path,
+            unit=unit,
+            count=count,
+            clock=used,
+            start=start,
+            step=step,
+        )
+        for line in range(strokes)
+    ]
+
+
+def _time_of(
+    file: str,
+    name: str,
+    array: StoredArray,
+    count: int,
+    clock: _Clock | None,
+    about: Mapping[str, str | float],
+    time_step: float | None,
+    notes: list[str],
+) -> tuple[float, float, tuple[StoredArray, float] | None]:
+    """Start, step and stored time: own attributes first, then a time, then those of the group."""
+    step = _step(file, name, array.about)
+    if step is not None:
+        return _start(array.about), step, None
+    if clock is not None and max(clock[0].shape) == count:
+        stored, unit = clock
+        if not no_unit(unit) or time_step is None:
+            axis = _long_axis(stored.shape)
+            first, last = (float(stored.read(0, axis, k, k + 1)[0]) for k in (0, count - 1))
+            mean = (last - first) / (count - 1)
+            factor, note = clock_factor(unit, mean, f"{file}: '{stored.name}'")
+            notes += [note] if note else []
+            return factor * first, factor * mean, (stored, factor)
+    step = _step(file, name, about) if time_step is None else time_step
+    if step is None:
+        raise no_clock(f"{file}: '{name}'")
+    return _start(about), step, None
+
+
+def _step(file: str, name: str, about: Mapping[str, str | float]) -> float | None:
+    """Step [s] from a step or a rate among the attributes."""
+    for keys, is_rate in ((_STEPS, False), (_RATES, True)):
+        for key in keys:
+            value = about.get(key)
+            if not isinstance(value, float):
+                continue
+            if not (0 < value < np.inf):
+                raise InputError(
+                    f"{file}: '{name}': {key}",
+                    got=f"{value:g}",
+                    expected="a value above 0",
+                    hint="correct it in the file.",
+                )
+            return 1.0 / value if is_rate else value
+    return None
+
+
+def _start(about: Mapping[str, str | float]) -> float:
+    return next((v for key in _STARTS if isinstance(v := about.get(key), float)), 0.0)

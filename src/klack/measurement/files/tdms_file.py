@@ -1,0 +1,143 @@
+"""TDMS files of LabVIEW and DIAdem, streamed through npTDMS.
+
+Time is what the properties of each channel say (``wf_increment``, ``wf_start_offset``), or else a
+channel of its group that is a time.  Names are ``group/channel``, without the group if there is
+only one.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.clock import clock_factor, is_clock, no_clock
+from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.unit_text import no_unit, plain_unit
+
+__all__ = ["TdmsFile"]
+
+Vector = NDArray[np.float64]
+
+
+class TdmsFile(Recording):
+    """Channels of numbers of a TDMS file.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        Of channels without time.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        self._tdms = _opened(path)
+        self._channel: dict[str, Any] = {}
+        self._clock: dict[str, tuple[Any, float]] = {}
+        notes: list[str] = []
+        try:
+            super().__init__(path, self._listed(path, time_step, notes), tuple(notes))
+        except BaseException:
+            self._tdms.close()
+            raise
+
+    def _listed(
+        self, path: Path, time_step: float | None, notes: list[str]
+    ) -> tuple[ChannelInfo, ...]:
+        groups = [group for group in self._tdms.groups() if _numbers(group)]
+        infos = []
+        for group in groups:
+            clocks = [c for c in _numbers(group) if is_clock(*_name_and_unit(c))]
+            for channel in _numbers(group):
+                if channel in clocks:
+                    continue
+                name, unit = _name_and_unit(channel)
+                full = f"{group.name}/{name}" if len(groups) > 1 else name
+                start, step, clock = self._time_of(path, channel, clocks, time_step, notes)
+                count = len(channel) if not clock else min(len(channel), len(self._clock[clock][0]))
+                self._channel[full] = channel
+                infos.append(
+                    ChannelInfo(
+                        name=full,
+                        unit=unit,
+                        count=count,
+                        start=start,
+                        step=step,
+                        clock=clock,
+                        label=channel.name,
+                    )
+                )
+        return tuple(infos)
+
+    def _time_of(
+        self,
+        path: Path,
+        channel: Any,
+        clocks: list[Any],
+        time_step: float | None,
+        notes: list[str],
+    ) -> tuple[float, float, str]:
+        """Start, step, and name of the stored time, if it is one."""
+        increment = float(channel.properties.get("wf_increment", 0.0) or 0.0)
+        if increment > 0:
+            return float(channel.properties.get("wf_start_offset", 0.0)), increment, ""
+        same = [c for c in clocks if len(c) == len(channel)] or clocks[:1]
+        if same and not (time_step is not None and not _name_and_unit(same[0])[1]):
+            clock = same[0]
+            ends = _read(clock, 0, 1)[0], _read(clock, len(clock) - 1, len(clock))[0]
+            step = float(ends[1] - ends[0]) / (len(clock) - 1)
+            factor, note = clock_factor(
+                _name_and_unit(clock)[1], step, f"{path.name}: {clock.name}"
+            )
+            if note and note not in notes:
+                notes.append(note)
+            self._clock[clock.path] = clock, factor
+            return factor * float(ends[0]), factor * step, clock.path
+        if time_step is None:
+            raise no_clock(f"{path.name}: channel '{channel.name}'")
+        return 0.0, time_step, ""
+
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        return _read(self._channel[channel.name], first, last)
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        if not channel.clock:
+            return super()._time(channel, first, last)
+        clock, factor = self._clock[channel.clock]
+        return factor * _read(clock, first, last)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._tdms.close()
+
+
+def _opened(path: Path) -> Any:
+    try:
+        import nptdms
+    except ImportError as error:
+        raise MissingExtraError("npTDMS", f"reading {path.name} (TDMS)", "measurement") from error
+    try:
+        return nptdms.TdmsFile.open(path)
+    except Exception as error:  # a damaged file ends in any kind of error there
+        raise InputError(
+            str(path),
+            got=f"a TDMS file that cannot be opened ({str(error)[:80]})",
+            expected="TDMS of LabVIEW or DIAdem",
+            hint="open and save it again with the program that wrote it.",
+        ) from error
+
+
+def _numbers(group: Any) -> list[Any]:
+    return [c for c in group.channels() if len(c) > 1 and np.dtype(c.dtype).kind in "iuf"]
+
+
+def _name_and_unit(channel: Any) -> tuple[str, str]:
+    name, unit = split_label(channel.name)
+    written = str(channel.properties.get("unit_string", "") or "")
+    return name, unit if no_unit(written) else plain_unit(written)
+
+
+def _read(channel: Any, first: int, last: int) -> Vector:
+    return np.asarray(channel.read_data(offset=first, length=last - first), dtype=np.float64)

@@ -1,0 +1,182 @@
+"""Universal files: sets 58 and 58b of real values over time, read through pyuff.
+
+A universal file says of its values what kind of quantity they are, in SI or in a unit written as
+text.  Sets are read one at a time; the last one stays in memory.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.clock import unique_names
+from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
+from klack.units import TIME
+
+__all__ = ["UffFile"]
+
+Vector = NDArray[np.float64]
+
+_TIME_RESPONSE, _TIME_AXIS = 1, 17
+_EVEN = 1
+_LARGEST = 2 << 30  # bytes
+_SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N", 15: "Pa"}
+"""Unit of a kind of ordinate (record 9, field 1) if the file does not write one."""
+
+
+class UffFile(Recording):
+    """Time records of a universal file.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._uff = _opened(path)
+        self._set: dict[str, int] = {}
+        self._last: tuple[int, Any] | None = None
+        super().__init__(path, self._listed(path))
+
+    def _listed(self, path: Path) -> tuple[ChannelInfo, ...]:
+        found = []
+        for number, kind in enumerate(self._uff.get_set_types()):
+            if int(kind) != 58:
+                continue
+            head = _header(path, self._uff, number)
+            if head["func_type"] == _TIME_RESPONSE or (
+                head["func_type"] == 0 and head["abscissa_spec_data_type"] == _TIME_AXIS
+            ):
+                found.append((number, head))
+        names = unique_names([split_label(_name(head))[0] for _, head in found])
+        si = _in_si(self._uff)
+        return tuple(
+            self._info(path, name, number, head, si)
+            for name, (number, head) in zip(names, found, strict=True)
+        )
+
+    def _info(self, path: Path, name: str, number: int, head: Any, si: bool) -> ChannelInfo:
+        unit = str(head.get("ordinate_axis_units_lab", "")).strip()
+        if no_unit(unit):
+            kind = int(head["ordinate_spec_data_type"])
+            unit = split_label(_name(head))[1] or (_SI.get(kind, "") if si else "")
+        count = int(head["num_pts"])
+        self._set[name] = number
+        second = _second(path, head)
+        if int(head["abscissa_spacing"]) == _EVEN:
+            start, step, clock = float(head["abscissa_min"]), float(head["abscissa_inc"]), ""
+        else:
+            times = self._data(number)["x"]
+            start, clock = float(times[0]), f"set {number + 1}"
+            step = float(times[-1] - times[0]) / max(len(times) - 1, 1)
+        if count < 2 or not step > 0:
+            raise InputError(
+                f"{path.name}: set {number + 1} ({name})",
+                got=f"{count} values with steps of {step:g} s",
+                expected="at least two, and steps above 0",
+                hint="leave this set out of the file.",
+            )
+        return ChannelInfo(
+            name=name,
+            unit=plain_unit(unit),
+            count=count,
+            start=second * start,
+            step=second * step,
+            clock=clock,
+            label=_name(head),
+        )
+
+    def _data(self, number: int) -> Any:
+        """Set ``number``, kept until another one is read."""
+        if self._last is None or self._last[0] != number:
+            try:
+                self._last = number, self._uff.read_sets(number)
+            except Exception as error:  # pyuff raises bare exceptions
+                raise InputError(
+                    f"{self.path.name}: set {number + 1}",
+                    got=f"values that cannot be read ({str(error)[:80]})",
+                    expected="a set 58 or 58b",
+                    hint="export it again, as text (58) if binary (58b) fails.",
+                ) from error
+        return self._last[1]
+
+    def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        values = np.asarray(self._data(self._set[channel.name])["data"])
+        if values.size < channel.count or np.iscomplexobj(values):
+            raise InputError(
+                f"{self.path.name}: channel '{channel.name}'",
+                got=f"{values.size} values of type {values.dtype}",
+                expected=f"{channel.count} real values",
+                hint="the file was cut off; export it again.",
+            )
+        return values[first:last].astype(np.float64)
+
+    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        if not channel.clock:
+            return super()._time(channel, first, last)
+        data = self._data(self._set[channel.name])
+        return _second(self.path, data) * np.asarray(data["x"][first:last], dtype=np.float64)
+
+
+def _opened(path: Path) -> Any:
+    try:
+        import pyuff
+    except ImportError as error:
+        raise MissingExtraError("pyuff", f"reading {path.name} (UFF)", "measurement") from error
+    size = path.stat().st_size
+    if size > _LARGEST:
+        raise InputError(
+            str(path),
+            got=f"a universal file of {size / 2**30:.1f} GB",
+            expected="at most 2 GB (it is read as a whole)",
+            hint="export MDF4, TDMS or HDF5.",
+        )
+    try:
+        return pyuff.UFF(str(path))
+    except Exception as error:  # pyuff raises bare exceptions
+        raise InputError(
+            str(path),
+            got=f"a universal file that cannot be opened ({str(error)[:80]})",
+            expected="sets 58 or 58b",
+            hint="export it again.",
+        ) from error
+
+
+def _in_si(uff: Any) -> bool:
+    """False if the file says by a set 164 that its units are not SI."""
+    kinds = [int(kind) for kind in uff.get_set_types()]
+    if 164 not in kinds:
+        return True
+    return int(uff.read_sets(kinds.index(164)).get("units_code", 1)) == 1
+
+
+def _header(path: Path, uff: Any, number: int) -> Any:
+    try:
+        return uff.read_sets(number, header_only=True)
+    except Exception as error:  # pyuff raises bare exceptions
+        raise InputError(
+            f"{path.name}: set {number + 1}",
+            got="a header that cannot be read",
+            expected="a set 58 or 58b",
+            hint="export it again.",
+        ) from error
+
+
+def _name(head: Any) -> str:
+    """Response name, or the first line of the set, or node and direction."""
+    for key in ("id1", "rsp_ent_name", "ordinate_axis_lab"):
+        text = str(head.get(key, "")).strip()
+        if text and text.upper() != "NONE":
+            return text
+    return f"node {int(head['rsp_node'])} direction {int(head['rsp_dir'])}"
+
+
+def _second(path: Path, head: Any) -> float:
+    unit = str(head.get("abscissa_axis_units_lab", "")).strip()
+    if no_unit(unit):
+        return 1.0
+    return unit_factor(unit, TIME, f"{path.name}: abscissa").factor
