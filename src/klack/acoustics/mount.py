@@ -114,13 +114,16 @@ def mounted(structure: Structure, mount: Mount) -> Structure:
     lost = fixed.T**2 @ (structure.damping * structure.omega) / omega
     lost = lost + mount.loss_factor * mount.stiffness * motion**2 / (2.0 * squares)
     carried = _carried_fields(structure, psi)
+    shapes = fixed.T @ structure.port_shapes + motion[:, None]
+    # the rest that the modes miss stays; in this form it survives a very soft mount
+    static = structure.residual_compliance + (shapes.T / squares) @ shapes
     return replace(
         structure,
         mass=mass,
         omega=omega,
         damping=lost,
-        port_shapes=fixed.T @ structure.port_shapes + motion[:, None],
-        static_compliance=structure.static_compliance + 1.0 / mount.stiffness,
+        port_shapes=shapes,
+        static_compliance=static,
         participation=fixed.T @ structure.participation + mass * motion,
         group_gram=carried.T @ structure.group_gram @ carried,
         group_volume=structure.group_volume @ carried,

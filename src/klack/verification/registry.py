@@ -17,6 +17,7 @@ GROUPS = (
     "transient",
     "interface",
     "spectra",
+    "vibration",
     "mechanics",
     "fluids",
     "hydraulics",
