@@ -94,7 +94,7 @@ def click_pressure(
     n += n % 2
     f = np.arange(n // 2 + 1) * rate / n
     strength = density * sound_speed / (4.0 * pi * distance**2)
-    start = force.start - _LEAD
+    start = force.start - 0.5 * force.step - _LEAD
     filtered = pressure_transfer(f, frequency, strength * transfer, rate=rate)
     changes = change_spectrum(force, high=0.5 * rate, count=f.size, origin=start)
     filtered[1:] *= changes[1:] / (2j * pi * f[1:])
