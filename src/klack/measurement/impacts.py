@@ -1,0 +1,506 @@
+r"""Impacts of one stroke from its lift alone.
+
+1. Levels of rest on the stops (given, or found: :mod:`klack.measurement.stop_levels`).
+2. Turns of the smoothed lift at these levels (:mod:`klack.measurement.impact_search`).
+3. The raw lift of each flight between two impacts, without the time in which the sensor still
+   shows the impact before, is fitted by a polynomial of the least degree (2, 3 or 4) that the next
+   coefficient does not improve significantly; of a flight that comes from elsewhere, the longest
+   stretch before the touch is used that agrees with all shorter ones (Lepski 1991).
+4. A short flight tells its acceleration badly, and with it its speeds.  The flights of one stop are
+   driven by nearly the same force, so each is told the mean acceleration of the others with a
+   variance that holds what the accelerations scatter beyond their own errors (random effects,
+   DerSimonian & Laird 1986, eq. 7); where they do differ, nothing is changed.
+5. First touch and release are where the fits meet the level of the stop; speeds are theirs there.
+
+A line instead of the parabola would be wrong by half the acceleration times its length: 0.1 m/s
+for 50 us at 4000 m/s^2.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.measurement.flight import Crossing, Flight, correlation_factor, fit_flight
+from klack.measurement.impact_search import Touch, find_touches
+from klack.measurement.lift_sensor import sensor_poles, sensor_polynomial
+from klack.measurement.sensor import LiftSensor
+from klack.measurement.stop_levels import SmoothLift, find_levels, smooth_lift
+from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
+from klack.measurement.uniform import uniform_step
+
+__all__ = ["measure_stroke"]
+
+_SETTLED = 4.0  # time constants of the sensor after which it shows nothing of an impact
+_FEWEST = 9  # samples of a flight that is fitted
+_SIGNIFICANT = 3.0  # standard errors of a rebound height that is seen
+_SPRING, _FRICTION = 3, 4  # terms of a flight that turns
+_USUAL_FRICTION = 0.05  # usual spread of friction over the mean force
+_USUAL_SPRING = 0.05  # of the change of force over the highest rebound, over that force
+_AGREES = 3.0  # standard errors within which nested stretches agree
+_OWN_NOISE = 60e-6  # [s] before a touch, from which the noise of an approach is taken
+_ROUNDS = 4  # of finding touch and release, each of which bounds the samples of the other
+_SHORTEST = 30e-6  # [s] stretch before a first touch
+_GROWTH = 1.25
+_FLOOR = 1e-6  # of the lift: no fit is better than this
+_NAN = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Record:
+    time: NDArray[np.float64]
+    lift: NDArray[np.float64]
+    smooth: SmoothLift
+    levels: Mapping[Stop, float]
+    level_se: Mapping[Stop, float]
+    sensor: NDArray[np.float64]
+    settle: float
+    floor: float
+    correlation: float = 1.0
+    noise: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Ends:
+    """A fitted flight: its release from the stop before, its touch of the stop after."""
+
+    flight: Flight
+    release: Crossing | None
+    touch: Crossing | None
+
+
+def measure_stroke(
+    time: NDArray[np.float64],
+    lift: NDArray[np.float64],
+    *,
+    seat: float | None = None,
+    opening: float | None = None,
+    sensor: LiftSensor | None = None,
+) -> StrokeMeasures:
+    """Read impacts, speeds, restitution, rebound heights and periods off one lift.
+
+    Works on measured lift and on computed lift alike, so that both are read in the same way, and
+    on single drops on a seat.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Uniform.
+    lift : array, shape (n,) [m]
+        Rising while the valve opens; as the sensor shows it if there is a sensor.
+    seat, opening : float [m], optional
+        True lift at which the needle touches the seat and the opening stop; found from where it
+        rests without.  ``nan`` for a stop that does not exist.
+    sensor : LiftSensor, optional
+        Its sensitivity and offset are taken out, its low pass is undone in the fits.
+
+    Returns
+    -------
+    StrokeMeasures
+        Without impacts if nothing touches.
+
+    Raises
+    ------
+    InputError
+        If the time is not uniform, values are missing, or the lift never changes.
+    """
+    record, notes = _prepare(time, lift, seat, opening, sensor)
+    touches = find_touches(record.smooth, record.levels)
+    fits = _fit_all(record, touches)
+    while (ghost := _ghost(record, touches, fits)) is not None:
+        touches = touches[:ghost] + touches[ghost + 1 :]
+        fits = _fit_all(record, touches)
+    factor = correlation_factor(tuple(f.flight.residuals for f in fits if f is not None))
+    record = replace(record, correlation=factor, noise=_noise(fits))
+    fits = _pooled(record, touches, _fit_all(record, touches))
+    impacts = _impacts(record, touches, fits)
+    noise = _noise(fits)
+    return StrokeMeasures(
+        impacts=impacts,
+        seat_level=record.levels.get("seat", _NAN),
+        opening_level=record.levels.get("opening", _NAN),
+        level_se=max(record.level_se.values(), default=_NAN),
+        noise=record.smooth.noise if noise is None else noise,
+        least_height=record.smooth.least_height,
+        notes=notes,
+    )
+
+
+def _prepare(
+    time: NDArray[np.float64],
+    lift: NDArray[np.float64],
+    seat: float | None,
+    opening: float | None,
+    sensor: LiftSensor | None,
+) -> tuple[_Record, tuple[str, ...]]:
+    step = uniform_step(time, "measure_stroke: time")
+    shown = np.asarray(lift, dtype=np.float64)
+    if shown.shape != time.shape or not np.all(np.isfinite(shown)) or np.ptp(shown) == 0.0:
+        raise InputError(
+            "measure_stroke: lift",
+            got=f"{shown.shape} values, {int(np.sum(~np.isfinite(shown)))} of them missing"
+            if shown.size and np.ptp(shown) != 0.0
+            else "a lift that never changes",
+            expected=f"{time.size} finite values that move",
+            hint="check the channel, and cut the record to one stroke.",
+        )
+    used = LiftSensor() if sensor is None else sensor
+    true = (shown - used.offset) / used.sensitivity
+    smooth = smooth_lift(time, true)
+    found = find_levels(time, true, smooth)
+    levels: dict[Stop, float] = {}
+    errors: dict[Stop, float] = {}
+    notes: list[str] = []
+    for stop, given, rest, error in (
+        ("seat", seat, found.seat, found.seat_se),
+        ("opening", opening, found.opening, found.opening_se),
+    ):
+        name: Stop = "seat" if stop == "seat" else "opening"
+        if given is not None:
+            if np.isfinite(given):
+                levels[name], errors[name] = float(given), 0.0
+        elif np.isfinite(rest):
+            levels[name], errors[name] = rest, error
+        else:
+            notes.append(f"the needle rests nowhere near the {name} stop; its level is not known")
+    poles = sensor_poles(used)
+    slowest = 1.0 / float(np.min(-poles.real)) if poles.size else 0.0
+    record = _Record(
+        time=time,
+        lift=true,
+        smooth=smooth,
+        levels=levels,
+        level_se=errors,
+        sensor=sensor_polynomial(used),
+        settle=max(_SETTLED * slowest, step),
+        floor=max(
+            _FLOOR * float(np.ptp(true)), used.resolution / used.sensitivity / float(np.sqrt(12.0))
+        ),
+    )
+    return record, tuple(notes)
+
+
+def _fit_all(record: _Record, touches: tuple[Touch, ...]) -> list[_Ends | None]:
+    """Fits of the flights that end at each touch."""
+    out: list[_Ends | None] = []
+    for k, after in enumerate(touches):
+        before = touches[k - 1] if k else None
+        if before is not None and before.stop == after.stop and before.rebounds:
+            out.append(_bounce(record, before, after))
+        else:
+            out.append(_approach(record, before, after))
+    return out
+
+
+def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
+    """Flight from a stop back to the same stop."""
+    t = record.time
+    release, touch = float(t[before.index]), float(t[after.index])
+    guard = min(record.smooth.half * (t[1] - t[0]) + record.settle, 0.2 * (touch - release))
+    ends = _whole(record, before.stop, release + guard, touch - guard)
+    for _ in range(_ROUNDS):
+        if ends is None or ends.release is None or ends.touch is None:
+            return ends
+        first, last = ends.release.time + record.settle, ends.touch.time
+        middle = 0.5 * (release + touch)
+        if not (release - guard < first < middle < last < touch + guard):
+            return ends
+        better = _whole(record, before.stop, first, last)
+        if better is None:
+            return ends
+        ends = better
+    return ends
+
+
+def _whole(record: _Record, stop: Stop, first: float, last: float) -> _Ends | None:
+    window = _window(record, first, last)
+    if window is None:
+        return None
+    plain = _fit(record, *window, 2)
+    if plain.acceleration == 0.0:
+        return _with_ends(record, stop, plain)
+    top = plain.reference - float(plain.coefficients[1]) / plain.acceleration
+    if not first < top < last:
+        return _with_ends(record, stop, plain)
+    return _with_ends(record, stop, _fit(record, *window, 2, top))
+
+
+def _with_ends(record: _Record, stop: Stop, flight: Flight) -> _Ends:
+    level, error = record.levels[stop], record.level_se[stop]
+    return _Ends(
+        flight=flight,
+        release=flight.crossing(level, error, flight.first),
+        touch=flight.crossing(level, error, flight.last),
+    )
+
+
+def _fit(
+    record: _Record,
+    time: NDArray[np.float64],
+    lift: NDArray[np.float64],
+    degree: int,
+    turning_point: float | None = None,
+) -> Flight:
+    return fit_flight(
+        time,
+        lift,
+        degree,
+        sensor=record.sensor,
+        turning_point=turning_point,
+        correlation=record.correlation,
+        floor=record.floor,
+        noise=record.noise,
+    )
+
+
+def _window(
+    record: _Record, first: float, last: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    a, b = np.searchsorted(record.time, [first, last])
+    if b - a < _FEWEST:
+        return None
+    return record.time[a:b], record.lift[a:b]
+
+
+def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | None:
+    """Flight that comes from elsewhere: from the other stop, or from the start of the record."""
+    t = record.time
+    touch = float(t[after.index])
+    guard = record.smooth.half * float(t[1] - t[0])
+    start = float(t[0]) if before is None else float(t[before.index]) + guard + record.settle
+    ends = _longest_stretch(record, after.stop, start, touch - guard)
+    for _ in range(_ROUNDS):
+        if ends is None or ends.touch is None or abs(ends.touch.time - touch) > 2.0 * guard:
+            return ends
+        better = _longest_stretch(record, after.stop, start, ends.touch.time)
+        if better is None:
+            return ends
+        ends = better
+    return ends
+
+
+def _longest_stretch(record: _Record, stop: Stop, start: float, end: float) -> _Ends | None:
+    """Of the stretches that end at a time: the most precise that agrees with all shorter ones."""
+    step = float(record.time[1] - record.time[0])
+    noise = _own_noise(record, max(start, end - max(_OWN_NOISE, 24.0 * step)), end)
+    best: tuple[float, _Ends] | None = None
+    for degree in (2, 3):
+        tried: list[tuple[float, float]] = []
+        length = max(_SHORTEST * (degree - 1), (_FEWEST + 6 * (degree - 2)) * step)
+        while (length := min(length, end - start)) > 0.0:
+            window = _window(record, end - length, end)
+            ends = None
+            if window is not None:
+                flight = _known_noise(_fit(record, *window, degree), noise)
+                ends = _with_ends(record, stop, flight)
+            if ends is not None and ends.touch is not None:
+                v, error = ends.touch.velocity, ends.touch.velocity_se
+                if not all(_agree(v, error, *other) for other in tried):
+                    break
+                tried.append((v, error))
+                if best is None or error < best[0]:
+                    best = error, ends
+            if length >= end - start:
+                break
+            length *= _GROWTH
+    return None if best is None else best[1]
+
+
+def _agree(value: float, error: float, shorter: float, its_error: float) -> bool:
+    """Whether two nested estimates differ by no more than the noise of the shorter one explains."""
+    own = np.sqrt(max(its_error**2 - error**2, 0.0))
+    return bool(abs(value - shorter) <= _AGREES * float(own) + 0.1 * error)
+
+
+def _own_noise(record: _Record, first: float, last: float) -> float:
+    """Standard deviation of the samples before a touch, about a cubic, as long means feel it."""
+    window = _window(record, first, last)
+    if window is None:
+        return record.smooth.noise
+    residuals = _fit(replace(record, noise=None), *window, 3).residuals
+    free = max(residuals.size - 4, 1)
+    spread = float(np.sqrt(residuals @ residuals / free))
+    return max(spread, record.floor) * float(np.sqrt(record.correlation))
+
+
+def _known_noise(flight: Flight, noise: float) -> Flight:
+    """The same fit with the covariance of a known noise."""
+    free = flight.residuals.size - flight.coefficients.size
+    used = flight.scale
+    return replace(flight, covariance=flight.covariance * (noise / used) ** 2) if free else flight
+
+
+def _ghost(record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]) -> int | None:
+    """Last touch between which and the one before the needle was not seen to fly; None if none.
+
+    Vibration of the needle and noise turn the lift round as well; but no parabola rises from the
+    stop there and comes back to it.
+    """
+    for k in range(len(touches) - 1, 0, -1):
+        fit = fits[k]
+        if touches[k].stop != touches[k - 1].stop or fit is None:
+            continue
+        away = 1.0 if touches[k].stop == "seat" else -1.0
+        window = _window(record, fit.flight.first, fit.flight.last + 1e-3 * record.settle)
+        if window is None:
+            continue
+        plain = _fit(record, *window, 2)
+        middle, gradient = plain.derivative(plain.reference, 0)
+        error = float(np.sqrt(gradient @ plain.covariance @ gradient))
+        height = away * (middle - record.levels[touches[k].stop])
+        falls = away * plain.acceleration < 0.0
+        if not falls or height < max(_SIGNIFICANT * error, 0.5 * record.smooth.least_height):
+            return k
+    return None
+
+
+def _noise(fits: list[_Ends | None]) -> float | None:
+    residuals = [fit.flight.residuals for fit in fits if fit is not None]
+    if not residuals:
+        return None
+    free = sum(max(r.size - 5, 1) for r in residuals)
+    return float(np.sqrt(sum(float(r @ r) for r in residuals) / free))
+
+
+def _pooled(
+    record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]
+) -> list[_Ends | None]:
+    """Every flight told of friction and acceleration of the others on its stop."""
+    out = list(fits)
+    for stop in record.levels:
+        bounces: dict[int, Flight] = {}
+        arrivals: dict[int, Flight] = {}
+        for k, (touch, fit) in enumerate(zip(touches, fits, strict=True)):
+            if touch.stop == stop and fit is not None:
+                (bounces if fit.flight.turns else arrivals)[k] = fit.flight
+        bounces = _told(bounces, _SPRING, _spring_scales(bounces), _USUAL_SPRING)
+        bounces = _told(bounces, _FRICTION, _sizes(bounces), _USUAL_FRICTION)
+        bounces = _told(bounces, 2, np.ones(len(bounces)), None, arrivals)
+        for k, flight in bounces.items():
+            out[k] = _with_ends(record, stop, flight)
+    return out
+
+
+def _sizes(flights: dict[int, Flight]) -> NDArray[np.float64]:
+    return np.array([flight.coefficients[2] for flight in flights.values()])
+
+
+def _spring_scales(flights: dict[int, Flight]) -> NDArray[np.float64]:
+    """Coefficients of ``s^4`` at which the longest flight's force would double to its top."""
+    if not flights:
+        return np.empty(0)
+    half = 0.5 * max(flight.last - flight.first for flight in flights.values())
+    return -_sizes(flights) / (6.0 * half**2)
+
+
+def _told(
+    flights: dict[int, Flight],
+    index: int,
+    scales: NDArray[np.float64],
+    usual: float | None,
+    beside: dict[int, Flight] | None = None,
+) -> dict[int, Flight]:
+    """Each flight told one coefficient by the others.
+
+    ``scales``: coefficient over this is the same in all of them, but for a scatter of its own.
+    ``usual``: its usual spread about zero.  ``beside``: flights whose coefficient is alike, but
+    only up to friction.
+    """
+    if not flights:
+        return {}
+    c = np.array([flight.coefficients[index] for flight in flights.values()]) / scales
+    var = np.array([flight.covariance[index, index] for flight in flights.values()]) / scales**2
+    scatter = _scatter(c, var) if c.size > 1 else 0.0
+    values, variances = c.tolist(), (var + scatter).tolist()
+    if usual is not None:
+        values.append(0.0)
+        variances.append(usual**2)
+    for flight in (beside or {}).values():
+        values.append(float(flight.coefficients[index]))
+        unlike = 2.0 * _USUAL_FRICTION * float(np.median(np.abs(c)))
+        variances.append(float(flight.covariance[index, index]) + scatter + unlike**2)
+    out = {}
+    for i, (k, flight) in enumerate(flights.items()):
+        weight = 1.0 / np.delete(variances, i)
+        if not weight.size:
+            return flights
+        mean = float(weight @ np.delete(values, i) / weight.sum())
+        spread = scatter + 1.0 / float(weight.sum())
+        out[k] = flight.told(index, mean * scales[i], spread * scales[i] ** 2)
+    return out
+
+
+def _scatter(values: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
+    """Variance of the values beyond their own (DerSimonian & Laird 1986), 0 or more."""
+    w = 1.0 / variances
+    mean = w @ values / w.sum()
+    excess = float(w @ (values - mean) ** 2) - (values.size - 1)
+    return max(0.0, excess / float(w.sum() - w @ w / w.sum()))
+
+
+def _impacts(
+    record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]
+) -> tuple[MeasuredImpact, ...]:
+    out: list[MeasuredImpact] = []
+    for k, touch in enumerate(touches):
+        following = touches[k + 1] if k + 1 < len(touches) else None
+        returns = following is not None and following.stop == touch.stop
+        out.append(_impact(record, touch, fits[k], fits[k + 1] if returns else None))
+    return tuple(_with_periods(out))
+
+
+def _impact(
+    record: _Record, touch: Touch, arriving: _Ends | None, leaving: _Ends | None
+) -> MeasuredImpact:
+    away = 1.0 if touch.stop == "seat" else -1.0
+    level, level_se = record.levels[touch.stop], record.level_se[touch.stop]
+    step = float(record.time[1] - record.time[0])
+    arrival = arriving.touch if arriving is not None else None
+    rough = float(record.time[touch.index])
+    v, v_se = (-away * arrival.velocity, arrival.velocity_se) if arrival else (_NAN, _NAN)
+    release = leaving.release if leaving is not None else None
+    w, w_se = (away * release.velocity, release.velocity_se) if release else (_NAN, _NAN)
+    height, height_se = _NAN, _NAN
+    if leaving is not None and leaving.flight.turns:
+        top, top_se = leaving.flight.top()
+        height, height_se = away * (top - level), float(np.hypot(top_se, level_se))
+    ends = touch.index + 4 * record.smooth.half >= record.time.size  # before it could rebound
+    if leaving is None and not ends:
+        fall = abs(arrival.acceleration) if arrival else _NAN
+        w, w_se = 0.0, float(np.sqrt(2.0 * fall * record.smooth.least_height))
+        height, height_se = 0.0, record.smooth.least_height
+    e = w / v
+    return MeasuredImpact(
+        stop=touch.stop,
+        time=arrival.time if arrival else rough,
+        time_se=arrival.time_se if arrival else record.smooth.half * step,
+        release=release.time if release else _NAN,
+        release_se=release.time_se if release else _NAN,
+        approach_speed=v,
+        approach_se=v_se,
+        rebound_speed=w,
+        rebound_se=w_se,
+        restitution=e,
+        restitution_se=float(np.hypot(w_se, e * v_se)) / v,
+        rebound_height=height,
+        rebound_height_se=height_se,
+        period=_NAN,
+        period_se=_NAN,
+        acceleration=-away * release.acceleration if release else _NAN,
+    )
+
+
+def _with_periods(impacts: list[MeasuredImpact]) -> list[MeasuredImpact]:
+    out = []
+    for k, impact in enumerate(impacts):
+        following = impacts[k + 1] if k + 1 < len(impacts) else None
+        if following is not None and following.stop == impact.stop:
+            impact = replace(
+                impact,
+                period=following.time - impact.time,
+                period_se=float(np.hypot(following.time_se, impact.time_se)),
+            )
+        out.append(impact)
+    return out

@@ -1,0 +1,105 @@
+"""Numbers that are read off the lift of one stroke, each with its standard error."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["MeasuredImpact", "Stop", "StrokeMeasures"]
+
+Stop = Literal["opening", "seat"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredImpact:
+    """One impact, as lift alone shows it.
+
+    Speeds are those of the smooth flight before and after, carried on to the level of the stop:
+    what the elastic needle does beside it is averaged out.  ``*_se`` are standard errors.
+
+    Parameters
+    ----------
+    stop : "opening" or "seat"
+    time, time_se : float [s]
+        First touch: the approaching flight reaches the level of the stop.
+    release, release_se : float [s]
+        The rebounding flight leaves it; nan without a rebound.
+    approach_speed, approach_se : float [m/s]
+        Above zero; nan if the flight is too short to be fitted.
+    rebound_speed, rebound_se : float [m/s]
+        0 where nothing above the noise is seen; nan if the flight is too short to be fitted.
+    restitution, restitution_se : float [-]
+        Rebound over approach speed.
+    rebound_height, rebound_height_se : float [m]
+        Largest distance from the stop in the flight after it; nan if the flight ends elsewhere.
+    period, period_se : float [s]
+        To the next first touch on the same stop; nan after the last.
+    acceleration : float [m/s^2]
+        Towards the stop, at the release; nan without a fitted rebound.
+    """
+
+    stop: Stop
+    time: float
+    time_se: float
+    release: float
+    release_se: float
+    approach_speed: float
+    approach_se: float
+    rebound_speed: float
+    rebound_se: float
+    restitution: float
+    restitution_se: float
+    rebound_height: float
+    rebound_height_se: float
+    period: float
+    period_se: float
+    acceleration: float
+
+    @property
+    def contact_time(self) -> float:
+        """From first touch to release [s]; nan without a rebound."""
+        return self.release - self.time
+
+
+@dataclass(frozen=True, kw_only=True)
+class StrokeMeasures:
+    """All impacts of a stroke, and the levels between which it moved.
+
+    Parameters
+    ----------
+    impacts : tuple of MeasuredImpact
+        In order of time.
+    seat_level, opening_level : float [m]
+        Lift at which the needle rests on the stop; nan for a stop that was not met.
+    level_se : float [m]
+        Standard error of the levels.
+    noise : float [m]
+        Standard deviation of the lift about the fitted flights.
+    least_height : float [m]
+        Bounces lower than this are not told from noise, and not counted.
+    notes : tuple of str
+        What could not be done, and why.
+    """
+
+    impacts: tuple[MeasuredImpact, ...]
+    seat_level: float
+    opening_level: float
+    level_se: float
+    noise: float
+    least_height: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def lift(self) -> float:
+        """Way between the stops [m]; nan if only one was met."""
+        return self.opening_level - self.seat_level
+
+    def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
+        """Impacts on one stop."""
+        return tuple(impact for impact in self.impacts if impact.stop == stop)
+
+    def first(self, stop: Stop) -> MeasuredImpact | None:
+        """First impact on a stop; None if there is none."""
+        return next(iter(self.on(stop)), None)
+
+    def bounces(self, stop: Stop) -> int:
+        """How often the needle left a stop again, higher than :attr:`least_height`."""
+        return sum(impact.rebound_speed != 0.0 for impact in self.on(stop))
