@@ -116,7 +116,7 @@ def plain_unit(text: str) -> str:
     text = " ".join(text.split())
     while len(text) > 1 and (text[0], text[-1]) in (("[", "]"), ("(", ")"), ("{", "}"), ('"', '"')):
         text = text[1:-1].strip()
-    return text.translate(_SIGNS).replace("^^", "^")
+    return text.translate(_SIGNS).replace("^-^", "^-")
 
 
 def no_unit(text: str) -> bool:

@@ -126,7 +126,8 @@ def _survey(path: Path, data: NDArray[np.uint8]) -> tuple[Dialect, tuple[Column,
     dialect = find_dialect(
         texts,
         [
-            *texts[-200:],
+            *texts[:400],
+            *texts[400:][-200:],
             *_lines_at(data, middle, middle + _SAMPLE),
             *_lines_at(data, max(data.size - _SAMPLE, mark), data.size),
         ],
