@@ -18,6 +18,7 @@ GROUPS = (
     "interface",
     "spectra",
     "vibration",
+    "sound",
     "mechanics",
     "fluids",
     "hydraulics",

@@ -1,0 +1,255 @@
+"""From force to ear: clicks, bands, weighting, loudness, sharpness."""
+
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.cumulative import cumulative_energy
+from klack.acoustics.drive_pattern import drive_pattern
+from klack.acoustics.loudness import time_varying_loudness
+from klack.acoustics.minimum_phase import minimum_phase_filter
+from klack.acoustics.signal_statistics import crest_factor, kurtosis, sound_exposure_level
+from klack.acoustics.sound import audio_band, click_pressure
+from klack.acoustics.spectrum import energy_spectral_density, force_spectrum
+from klack.acoustics.weighting import a_weighting
+from klack.signals import TimeSeries
+from klack.verification.check import Check, compare
+
+__all__ = ["checks"]
+
+GROUP = "sound"
+RATE = 48_000
+LENGTH, PEAK, TOUCH = 15e-6, 250.0, 1e-3  # [s], [N], [s]
+DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s]
+STRENGTH = DENSITY * SPEED / (4.0 * pi)  # [Pa^2/W] at 1 m
+# frequency [Hz], level [dB], loudness [sone]
+TONES = ((250.0, 80.0, 14.655), (1000.0, 60.0, 4.019), (4000.0, 40.0, 1.549))
+# duration [s], loudness [sone] of pulses of 1 kHz and 70 dB
+PULSES = ((0.05, 5.975), (0.5, 8.077))
+# [Hz], [dB]
+A_WEIGHTS = ((31.622777, -39.4), (100.0, -19.1), (1e3, 0.0), (3981.0717, 1.0), (15848.932, -6.6))
+
+
+def checks() -> list[Check]:
+    """Click, pattern, weighting, cumulative energy, loudness, sharpness."""
+    return [*_click(), *_filter(), *_pattern(), *_weighting(), *_cumulative(), *_loudness()]
+
+
+def _half_sine() -> TimeSeries:
+    """Half sine of 250 N and 15 us in 4 ms, on a preload of 30 N, as means over 50 ns."""
+    step = 50e-9
+    edges = step * np.arange(round(4e-3 / step) + 1)
+    x = np.clip((edges - TOUCH) / LENGTH, 0.0, 1.0)
+    values = np.diff(PEAK * LENGTH / pi * (1.0 - np.cos(pi * x))) / step
+    return TimeSeries(step=step, values=values + 30.0, unit="N", start=0.5 * step)
+
+
+def _spectrum(f: NDArray[np.float64]) -> NDArray[np.float64]:
+    x = f * LENGTH
+    return np.asarray(2.0 / pi * PEAK * LENGTH * np.abs(np.cos(pi * x) / (1.0 - 4.0 * x * x)))
+
+
+def _transfer(f: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(1e-12 * (f / 1e3) ** 2)
+
+
+def _pressure() -> TimeSeries:
+    f = np.geomspace(20.0, 30e3, 200)
+    return click_pressure(
+        _half_sine(), f, _transfer(f), distance=1.0, density=DENSITY, sound_speed=SPEED
+    )
+
+
+def _click() -> list[Check]:
+    click = _pressure()
+    f = np.linspace(20.0, 24e3, 100_001)
+    radiated = _transfer(f) * 2.0 * (_spectrum(f) * audio_band(f)) ** 2
+    energy = np.cumsum(click.values**2) * click.step / STRENGTH
+    out = [
+        compare(
+            GROUP,
+            "energy of a click through a sphere of 1 m against the radiated energy [J]",
+            expected=float(np.trapezoid(radiated, f)),
+            computed=float(energy[-1]),
+            tolerance=1e-6,
+            source="integral of 2 T |F|^2, F of a half sine in closed form",
+        ),
+        compare(
+            GROUP,
+            "share of that energy 0.2 ms before the impact [-]",
+            expected=0.0,
+            computed=float(energy[np.searchsorted(click.time, TOUCH - 0.2e-3)] / energy[-1]),
+            tolerance=1e-6,
+            source="causality",
+        ),
+    ]
+    for frequency in (100.0, 1e3, 15e3):
+        turned = np.exp(-2j * pi * frequency * click.time)
+        at = np.array([frequency])
+        out.append(
+            compare(
+                GROUP,
+                f"sound pressure spectrum of the click at {frequency:g} Hz [Pa s]",
+                expected=float(np.sqrt(STRENGTH * _transfer(at)[0]) * _spectrum(at)[0]),
+                computed=float(np.abs(turned @ click.values) * click.step),
+                tolerance=1e-4,
+                source="sqrt(rho c T / (4 pi r^2)) |F|",
+            )
+        )
+    return out
+
+
+def _filter() -> list[Check]:
+    z = np.exp(-1j * np.linspace(0.0, pi, 1025))
+    inside = (1.0 - 0.9 * z) * (1.0 + 0.5 * z) / (1.0 - 0.7 * z)
+    outside = (z - 0.9) * (1.0 + 0.5 * z) / (1.0 - 0.7 * z)
+    found = minimum_phase_filter(np.abs(outside))
+    return [
+        compare(
+            GROUP,
+            "minimum phase of a magnitude against the filter with its zeros inside [-]",
+            expected=0.0,
+            computed=float(np.abs(found - inside).max()),
+            tolerance=1e-9,
+            source="Oppenheim & Schafer, Discrete-Time Signal Processing, ch. 12",
+        )
+    ]
+
+
+def _pattern() -> list[Check]:
+    t = np.arange(4800) / RATE
+    click = TimeSeries(
+        step=1.0 / RATE,
+        values=np.exp(-0.5 * ((t - 6e-3) / 0.8e-3) ** 2) * np.cos(6e3 * pi * t),
+        unit="Pa",
+    )
+    once = sound_exposure_level(click)
+    pattern = drive_pattern(click, 2000.0 / 60.0 * 0.5, 2.0)
+    sine = TimeSeries(step=1.0 / RATE, values=np.sin(2e3 * pi * np.arange(RATE) / RATE), unit="Pa")
+    return [
+        compare(
+            GROUP,
+            "sound exposure of 34 clicks over that of one (2000 rpm, four strokes, 2 s) [dB]",
+            expected=10.0 * float(np.log10(34.0)),
+            computed=sound_exposure_level(pattern) - once,
+            tolerance=1e-6,
+            source="10 lg n for tails that do not overlap",
+        ),
+        compare(
+            GROUP,
+            "kurtosis of a sine [-]",
+            expected=1.5,
+            computed=kurtosis(sine),
+            tolerance=1e-9,
+            source="moments of a sine",
+        ),
+        compare(
+            GROUP,
+            "crest factor of a sine [-]",
+            expected=sqrt(2.0),
+            computed=crest_factor(sine),
+            tolerance=1e-9,
+            source="moments of a sine",
+        ),
+    ]
+
+
+def _weighting() -> list[Check]:
+    return [
+        compare(
+            GROUP,
+            f"A-weighting at {frequency:.6g} Hz [dB]",
+            expected=level,
+            computed=float(20.0 * np.log10(a_weighting(frequency))),
+            tolerance=0.05,
+            source="IEC 61672-1:2013, Table 3, one decimal",
+            absolute=True,
+        )
+        for frequency, level in A_WEIGHTS
+    ]
+
+
+def _cumulative() -> list[Check]:
+    density = energy_spectral_density(force_spectrum(_half_sine(), high=2e6, resolution=200.0))
+    cumulative = cumulative_energy(density, low=0.0, high=2e6)
+    below = cumulative.frequency_below(0.9)
+    f = np.linspace(0.0, below, 100_001)
+    return [
+        compare(
+            GROUP,
+            "energy of a half sine on a preload over all frequencies [N^2 s]",
+            expected=0.5 * PEAK**2 * LENGTH,
+            computed=cumulative.total,
+            tolerance=1e-4,
+            source="Parseval: F0^2 T / 2",
+        ),
+        compare(
+            GROUP,
+            "share of its energy below the frequency of 90 % [-]",
+            expected=0.9,
+            computed=float(np.trapezoid(2.0 * _spectrum(f) ** 2, f) / (0.5 * PEAK**2 * LENGTH)),
+            tolerance=1e-4,
+            source="closed density of a half sine",
+        ),
+    ]
+
+
+def _loudness() -> list[Check]:
+    out = []
+    for frequency, level, loudness in TONES:
+        found = time_varying_loudness(_pulse(frequency, level, 0.6, end=0.0))
+        out.append(
+            compare(
+                GROUP,
+                f"loudness of a tone of {frequency:g} Hz and {level:g} dB [sone]",
+                expected=loudness,
+                computed=found.maximum,
+                tolerance=max(0.05 * loudness, 0.1),
+                source="ISO 532-1:2017, Annex B.3; its tolerance: 5 % or 0.1 sone",
+                absolute=True,
+            )
+        )
+    for duration, loudness in PULSES:
+        found = time_varying_loudness(_pulse(1000.0, 70.0, duration, end=0.2))
+        out.append(
+            compare(
+                GROUP,
+                f"largest loudness of 1 kHz, 70 dB for {duration * 1e3:g} ms [sone]",
+                expected=loudness,
+                computed=found.maximum,
+                tolerance=0.05,
+                source="ISO 532-1:2017, Annex B.4 (ramps of 2 ms assumed)",
+            )
+        )
+    noise = time_varying_loudness(_narrow_noise())
+    out.append(
+        compare(
+            GROUP,
+            "sharpness of noise from 920 to 1080 Hz, 60 dB [acum]",
+            expected=1.0,
+            computed=noise.sharpness,
+            tolerance=0.05,
+            source="DIN 45692:2009: defines 1 acum; its tolerance",
+        )
+    )
+    return out
+
+
+def _pulse(frequency: float, level: float, duration: float, *, end: float) -> TimeSeries:
+    t = np.arange(round((0.1 + duration + end) * RATE)) / RATE - 0.1
+    ramp = 2e-3
+    rise = 0.5 - 0.5 * np.cos(pi * np.clip(t / ramp + 0.5, 0.0, 1.0))
+    fall = 0.5 + 0.5 * np.cos(pi * np.clip((t - duration) / ramp + 0.5, 0.0, 1.0))
+    peak = sqrt(2.0) * 20e-6 * 10.0 ** (level / 20.0)
+    wave = peak * rise * (fall if end else 1.0) * np.sin(2.0 * pi * frequency * t)
+    return TimeSeries(step=1.0 / RATE, values=wave, unit="Pa")
+
+
+def _narrow_noise() -> TimeSeries:
+    f = np.fft.rfftfreq(RATE, 1.0 / RATE)
+    phase = np.exp(2j * pi * np.random.default_rng(0).random(f.size))
+    values = np.fft.irfft(np.where((f >= 920.0) & (f < 1080.0), phase, 0.0), RATE)
+    return TimeSeries(
+        step=1.0 / RATE, values=values * 0.02 / np.sqrt(np.mean(values**2)), unit="Pa"
+    )
