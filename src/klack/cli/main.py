@@ -23,7 +23,19 @@ from typing import Any
 from cyclopts import App, CycloptsError
 
 from klack import __version__
-from klack.cli import compare, demo, export, impact, reduce, report, schema, shots, stroke, verify
+from klack.cli import (
+    compare,
+    demo,
+    export,
+    impact,
+    noise,
+    reduce,
+    report,
+    schema,
+    shots,
+    stroke,
+    verify,
+)
 from klack.errors import AccuracyWarning, ConvergenceError, KlackError
 
 __all__ = ["app", "main"]
@@ -42,6 +54,7 @@ app.command(demo.demo)
 app.command(impact.impact)
 app.command(stroke.stroke)
 app.command(shots.shots)
+app.command(noise.noise)
 app.command(reduce.reduce)
 app.command(report.report)
 app.command(export.export)

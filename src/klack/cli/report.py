@@ -1,4 +1,4 @@
-"""``klack report``: the report of a stored result, of an impact, of a stroke or of shots."""
+"""``klack report``: the report of a stored result, of whichever kind."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ __all__ = ["report"]
 def report(
     result: Annotated[
         Path,
-        Parameter(name="RESULT", help="Folder that klack impact, stroke or shots wrote."),
+        Parameter(name="RESULT", help="Folder that klack impact, stroke, shots or noise wrote."),
     ],
     /,
     *,
@@ -41,6 +41,7 @@ def report(
 
 def _load(result: Path) -> "Study":
     """Read whichever kind of study the store holds."""
+    from klack.workflow.noise_store import NOISE_FORMAT, load_noise
     from klack.workflow.record_store import stored_format
     from klack.workflow.shots_store import SHOTS_FORMAT, load_shots
     from klack.workflow.store import load_study
@@ -49,4 +50,6 @@ def _load(result: Path) -> "Study":
     name = stored_format(result)
     if name == STROKE_FORMAT.name:
         return load_stroke(result)
+    if name == NOISE_FORMAT.name:
+        return load_noise(result)
     return load_shots(result) if name == SHOTS_FORMAT.name else load_study(result)

@@ -25,6 +25,7 @@ __all__ = [
     "Content",
     "Picture",
     "Section",
+    "Sound",
     "Table",
     "body_table",
     "date_text",
@@ -58,11 +59,21 @@ class Picture(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sound:
+    """A sound to listen to (WAV; empty if it is too long for a page), and what to say about it."""
+
+    title: str
+    wav: bytes
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading with what belongs under it, in this order: text, picture, charts, tables."""
+    """A heading with what belongs under it: text, sounds, picture, charts, tables."""
 
     title: str
     paragraphs: tuple[str, ...] = ()
+    sounds: tuple[Sound, ...] = ()
     picture: Picture | None = None
     charts: tuple[Chart | BarChart, ...] = ()
     tables: tuple[Table, ...] = ()

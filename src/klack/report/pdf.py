@@ -75,7 +75,7 @@ def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
         (work / figures[-1]["image"]).write_bytes(_drawn(chart))
     return {
         "title": section.title,
-        "paragraphs": section.paragraphs,
+        "paragraphs": [*section.paragraphs, *(f"{s.title}. {s.note}" for s in section.sounds)],
         "figures": figures,
         "tables": [asdict(table) for table in section.tables],
     }

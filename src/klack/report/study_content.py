@@ -1,15 +1,17 @@
 """The content of a report of any kind of study."""
 
 from klack.report.content import Content, report_content
+from klack.report.noise_content import noise_content
 from klack.report.shots_content import shots_content
 from klack.report.stroke_content import stroke_content
+from klack.workflow.noise_study import NoiseStudy
 from klack.workflow.shots_study import ShotsStudy
 from klack.workflow.stroke_study import StrokeStudy
 from klack.workflow.study import ImpactStudy
 
 __all__ = ["Study", "study_content"]
 
-Study = ImpactStudy | StrokeStudy | ShotsStudy
+Study = ImpactStudy | StrokeStudy | ShotsStudy | NoiseStudy
 
 
 def study_content(study: Study) -> Content:
@@ -18,4 +20,6 @@ def study_content(study: Study) -> Content:
         return stroke_content(study)
     if isinstance(study, ShotsStudy):
         return shots_content(study)
+    if isinstance(study, NoiseStudy):
+        return noise_content(study)
     return report_content(study)

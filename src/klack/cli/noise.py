@@ -1,0 +1,155 @@
+"""``klack noise``: from the force of the impacts to what is heard, for one or two designs."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from klack.cli.options import Json, Out, Quiet, Threads, require_threads
+from klack.cli.output import require_folder, require_json_target, write_json
+from klack.cli.progress import Progress, show_progress
+from klack.cli.reports import REPORTS, write_result
+from klack.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from klack.workflow.noise_source import NoiseSource
+    from klack.workflow.noise_study import NoiseStudy
+
+__all__ = ["noise"]
+
+_A = Annotated[
+    Path,
+    Parameter(
+        name="A",
+        help="Folder that klack impact or stroke wrote; or a case (file or shipped name), which is "
+        "run first.",
+    ),
+]
+_B = Annotated[
+    Path | None, Parameter(name="B", help="A second design, of either kind, to compare with.")
+]
+_Names = Annotated[
+    list[str] | None,
+    Parameter(
+        name=["--variant", "--level"],
+        consume_multiple=True,
+        negative="",
+        help="Variants of a stroke or levels of an impact; several (wet,dry) are compared. "
+        "[default: the first variant, the best level]",
+    ),
+]
+
+
+def noise(
+    a: _A,
+    b: _B = None,
+    /,
+    *,
+    variant: _Names = None,
+    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    out: Out = None,
+    json: Json = None,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> int:
+    """Estimate what is heard: force spectra, vibration, radiated sound, loudness, WAV files."""
+    require_json_target(json)
+    require_threads(threads)
+    names = tuple(name for item in variant or () for name in item.split(",") if name)
+    paths = (a,) if b is None else (a, b)
+    _require_known(paths)
+    folder = out if out is not None else Path("klack-results") / _folder_name(paths)
+    require_folder(folder)
+
+    from klack.workflow.noise import run_noise
+    from klack.workflow.noise_sounds import write_sounds
+    from klack.workflow.noise_store import save_noise
+    from klack.workflow.noise_summary import noise_to_json
+
+    def save(study: "NoiseStudy", stage: Path) -> None:
+        save_noise(study, stage)
+        write_sounds(study, stage)
+
+    with show_progress(quiet) as progress:
+        sources = [source for path in paths for source in _sources(path, names, progress, threads)]
+        study = run_noise(sources, names=_names(paths, sources), progress=progress)
+        failure = write_result(study, folder, save, report=report, progress=progress)
+    if not quiet:
+        made = report and failure is None
+        _print_study(study, folder, made, to_stderr=str(json) == "-")
+    if json is not None:
+        write_json(json, noise_to_json(study))
+    if failure:
+        raise failure
+    return 0
+
+
+def _is_result(path: Path) -> bool:
+    """Tell a folder with a result from a case."""
+    return (path / "result.zarr").is_dir() or (path / "zarr.json").is_file()
+
+
+def _require_known(paths: Sequence[Path]) -> None:
+    """Find every path before the long work begins."""
+    from klack.case.shipped import find_case
+
+    for path in paths:
+        if not _is_result(path):
+            find_case(path)
+
+
+def _folder_name(paths: Sequence[Path]) -> str:
+    return "-".join(["noise", *(_short(path) for path in paths)])
+
+
+def _short(path: Path) -> str:
+    if path.name == "result.zarr" or path.name == "case.yaml":
+        path = path.absolute().parent
+    return path.absolute().stem if path.suffix in (".yaml", ".yml") else path.absolute().name
+
+
+def _sources(
+    path: Path, names: Sequence[str], progress: Progress, threads: int | None
+) -> tuple["NoiseSource", ...]:
+    """Forces and bodies of a stored result, or of a case that is run now."""
+    from klack.workflow.noise_source import load_sources, run_sources
+
+    if _is_result(path):
+        progress("result", 0.0)
+        return load_sources(path, names)
+
+    from klack.case.shipped import find_case
+    from klack.case.valve_reader import load_any_case
+
+    case = load_any_case(find_case(path))
+    return run_sources(case, names, progress=progress, threads=threads)
+
+
+def _names(paths: Sequence[Path], sources: Sequence["NoiseSource"]) -> tuple[str, ...]:
+    """Short names that tell the designs apart: the case, what was run, the folder, a number."""
+    per_path = len(sources) // len(paths)
+    folders = [_short(paths[i // per_path]) for i in range(len(sources))]
+    candidates = (
+        [source.case for source in sources],
+        [f"{source.case} {source.run}" for source in sources],
+        folders,
+        [f"{name} {source.run}" for name, source in zip(folders, sources, strict=True)],
+    )
+    for found in candidates:
+        if len(set(found)) == len(found):
+            return tuple(found)
+    return tuple(f"{source.case} {source.run} {i + 1}" for i, source in enumerate(sources))
+
+
+def _print_study(study: "NoiseStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
+    from klack.workflow.noise_sounds import sound_names
+    from klack.workflow.noise_summary import NOISE_COLUMNS, noise_rows
+
+    print_table(study.title, NOISE_COLUMNS, noise_rows(study), to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for warning in study.warnings:
+        print(f"Note: {warning}", file=stream)
+    made = ["result.zarr", *sound_names(study), *(REPORTS if report else ())]
+    print(f"Results in {folder}: {', '.join(made)}", file=stream)

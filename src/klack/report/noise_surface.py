@@ -1,0 +1,217 @@
+"""Surfaces of the bodies in the air, coloured by how fast they move in one band.
+
+A body of revolution is shown as its half section: the lines are the surfaces that meet the air.  A
+solid is shown in parallel projection, seen from the front and above; faces that look away are left
+out.  One row per design, all colours to one scale.
+"""
+
+from dataclasses import dataclass
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from klack.acoustics.third_octave import ThirdOctaves, nominal_label
+from klack.report.printed import STYLE, plain, svg
+from klack.report.wording import listed
+from klack.workflow.noise_study import BodyNoise, NoiseDesign, NoiseStudy, Surface
+
+__all__ = ["SurfaceFigure", "shown_bands", "surface_figure"]
+
+Floats = NDArray[np.float64]
+
+_REFERENCE = 1e-6  # [m/s]
+_RANGE = 50.0  # [dB] of the colours at most
+_MAP = "viridis"
+_HEARING = 20e3  # [Hz]
+_VIEW = (np.radians(35.0), np.radians(25.0))  # turned about z, seen from above
+_VECTOR_FACES = 3000
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceFigure:
+    """Picture (SVG) and what has to be said about it."""
+
+    image: bytes
+    note: str
+
+
+def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
+    """Indices of the bands in which most is radiated: of what can be heard, and of all."""
+    designs = [design for design in study.designs if design.bodies]
+    if not designs:
+        return ()
+    energy = designs[0].radiated_bands
+    middle = designs[0].band_middle
+    audible = np.where(middle <= _HEARING, energy, 0.0)
+    return tuple(dict.fromkeys((int(np.argmax(audible)), int(np.argmax(energy)))))
+
+
+def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
+    """Draw every body of every design in the loudest bands; None without bodies."""
+    designs = [design for design in study.designs if design.bodies]
+    if not designs:
+        return None
+    bands = shown_bands(study)
+    rows = [(design, band) for design in designs for band in bands]
+    names = list(dict.fromkeys(body.name for design in designs for body in design.bodies))
+    octaves = designs[0].stops[0].bands
+    scale = _scale(designs, bands)
+    with rc_context(STYLE | {"axes.grid": False}):
+        wide = [_width_over_height(_body(designs, name).surface) for name in names]
+        tall = float(np.clip(5.2 / sum(wide), 1.5, 2.8))
+        figure = Figure(figsize=(6.7, tall * len(rows) + 0.9), layout="constrained")
+        grid = figure.subplots(len(rows), len(names), squeeze=False, width_ratios=wide)
+        for (design, band), line in zip(rows, grid, strict=True):
+            for name, axes in zip(names, line, strict=True):
+                found = [body for body in design.bodies if body.name == name]
+                title = _title(study, design, name, octaves, band)
+                _draw(axes, found[0].surface if found else None, band, scale, title)
+        _bar(figure, grid, scale)
+        return SurfaceFigure(svg(figure), _note(designs, octaves, bands))
+
+
+def _body(designs: list[NoiseDesign], name: str) -> BodyNoise:
+    return next(body for design in designs for body in design.bodies if body.name == name)
+
+
+def _title(
+    study: NoiseStudy, design: NoiseDesign, name: str, octaves: ThirdOctaves, band: int
+) -> str:
+    whose = f"{design.name}, " if len(study.designs) > 1 else ""
+    return f"{whose}{name}, {nominal_label(int(octaves.number[band]))}"
+
+
+def _level(velocity: NDArray[np.float32]) -> Floats:
+    return np.asarray(20.0 * np.log10(np.maximum(velocity.astype(float), 1e-30) / _REFERENCE))
+
+
+def _scale(designs: list[NoiseDesign], bands: tuple[int, ...]) -> Normalize:
+    values = np.concatenate(
+        [_level(body.surface.velocity[list(bands)]).ravel() for d in designs for body in d.bodies]
+    )
+    top = 5.0 * ceil(float(values.max()) / 5.0)
+    low = max(5.0 * floor(float(values.min()) / 5.0), top - _RANGE)
+    return Normalize(min(low, top - 5.0), top)
+
+
+# --------------------------------------------------------------------------- drawing
+
+
+def _draw(axes: Any, surface: Surface | None, band: int, scale: Normalize, title: str) -> None:
+    axes.set_title(plain(title), fontsize=8)
+    axes.set_aspect("equal")
+    if surface is None:
+        axes.set_axis_off()
+        return
+    level = _level(surface.velocity[band])
+    if surface.points.shape[1] == 2:
+        _draw_section(axes, surface, level, scale)
+    else:
+        _draw_solid(axes, surface, level, scale)
+
+
+def _draw_section(axes: Any, surface: Surface, level: Floats, scale: Normalize) -> None:
+    lines = 1e3 * surface.points[surface.faces]
+    both = np.concatenate([lines, lines * np.array([-1.0, 1.0])])
+    collection = LineCollection(list(both), linewidths=3.5, capstyle="round", cmap=_MAP, norm=scale)
+    collection.set_array(np.concatenate([level, level]))
+    axes.add_collection(collection)
+    axes.axvline(0.0, color="#22262b", linewidth=0.5, dashes=(8, 2, 2, 2))
+    size = float(np.abs(both).max(axis=(0, 1))[0])
+    low, high = float(both[..., 1].min()), float(both[..., 1].max())
+    margin = 0.08 * max(size, high - low)
+    axes.set_xlim(-size - margin, size + margin)
+    axes.set_ylim(low - margin, high + margin)
+    axes.set_xlabel("distance from the axis [mm]")
+    axes.set_ylabel("height [mm]")
+
+
+def _draw_solid(axes: Any, surface: Surface, level: Floats, scale: Normalize) -> None:
+    corners = 1e3 * surface.points[surface.faces]
+    right, up, towards = _axes_of_view()
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+    # a quadrangle that repeats its last corner is a triangle
+    repeated = np.all(corners[:, -1] == corners[:, -2], axis=1)
+    normals[repeated] = np.cross(
+        corners[repeated, 1] - corners[repeated, 0], corners[repeated, 2] - corners[repeated, 0]
+    )
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    facing = normals @ towards
+    order = np.argsort((corners @ towards).mean(axis=1))
+    order = order[facing[order] > 0.0]
+    flat = np.stack([corners @ right, corners @ up], axis=-1)[order]
+    shade = 0.72 + 0.28 * facing[order, None]
+    from matplotlib import colormaps
+
+    colours = colormaps[_MAP](scale(level[order]))
+    colours[:, :3] *= shade
+    axes.add_collection(
+        PolyCollection(
+            list(flat),
+            facecolors=colours,
+            edgecolors=colours,
+            linewidths=0.2,
+            rasterized=len(order) > _VECTOR_FACES,
+        )
+    )
+    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    margin = 0.05 * float((high - low).max())
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_axis_off()
+
+
+def _axes_of_view() -> tuple[Floats, Floats, Floats]:
+    """To the right, up, and towards the eye, in the coordinates of the body."""
+    turn, lift = _VIEW
+    towards = np.array([np.cos(lift) * np.sin(turn), -np.cos(lift) * np.cos(turn), np.sin(lift)])
+    right = np.array([np.cos(turn), np.sin(turn), 0.0])
+    return right, np.cross(towards, right), towards
+
+
+def _width_over_height(surface: Surface) -> float:
+    if surface.points.shape[1] == 2:
+        used = surface.points[np.unique(surface.faces)]
+        width, height = 2.0 * float(used[:, 0].max()), float(np.ptp(used[:, 1]))
+    else:
+        right, up, _ = _axes_of_view()
+        width, height = (float(np.ptp(surface.points @ axis)) for axis in (right, up))
+    return float(np.clip(width / max(height, 1e-9), 0.5, 3.0))
+
+
+def _bar(figure: Figure, grid: Any, scale: Normalize) -> None:
+    from matplotlib.cm import ScalarMappable
+
+    bar = figure.colorbar(
+        ScalarMappable(norm=scale, cmap=_MAP),
+        ax=list(grid.ravel()),
+        location="bottom",
+        shrink=0.6,
+        aspect=40,
+    )
+    bar.set_label("normal velocity [dB re 1 µm/s]")
+
+
+def _note(designs: list[NoiseDesign], octaves: ThirdOctaves, bands: tuple[int, ...]) -> str:
+    names = listed([nominal_label(int(octaves.number[band])) for band in bands])
+    which = (
+        "the band that radiates most"
+        if len(bands) == 1
+        else "the audible band that radiates most, and the band that radiates most of all"
+    )
+    solid = any(body.surface.points.shape[1] == 3 for design in designs for body in design.bodies)
+    seen = (
+        "Solids are seen from the front and above."
+        if solid
+        else "Half sections, mirrored; the lines are the surfaces that meet the air."
+    )
+    return (
+        f"Normal velocity of the surfaces in the third octaves {names}: {which}, of the first "
+        f"design. Root mean square over one period of the drive pattern. {seen}"
+    )

@@ -1,0 +1,308 @@
+"""Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from klack.acoustics.comparison import first_impact
+from klack.case.bodies import CaseMaterial
+from klack.case.noise import CaseNoise
+from klack.case.reader import parse
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+from klack.reduction.structure import Structure
+from klack.signals import TimeSeries
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+from klack.workflow.impact import run_impact
+from klack.workflow.noise_force import impact_force, stop_forces
+from klack.workflow.progress import Progress, silent
+from klack.workflow.record_store import stored_format
+from klack.workflow.store import IMPACT_FORMAT, load_study
+from klack.workflow.stroke import run_stroke
+from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
+from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.structures import IMPACT_STOP
+from klack.workflow.study import BodySummary, ImpactStudy
+
+__all__ = [
+    "NoiseSource",
+    "SourceStop",
+    "impact_sources",
+    "load_sources",
+    "run_sources",
+    "stroke_sources",
+]
+
+_AROUND = 5.0  # contact times shown on each side of the strongest impact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SourceStop:
+    """Force of one stop: all of it, and its strongest impact alone."""
+
+    name: str
+    force: TimeSeries
+    strongest: TimeSeries
+    impacts: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NoiseSource:
+    """One run that makes noise.
+
+    Parameters
+    ----------
+    kind : str
+        ``"impact"`` or ``"stroke"``.
+    case, title, case_text : str
+    run, label : str
+        Name of the variant or level, and in words.
+    stops : tuple of SourceStop
+    structures : tuple of Structure
+    kept_up_to : float [Hz]
+        Lowest of the highest kept modes of all bodies; nan for rigid ones.
+    noise : CaseNoise
+    given : bool
+        Whether the case has a section ``noise``.
+    materials : mapping of str to CaseMaterial
+    notes : tuple of str
+    """
+
+    kind: str
+    case: str
+    title: str
+    case_text: str
+    run: str
+    label: str
+    stops: tuple[SourceStop, ...]
+    structures: tuple[Structure, ...]
+    kept_up_to: float
+    noise: CaseNoise
+    given: bool
+    materials: Mapping[str, CaseMaterial]
+    notes: tuple[str, ...] = ()
+
+
+# --------------------------------------------------------------------------- from disk, from cases
+
+
+def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Take forces and bodies from a stored result of an impact or a stroke.
+
+    Parameters
+    ----------
+    folder : Path
+    names : sequence of str
+        Variants or levels; the best one of an impact and the first one of a stroke without.
+
+    Raises
+    ------
+    InputError
+        If it is another kind of result, or holds no such variant or level.
+    """
+    form = stored_format(folder)
+    if form == IMPACT_FORMAT.name:
+        return impact_sources(load_study(folder), names)
+    if form == STROKE_FORMAT.name:
+        return stroke_sources(load_stroke(folder), names)
+    raise InputError(
+        f"result {folder}",
+        got=f"a {form}",
+        expected="the result of an impact or a stroke",
+        hint="give the folder that klack impact or klack stroke names at the end.",
+    )
+
+
+def run_sources(
+    case: Case | ValveCase,
+    names: Sequence[str] = (),
+    *,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> tuple[NoiseSource, ...]:
+    """Run a case and take forces and bodies from it.
+
+    Parameters
+    ----------
+    case : Case or ValveCase
+    names : sequence of str
+        Levels of an impact, ``reduced`` without; variants of a stroke, the first one without.
+    progress : callable
+    threads : int, optional
+    """
+    if isinstance(case, ValveCase):
+        variants = tuple(names) or case.run.variants[:1]
+        stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
+        return stroke_sources(stroke, tuple(names))
+    levels = case.require_levels(tuple(names) or ("reduced",))
+    impact = run_impact(case, levels=levels, certify=False, progress=progress, threads=threads)
+    return impact_sources(impact, tuple(names))
+
+
+# --------------------------------------------------------------------------- impacts
+
+
+def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Forces of an impact at some levels; of the best level without.
+
+    The structure is that of the reduced level, whichever level the force comes from.
+    """
+    wanted = tuple(levels) or (study.reference,)
+    noise, given, materials = _noise_section(study.case_text, study.case)
+    found = []
+    for name in wanted:
+        _require("level", name, study.levels)
+        result = study.levels[name]
+        touched = bool(np.any(result.history.force > 0.0))
+        force = impact_force(result.history)
+        found.append(
+            NoiseSource(
+                kind="impact",
+                case=study.case,
+                title=study.title or study.case,
+                case_text=study.case_text,
+                run=name,
+                label=result.label,
+                stops=(
+                    SourceStop(
+                        name=IMPACT_STOP,
+                        force=force,
+                        strongest=first_impact(result.history) if touched else force,
+                        impacts=1 if touched else 0,
+                    ),
+                ),
+                structures=study.structures,
+                kept_up_to=float("nan") if name == "lumped" else _kept_up_to(study.bodies),
+                noise=noise,
+                given=given,
+                materials=materials,
+            )
+        )
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- strokes
+
+
+def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Forces of all stops of a stroke, in some variants; in the first one without."""
+    wanted = tuple(variants) or (study.reference.name,)
+    noise, given, materials = _noise_section(study.case_text, study.case)
+    found = []
+    for name in wanted:
+        _require("variant", name, study.variants)
+        variant = study.variants[name]
+        found.append(
+            NoiseSource(
+                kind="stroke",
+                case=study.case,
+                title=study.title or study.case,
+                case_text=study.case_text,
+                run=name,
+                label=f"{name}: {variant.label}",
+                stops=_stops(study, variant),
+                structures=study.structures,
+                kept_up_to=_kept_up_to(study.bodies) if variant.flexible else float("nan"),
+                noise=noise,
+                given=given,
+                materials=materials,
+                notes=_notes(variant),
+            )
+        )
+    return tuple(found)
+
+
+def _stops(study: StrokeStudy, variant: StrokeVariant) -> tuple[SourceStop, ...]:
+    """Stops in the order of a stroke: the opening stop first."""
+    order = dict.fromkeys(
+        name for name in (study.channels.opening_stop, study.channels.seat) if name
+    )
+    forces = stop_forces(variant.result)
+    result = []
+    for name in order | dict.fromkeys(forces):
+        if name in forces:
+            events = variant.impacts(name)
+            result.append(
+                SourceStop(
+                    name=name,
+                    force=forces[name],
+                    strongest=_strongest(forces[name], events),
+                    impacts=len(events),
+                )
+            )
+    return tuple(result)
+
+
+def _strongest(force: TimeSeries, events: Sequence[ImpactEvent]) -> TimeSeries:
+    """Force about the impact with the highest peak, between its neighbours; time from its touch."""
+    if not events:
+        return force
+    k = int(np.argmax([event.peak_force for event in events]))
+    event = events[k]
+    begin = event.time - _AROUND * event.contact_time
+    end = event.time + (1.0 + _AROUND) * event.contact_time
+    if k > 0:
+        begin = max(begin, 0.5 * (_end(events[k - 1]) + event.time))
+    if k + 1 < len(events):
+        end = min(end, 0.5 * (_end(event) + events[k + 1].time))
+    edge = force.start - 0.5 * force.step
+    first = max(0, round((begin - edge) / force.step))
+    last = min(force.values.size, max(first + 2, round((end - edge) / force.step)))
+    return TimeSeries(
+        step=force.step,
+        values=force.values[first:last],
+        unit=force.unit,
+        start=force.start + first * force.step - event.time,
+        name=force.name,
+    )
+
+
+def _end(event: ImpactEvent) -> float:
+    if np.isfinite(event.separation_time):
+        return event.separation_time
+    return event.time + event.contact_time
+
+
+def _notes(variant: StrokeVariant) -> tuple[str, ...]:
+    result: NetworkResult = variant.result
+    incomplete = [stop for stop, record in result.interfaces.items() if not record.complete]
+    if not incomplete:
+        return ()
+    return (
+        f"The fine record of {one_of(incomplete)} is not complete: its latest impacts are known as "
+        "means over the records alone.",
+    )
+
+
+# --------------------------------------------------------------------------- what both share
+
+
+def _require(what: str, name: str, held: Mapping[str, object]) -> None:
+    if name not in held:
+        raise InputError(
+            what,
+            got=f"'{name}', which the result does not hold",
+            expected=f"one of: {one_of(held)}",
+            hint=nearest(name, held, f"run the case with --{what} {name} first."),
+        )
+
+
+def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
+    tops = [float(body.frequencies[-1]) for body in bodies if body.frequencies.size]
+    return min(tops, default=float("nan"))
+
+
+def _noise_section(text: str, name: str) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
+    """Section ``noise`` and materials of the text of a case that was checked when it was run."""
+    data, _ = parse(text, Path(name))
+    given = data.get("noise") is not None
+    noise = CaseNoise.model_validate(data["noise"] if given else {})
+    materials = {
+        key: CaseMaterial.model_validate(value)
+        for key, value in (data.get("materials") or {}).items()
+    }
+    return noise, given, materials

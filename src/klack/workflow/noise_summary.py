@@ -1,0 +1,154 @@
+"""The few numbers of a noise study that a script or a terminal wants."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
+from klack.workflow.noise_study import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
+
+__all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json"]
+
+NOISE_COLUMNS = (
+    "design",
+    "peak force [N]",
+    "force [dB re 1 uN^2 s]",
+    "injected [uJ]",
+    "radiated [nJ]",
+    "SEL [dB]",
+    "peak [dB]",
+    "loudness max [sone]",
+    "sharpness [acum]",
+    "valid up to [kHz]",
+)
+
+
+def noise_rows(study: NoiseStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`NOISE_COLUMNS`, one per design, as text."""
+    return tuple(_row(design) for design in study.designs)
+
+
+def _row(design: NoiseDesign) -> tuple[str, ...]:
+    sound = design.sound
+    level = 10.0 * np.log10(max(design.band_energy.sum(), 1e-300) / ENERGY_REFERENCE)
+    heard = (
+        ("–",) * 4
+        if sound is None
+        else (
+            f"{sound.statistics.exposure_level:.1f}",
+            f"{sound.statistics.peak_level:.1f}",
+            f"{sound.loudness.maximum:.3g}",
+            f"{sound.loudness.sharpness:.3g}",
+        )
+    )
+    return (
+        design.name,
+        f"{max(stop.peak_force for stop in design.stops):.4g}",
+        f"{level:.1f}",
+        _number(1e6 * design.injected_energy),
+        _number(1e9 * design.radiated_energy),
+        *heard,
+        _number(1e-3 * design.valid_up_to),
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else "–"
+
+
+def noise_to_json(study: NoiseStudy) -> dict[str, Any]:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        The numbers of the first design (``third_octave``: level of the force of all its stops in
+        dB re (1 uN)^2 s; ``injected_energy_J``, ``loudness_max_sone`` and so on), and ``designs``:
+        the same for every design by name.  Numbers that do not exist are None.
+    """
+    designs = {design.name: _design(design) for design in study.designs}
+    return {"case": study.case, **designs[study.reference.name], "designs": designs}
+
+
+def _design(design: NoiseDesign) -> dict[str, Any]:
+    bands = design.stops[0].bands
+    return {
+        "kind": design.kind,
+        "run": design.run,
+        "third_octave": _bands(bands, design.band_energy),
+        "injected_energy_J": _finite(design.injected_energy),
+        "radiated_energy_J": _finite(design.radiated_energy),
+        "radiated_energy_upper_bound_J": _finite(design.upper_bound),
+        "valid_from_Hz": _finite(design.valid_from),
+        "valid_up_to_Hz": _finite(design.valid_up_to),
+        **_sound(design.sound),
+        "stops": {
+            stop.stop: {
+                "impacts": stop.impacts,
+                "peak_force_N": _finite(stop.peak_force),
+                "impulse_Ns": _finite(stop.impulse),
+                "third_octave": _bands(stop.bands, stop.bands.energy),
+            }
+            for stop in design.stops
+        },
+        "bodies": {body.name: _body(body) for body in design.bodies},
+    }
+
+
+def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[dict[str, Any]]:
+    return [
+        {
+            "center_Hz": float(middle),
+            "nominal": nominal_label(int(number)),
+            "level_dB": float(10.0 * np.log10(max(float(value), 1e-300) / ENERGY_REFERENCE)),
+        }
+        for number, middle, value in zip(bands.number, bands.middle, energy, strict=True)
+    ]
+
+
+def _body(body: BodyNoise) -> dict[str, Any]:
+    radiated = body.radiated.sum(axis=1)
+    return {
+        "highest_mode_Hz": _finite(body.highest_frequency),
+        "injected_energy_J": dict(zip(body.ports, map(_finite, body.injected), strict=True)),
+        "vibration_energy_J": _finite(body.vibration_energy),
+        "vibration_energy_by_mobility_J": _finite(body.vibration_spectral),
+        "radiated_energy_J": dict(zip(body.groups, map(_finite, radiated), strict=True)),
+    }
+
+
+def _sound(sound: ClickSound | None) -> dict[str, float | None]:
+    if sound is None:
+        return dict.fromkeys(_SOUND_KEYS)
+    one, pattern = sound.statistics, sound.pattern
+    values = (
+        sound.loudness.maximum,
+        sound.loudness.level,
+        sound.loudness.sharpness,
+        pattern.kurtosis,
+        pattern.crest_factor,
+        one.exposure_level,
+        one.exposure_level_A,
+        one.peak_level,
+        pattern.equivalent_level_A,
+    )
+    return {key: _finite(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
+
+
+_SOUND_KEYS = (
+    "loudness_max_sone",
+    "loudness_level_phon",
+    "sharpness_acum",
+    "kurtosis",
+    "crest_factor",
+    "sound_exposure_level_dB",
+    "sound_exposure_level_dBA",
+    "peak_level_dB",
+    "pattern_level_dBA",
+)
+
+
+def _finite(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if abs(value) < float("inf") else None
