@@ -4,6 +4,8 @@ Values come converted to physical units.  A conversion that is a formula written
 computed: such channels are left out, with a note.
 """
 
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +115,8 @@ class MdfFile(Recording):
         )
 
     def _master(self, g: int, first: int, last: int) -> Vector:
-        time = self._mdf.get_master(g, record_offset=first, record_count=last - first)
+        with redirect_stdout(StringIO()):  # asammdf prints when a disk is slow
+            time = self._mdf.get_master(g, record_offset=first, record_count=last - first)
         return self._second[g] * np.asarray(time, dtype=np.float64)
 
     def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
@@ -123,14 +126,15 @@ class MdfFile(Recording):
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         g, c = self._place[channel.name]
-        samples, invalid = self._mdf.get(
-            group=g,
-            index=c,
-            record_offset=first,
-            record_count=last - first,
-            samples_only=True,
-            ignore_invalidation_bits=True,
-        )
+        with redirect_stdout(StringIO()):  # as above
+            samples, invalid = self._mdf.get(
+                group=g,
+                index=c,
+                record_offset=first,
+                record_count=last - first,
+                samples_only=True,
+                ignore_invalidation_bits=True,
+            )
         values = np.array(samples, dtype=np.float64)
         if invalid is not None:
             values[np.asarray(invalid, dtype=bool)] = np.nan
