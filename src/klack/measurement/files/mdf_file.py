@@ -7,6 +7,7 @@ computed: such channels are left out, with a note.
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 import numpy as np
@@ -162,12 +163,21 @@ def _opened(path: Path, file: Any) -> Any:
         # of an open file asammdf reads only the records that are asked for
         return MDF(file, raise_on_multiple_occurrences=False)
     except Exception as error:  # a damaged file ends in any kind of error there
+        _forget_half_open(error)
         raise InputError(
             str(path),
             got=f"an MDF file that cannot be opened ({str(error)[:80]})",
             expected="MDF version 3 or 4",
             hint="repair or convert it with the program that wrote it.",
         ) from error
+
+
+def _forget_half_open(error: Exception) -> None:
+    """Keep the reader that failed from complaining once more when it is thrown away."""
+    for frame, _ in walk_tb(error.__traceback__):
+        half: Any = frame.f_locals.get("self")
+        if hasattr(half, "_closed"):
+            half._closed = True
 
 
 def _is_number(channel: Any, old: bool) -> bool:
