@@ -1,0 +1,203 @@
+"""From files to a set of strokes."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.measurement.alignment import common_axis, covers, onto_axis
+from klack.measurement.channels import Channels
+from klack.measurement.cutting import Piece, cut_strokes, trigger_level, whole_piece
+from klack.measurement.find_channels import FoundChannel, find_channels
+from klack.measurement.outliers import find_outliers
+from klack.measurement.read_channels import common_time, read_channels, windows
+from klack.measurement.recording import Recording, open_recording
+from klack.measurement.roles import Role
+from klack.measurement.stroke_set import MeasuredStroke, Rejection, StrokeSet
+from klack.measurement.trigger import Trigger
+
+__all__ = ["MeasurementSection", "load_stroke_set"]
+
+_WINDOW = 1_000_000  # samples
+_WINDOW_TIMES = 20.0  # of one stroke: windows are not shorter
+
+
+class MeasurementSection(Protocol):
+    """What a case says of its recordings (:class:`klack.case.measurement.CaseMeasurement`)."""
+
+    @property
+    def channels(self) -> Channels:
+        """Channels by what they mean."""
+
+    @property
+    def time_step(self) -> float | None:
+        """Step of files without a time [s]."""
+
+    @property
+    def trigger(self) -> Trigger | None:
+        """Where strokes begin."""
+
+    @property
+    def zero(self) -> str:
+        """``"start"`` or ``"none"``."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Cut:
+    name: str
+    piece: Piece
+
+
+def load_stroke_set(
+    paths: Sequence[Path],
+    measurement: MeasurementSection | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> StrokeSet:
+    """Read recordings, cut them into strokes, align these, and put aside what cannot be used.
+
+    Long recordings are read in windows; only the strokes themselves are kept.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of one valve: one long recording, one file per stroke, or a mixture.
+    measurement : MeasurementSection, optional
+        Channels, trigger, zero; without it channels are found by their names, and every recording
+        is one stroke in its own time.
+    progress : callable
+        Called with the share of the files that is done, 0 to 1.
+
+    Returns
+    -------
+    StrokeSet
+        Values as the sensor showed them; with ``zero: start`` the median lift before the trigger
+        is taken off.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, channels are missing, or no stroke is left.
+    """
+    trigger = None if measurement is None else measurement.trigger
+    cuts: list[_Cut] = []
+    notes: list[str] = []
+    for k, path in enumerate(paths):
+        progress(k / len(paths))
+        step = None if measurement is None else measurement.time_step
+        with open_recording(Path(path), time_step=step) as recording:
+            needed: tuple[Role, ...] = () if trigger is None else (trigger.channel,)
+            channels = None if measurement is None else measurement.channels
+            found = find_channels(recording, channels, needed=needed)
+            for one in found:
+                notes.extend(common_time(recording, one).notes)
+                cuts.extend(_cuts(recording, one, trigger, several=len(found) > 1))
+    progress(1.0)
+    source = ", ".join(Path(path).name for path in paths)
+    if not cuts:
+        raise InputError(
+            source or "measurement",
+            got="no stroke",
+            expected="a channel that crosses the trigger level",
+            hint="check measurement.trigger: channel, level or share, and slope.",
+        )
+    zero = measurement is not None and measurement.zero == "start"
+    return _aligned(source, cuts, trigger, zero=zero or measurement is None, notes=notes)
+
+
+def _cuts(
+    recording: Recording,
+    found: Mapping[Role, FoundChannel],
+    trigger: Trigger | None,
+    *,
+    several: bool,
+) -> Iterator[_Cut]:
+    name = recording.path.name
+    if several:
+        name += f" {next(iter(found.values())).name}"
+    if trigger is None:
+        yield _Cut(name=name, piece=whole_piece(read_channels(recording, found)))
+        return
+    clock = common_time(recording, found)
+    overlap = trigger.before + trigger.after + 8.0 * clock.step
+    length = max(_WINDOW * clock.step, _WINDOW_TIMES * overlap)
+    channel = {trigger.channel: found[trigger.channel]}
+    level = trigger_level(windows(recording, channel, length), trigger)
+    whole = windows(recording, found, length, overlap)
+    for number, piece in enumerate(cut_strokes(whole, trigger, level), start=1):
+        yield _Cut(name=f"{name} #{number}", piece=piece)
+
+
+def _aligned(
+    source: str, cuts: list[_Cut], trigger: Trigger | None, *, zero: bool, notes: list[str]
+) -> StrokeSet:
+    first = -np.inf if trigger is None else -trigger.before
+    last = np.inf if trigger is None else trigger.after
+    axis = common_axis([cut.piece for cut in cuts], first, last)
+    if trigger is not None:
+        notes.extend(_shortened(axis, trigger))
+    rejected = [
+        Rejection(name=cut.name, reason=_incomplete(cut.piece, axis))
+        for cut in cuts
+        if not covers(cut.piece, axis)
+    ]
+    strokes = [
+        MeasuredStroke(
+            name=cut.name, values=_zeroed(axis, onto_axis(cut.piece, axis), zero), start=instant
+        )
+        for cut in cuts
+        if covers(cut.piece, axis)
+        for instant in (cut.piece.instant,)
+    ]
+    if strokes and all("lift" in stroke.values for stroke in strokes):
+        reasons = find_outliers(axis, np.array([stroke.values["lift"] for stroke in strokes]))
+        rejected.extend(
+            Rejection(name=strokes[k].name, reason=reason) for k, reason in sorted(reasons.items())
+        )
+        strokes = [stroke for k, stroke in enumerate(strokes) if k not in reasons]
+    if not strokes:
+        raise InputError(
+            source,
+            got=f"{len(rejected)} strokes, none of which can be used "
+            f"({rejected[0].name}: {rejected[0].reason})",
+            expected="at least one whole stroke",
+            hint="check the trigger, and how long was recorded.",
+        )
+    return StrokeSet(
+        source=source,
+        time=axis,
+        strokes=tuple(strokes),
+        rejected=tuple(rejected),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _zeroed(
+    axis: NDArray[np.float64], values: Mapping[str, NDArray[np.float64]], zero: bool
+) -> Mapping[str, NDArray[np.float64]]:
+    """Lift from the closed valve, where there is time before the trigger."""
+    before = axis < 0.0
+    if not zero or "lift" not in values or not before.any():
+        return values
+    lift = values["lift"]
+    return {**values, "lift": lift - float(np.median(lift[before]))}
+
+
+def _incomplete(piece: Piece, axis: NDArray[np.float64]) -> str:
+    return (
+        f"incomplete: recorded from {1e3 * piece.start:.3g} ms to {1e3 * piece.end:.3g} ms around "
+        f"its trigger, needed {1e3 * axis[0]:.3g} ms to {1e3 * axis[-1]:.3g} ms"
+    )
+
+
+def _shortened(axis: NDArray[np.float64], trigger: Trigger) -> Iterator[str]:
+    step = float(axis[1] - axis[0])
+    if axis[0] > -trigger.before + 2.0 * step or axis[-1] < trigger.after - 2.0 * step:
+        yield (
+            f"Recorded around the trigger is {1e3 * axis[0]:.4g} ms to {1e3 * axis[-1]:.4g} ms, "
+            f"less than the {-1e3 * trigger.before:.4g} ms to {1e3 * trigger.after:.4g} ms asked "
+            "for."
+        )
