@@ -205,13 +205,13 @@ def _sampled(
     kept = area > _NO_AREA * float(np.max(np.ptp(body.mesh.points, axis=0))) ** 2
     connectivity, area = block.connectivity[kept], area[kept]
     weights, normal = at.area[kept], at.normal[kept]
-    f, q, _ = normal.shape
-    along = np.einsum("qn,fqd->fqnd", at.values, normal).reshape(f, q, -1)
-    moved = along @ fields[connectivity].reshape(f, normal.shape[2] * len(at.values[0]), -1)
+    f, q, d = normal.shape
+    along = np.einsum("qn,fqd->fqnd", at.values, normal).reshape(f, q, d * at.values.shape[1])
+    moved = along @ fields[connectivity].reshape(f, along.shape[2], fields.shape[2])
     mean = np.einsum("fq,fqb->fb", weights, moved) / area[:, None]
     corners = connectivity[:, : FAMILIES[block.family].corners]
     part = _Part(corners=corners, area=area, mean=mean)
-    return part, moved.reshape(f * q, -1), weights.ravel()
+    return part, moved.reshape(f * q, fields.shape[2]), weights.ravel()
 
 
 def _faces(

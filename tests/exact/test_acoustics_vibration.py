@@ -1,0 +1,269 @@
+"""Vibration, mounts, plates and radiation against closed formulas and small exact systems."""
+
+import numpy as np
+import pytest
+
+from klack.acoustics.air import Air
+from klack.acoustics.force_response import modal_response, surface_velocity
+from klack.acoustics.harmonic import harmonic_response
+from klack.acoustics.mobility import drive_point_mobility, support_force_transfer
+from klack.acoustics.mount import Mount, mounted
+from klack.acoustics.plate import Plate, baffled_plate_efficiency
+from klack.acoustics.radiation import piston_efficiency, power_transfer
+from klack.materials import Material
+from klack.signals import TimeSeries
+from klack.verification import vibration
+from klack.verification.vibration import STEEL, oscillator, rod_structure
+
+MASS, STIFFNESS, BASE = 0.3, 4e6, 0.9  # [kg], [N/m], [kg]
+AIR = Air()
+
+
+def test_every_check_of_the_group_passes() -> None:
+    checks = vibration.checks()
+
+    assert len(checks) >= 20
+    assert [check.name for check in checks if not check.passed] == []
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1, 1.5])
+def test_a_step_of_force_on_one_mode(damping: float) -> None:
+    """From rest to F: displacement of an oscillator in closed form."""
+    body = oscillator(mass=MASS, stiffness=STIFFNESS, base=BASE, damping=damping)
+    h, n = 1e-6, 4000
+    values = np.full(n, 50.0)
+    values[0] = 0.0  # it has acted for ever
+    run = modal_response(body, {"mass": series(h, values)}, sample=10 * h)
+
+    t, w = run.sample_time - h, body.omega[0]
+    root = np.sqrt(complex(1 - damping**2)) * w
+    swing = np.cos(root * t) + damping * w * np.sin(root * t) / root
+    exact = 50.0 / STIFFNESS * (1 - (np.exp(-damping * w * t) * swing).real)
+    shown = t >= 0
+    moved = run.modal_displacement[:, 0] / np.sqrt(MASS)
+    assert moved[shown] == pytest.approx(exact[shown], rel=1e-9, abs=1e-9 * 50 / STIFFNESS)
+    speed = surface_velocity(body, run)[:, 0]  # float32 shapes
+    assert speed == pytest.approx(run.modal_velocity[:, 0] / np.sqrt(MASS), rel=1e-6)
+
+
+def test_a_force_that_has_always_acted_moves_nothing() -> None:
+    body = rod_structure(modes=6, damping=0.01)
+
+    run = modal_response(body, {"tip": series(1e-7, np.full(500, 80.0))})
+
+    assert run.stored == pytest.approx(np.full(501, run.energy_before), rel=1e-12)
+    assert abs(run.injected_energy) < 1e-12 * run.energy_before
+    assert run.blocked_force.values == pytest.approx(np.full(500, 80.0), rel=1e-9)
+    assert run.vibration_energy < 1e-20 * run.energy_before
+
+
+@pytest.mark.parametrize("below", ["mount", "plate", "both"])
+def test_two_masses_are_solved_exactly(below: str) -> None:
+    """Mobility of an oscillator on a spring with losses and on a plate, from its 2 x 2 system."""
+    plate = Plate(thickness=2e-3, area=1.0, material=STEEL) if below != "mount" else None
+    mount = Mount(stiffness=2e6, loss_factor=0.1) if below != "plate" else None
+    zeta = 0.03
+    body = oscillator(mass=MASS, stiffness=STIFFNESS, base=BASE, damping=zeta)
+    f = np.geomspace(10.0, 5e3, 40)
+
+    computed = drive_point_mobility(body, "mass", f, mount=mount, plate=plate)
+    carried = support_force_transfer(body, "mass", f, mount=mount, plate=plate)
+
+    dashpot = 2 * zeta * np.sqrt(STIFFNESS * MASS)
+    for at, y, share in zip(f, computed, carried, strict=True):
+        w = 2 * np.pi * at
+        spring = STIFFNESS + 1j * w * dashpot
+        soft = 1j * w / (2e6 * (1 + 0.1j)) if mount else 0.0
+        support = 1j * w / (soft + (plate.mobility if plate else 0.0))  # dynamic stiffness
+        K = np.array([[spring - w**2 * MASS, -spring], [-spring, spring + support - w**2 * BASE]])
+        u = np.linalg.solve(K, [1.0, 0.0])
+        assert y == pytest.approx(1j * w * u[0], rel=1e-9)
+        assert share == pytest.approx(support * u[1], rel=1e-9)
+
+
+def test_new_modes_on_a_mount_answer_like_the_old_ones() -> None:
+    body = rod_structure(modes=8)
+    mount = Mount(stiffness=3e5, loss_factor=0.0)
+    moved, f = mounted(body, mount), np.geomspace(100.0, 2.3e5, 50)
+
+    for port in body.port_names:
+        old = drive_point_mobility(body, port, f, mount=mount)
+        new = drive_point_mobility(moved, port, f)
+        assert new == pytest.approx(old, rel=1e-7)
+    old_power = power_transfer(body, f, "tip", mount=mount).values
+    new_power = power_transfer(moved, f, "tip").values
+    assert new_power == pytest.approx(old_power, rel=1e-6)
+    old_force = support_force_transfer(body, "tip", f, mount=mount)
+    assert support_force_transfer(moved, "tip", f) == pytest.approx(old_force, rel=1e-7)
+    assert np.sum(moved.participation**2) == pytest.approx(body.mass, rel=1e-12)
+    assert moved.residual_compliance == pytest.approx(body.residual_compliance, rel=1e-6)
+
+
+def test_losses_of_mount_and_body_are_shared_by_energy() -> None:
+    """Decay of the 2 x 2 system from its complex eigenvalues; small losses."""
+    zeta, eta, below = 2e-3, 5e-3, 2e6
+    body = oscillator(mass=MASS, stiffness=STIFFNESS, base=BASE, damping=zeta)
+
+    moved = mounted(body, Mount(stiffness=below, loss_factor=eta))
+
+    for w, damping in zip(moved.omega, moved.damping, strict=True):
+        spring = STIFFNESS + 1j * w * 2 * zeta * np.sqrt(STIFFNESS * MASS)
+        K = np.array([[spring, -spring], [-spring, spring + below * (1 + 1j * eta)]])
+        roots = np.sqrt(np.linalg.eigvals(K / np.array([[MASS], [BASE]])))
+        root = roots[np.argmin(np.abs(roots - w))]
+        assert damping == pytest.approx(root.imag / root.real, rel=1e-3)
+
+
+def test_a_free_body_takes_all_momentum() -> None:
+    """Soft mount: m v of the lowest mode is the impulse of the force."""
+    moved = mounted(rod_structure(modes=8), Mount(stiffness=1e-2, loss_factor=0.0))
+    h = 20e-9
+    values = 30.0 * np.sin(np.pi * np.linspace(0, 1, 400)) ** 2
+
+    run = modal_response(moved, {"tip": series(h, values)}, sample=h)
+
+    speed = moved.participation @ run.modal_velocity[-1] / moved.mass
+    assert speed == pytest.approx(h * values.sum() / moved.mass, rel=1e-6)
+
+
+@pytest.mark.parametrize(("thickness", "impedance"), [(1e-3, 98.29), (2e-3, 393.2)])
+def test_impedance_of_a_steel_plate(thickness: float, impedance: float) -> None:
+    """8 sqrt(D m'') = 2.3 rho c_p h^2 with the plate speed c_p, as the handbooks write it."""
+    plate = Plate(thickness=thickness, area=1.0, material=STEEL)
+    speed = np.sqrt(STEEL.plane_strain_modulus / STEEL.density)
+
+    assert 1 / plate.mobility == pytest.approx(impedance, rel=1e-4)
+    handbook = 4 / np.sqrt(3) * STEEL.density * speed * thickness**2  # 2.309
+    assert 1 / plate.mobility == pytest.approx(handbook, rel=1e-12)
+
+
+def test_a_finite_plate_has_that_mobility_on_average() -> None:
+    """Modes of a simply supported plate, averaged over frequency and over places inside."""
+    plate = Plate(thickness=1e-3, area=0.5 * 0.41, material=STEEL)
+    a, b, eta = 0.5, 0.41, 0.02
+    m, n = np.meshgrid(np.arange(1, 80), np.arange(1, 70), indexing="ij")
+    root = np.sqrt(plate.bending_stiffness / plate.mass_per_area)
+    squares = (root * ((m * np.pi / a) ** 2 + (n * np.pi / b) ** 2)) ** 2 * (1 + 1j * eta)
+    omega = 2 * np.pi * np.linspace(2e3, 6e3, 400)
+    total = []
+    for x, y in np.random.default_rng(1).uniform(0.25, 0.75, (12, 2)):
+        shape = 4 * (np.sin(m * np.pi * x) * np.sin(n * np.pi * y)) ** 2
+        shape = shape / (plate.mass_per_area * a * b)
+        total.append([np.sum(1j * w * shape / (squares - w**2)).real for w in omega])
+
+    # 12 places and about 100 modes: 1 to 2 % are left to chance
+    assert np.mean(total) == pytest.approx(plate.mobility, rel=0.03)
+
+
+def test_radiation_efficiency_of_a_plate_against_the_integral_over_its_modes() -> None:
+    """Wallace's far-field integral, averaged over the modes of a band; within 3 dB of Maidanik."""
+    plate = Plate(thickness=2e-3, area=0.64, material=STEEL)
+    side, c, fc = 0.8, AIR.sound_speed, plate.coincidence(AIR)
+    root = np.sqrt(plate.bending_stiffness / plate.mass_per_area)
+    m, n = np.meshgrid(np.arange(1, 60), np.arange(1, 60), indexing="ij")
+    f = root * np.pi / 2 * (m**2 + n**2) / side**2
+    for middle in (0.12 * fc, 0.3 * fc, 0.6 * fc):
+        inside = (f > middle / 1.12) & (f < middle * 1.12)
+        assert inside.sum() > 15
+        modes = zip(m[inside], n[inside], f[inside], strict=True)
+        exact = np.mean([wallace(i, j, at, side, c) for i, j, at in modes])
+        estimate = baffled_plate_efficiency(np.array([middle]), fc, area=0.64, sound_speed=c)[0]
+        assert abs(10 * np.log10(estimate / exact)) < 3.0
+
+
+def wallace(m: int, n: int, f: float, side: float, c: float) -> float:
+    """Radiation efficiency of one mode of a square plate, by far-field intensity."""
+    k = 2 * np.pi * f / c
+    x, wx = np.polynomial.legendre.leggauss(64)
+    theta, phi = np.pi / 4 * (x + 1), np.pi / 4 * (x + 1)
+    T, P = np.meshgrid(theta, phi, indexing="ij")
+    alpha = k * side * np.sin(T) * np.cos(P)
+    beta = k * side * np.sin(T) * np.sin(P)
+    top = (np.cos if m % 2 else np.sin)(alpha / 2) * (np.cos if n % 2 else np.sin)(beta / 2)
+    bottom = ((alpha / (m * np.pi)) ** 2 - 1) * ((beta / (n * np.pi)) ** 2 - 1)
+    integrand = (top / bottom) ** 2 * np.sin(T)
+    integral = float(np.sum(np.outer(wx, wx) * integrand) * (np.pi / 4) ** 2)
+    return 64 * (k * side) ** 2 / (np.pi**6 * m**2 * n**2) * integral
+
+
+def test_limits_of_the_radiation_of_a_plate() -> None:
+    plate = Plate(thickness=1e-3, area=0.5, material=STEEL, loss_factor=0.02)
+    fc = plate.coincidence(AIR)
+    f = np.array([0.1, 30.0 * fc])
+
+    sigma = plate.efficiency(f, AIR)
+    share = plate.radiated_share(f[1:], AIR)
+
+    assert sigma[0] == pytest.approx(4 * 0.5 * (0.1 / AIR.sound_speed) ** 2, rel=1e-12)
+    assert sigma[1] == pytest.approx(1 / np.sqrt(1 - 1 / 30), rel=1e-12)
+    lost = 2 * AIR.impedance * sigma[1] / (2 * np.pi * f[1] * 7.85)
+    assert share == pytest.approx([lost / (lost + 0.02)], rel=1e-12)
+
+
+def test_all_power_of_a_lossless_valve_goes_into_the_plate() -> None:
+    plate = Plate(thickness=1.5e-3, area=0.5, material=STEEL)
+    body = rod_structure(modes=8)
+    f = np.geomspace(100.0, 2e5, 60)
+
+    taken = drive_point_mobility(body, "tip", f, plate=plate).real
+    force = support_force_transfer(body, "tip", f, plate=plate)
+
+    assert taken == pytest.approx(plate.mobility * np.abs(force) ** 2, rel=1e-7)
+
+
+def test_a_plate_adds_its_share_to_the_radiated_power() -> None:
+    plate = Plate(thickness=1.5e-3, area=0.5, material=STEEL)
+    body, f = rod_structure(modes=8, damping=0.01), np.geomspace(100.0, 2e5, 20)
+
+    power = power_transfer(body, f, "tip", plate=plate)
+
+    force = np.abs(support_force_transfer(body, "tip", f, plate=plate)) ** 2
+    assert power.names == ("bottom", "outer", "plate")
+    expected = plate.mobility * force * plate.radiated_share(f, AIR)
+    assert power.group("plate") == pytest.approx(expected, rel=1e-12)
+    assert power.total == pytest.approx(power.values.sum(axis=0), rel=1e-12)
+
+
+def test_radiated_power_from_velocities_face_by_face() -> None:
+    """Rho c sum of v^2 A over small faces, against the Gram matrices; the rod's side moves little.
+
+    With Poisson's ratio 0 the side has no normal motion, so the end face alone radiates.
+    """
+    body = rod_structure(modes=8, damping=0.01)
+    f = np.geomspace(1e3, 2e5, 30)
+    answer = harmonic_response(body, f, "tip")
+
+    power = power_transfer(body, f, "tip", efficiency="unity")
+
+    shapes = np.hstack([body.face_shapes, body.face_residual, body.axial_normals[:, None]])
+    v = answer.fields @ shapes.T.astype(float)
+    exact = AIR.impedance * np.abs(v) ** 2 @ body.face_area
+    assert power.total == pytest.approx(exact, rel=1e-5)  # single precision
+    piston = power_transfer(body, f, "tip", efficiency="piston")
+    sigma = piston_efficiency(f, body.area, AIR.sound_speed)
+    assert piston.total == pytest.approx(sigma * power.total, rel=1e-12)
+
+
+def test_a_mounted_sphere_of_the_oscillator_radiates_what_it_should() -> None:
+    """Rigid oscillation of a face of 1 cm^2: rho c A v^2 with v = 1 / (omega M)."""
+    body = oscillator(mass=MASS, stiffness=1e12, base=BASE)
+    f = np.array([300.0])
+
+    power = power_transfer(
+        body, f, "mass", mount=Mount(stiffness=1e-3, loss_factor=0.0), efficiency="unity"
+    )
+
+    v = 1 / (2 * np.pi * 300.0 * (MASS + BASE))
+    assert power.total == pytest.approx([AIR.impedance * 1e-4 * v**2], rel=1e-4)  # stiffness
+
+
+def test_material_of_a_plate() -> None:
+    aluminium = Material(name="aluminium", young=70e9, poisson=0.33, density=2700.0)
+    plate = Plate(thickness=3e-3, area=0.2, material=aluminium)
+
+    assert plate.bending_stiffness == pytest.approx(70e9 * 27e-9 / 12 / (1 - 0.33**2), rel=1e-12)
+    assert plate.mass_per_area == pytest.approx(8.1, rel=1e-12)
+
+
+def series(step: float, values: np.ndarray) -> TimeSeries:
+    return TimeSeries(step=step, values=values, unit="N", start=0.5 * step)
