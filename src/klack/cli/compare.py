@@ -1,6 +1,7 @@
-"""``klack compare``: a stored result beside that of another program."""
+"""``klack compare``: a stored result beside that of another program, or beside a measurement."""
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,41 +9,278 @@ from cyclopts import Parameter
 
 from klack.cli.options import Json, Quiet
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.cli.progress import show_progress
+from klack.cli.reports import REPORTS, write_result
 from klack.cli.tables import print_table
+from klack.errors import InputError
 
 if TYPE_CHECKING:
+    from klack.case.measurement import CaseMeasurement
     from klack.workflow.compare import Comparison
+    from klack.workflow.measured_shots_study import MeasuredShotsStudy
+    from klack.workflow.measured_study import MeasuredStrokeStudy
 
 __all__ = ["compare"]
 
 _PICTURE = "calculix.svg"
+_MEASURED = "measured"
+
+_Case = Annotated[
+    Path | None,
+    Parameter(
+        name="--case",
+        help="Case file (or shipped case) whose section 'measurement' is used. [default: that of "
+        "the result]",
+    ),
+]
 
 
 def compare(
-    result: Annotated[Path, Parameter(name="RESULT", help="Folder that klack impact wrote.")],
+    result: Annotated[
+        Path, Parameter(name="RESULT", help="Folder that klack impact, stroke or shots wrote.")
+    ],
     /,
     *,
+    measurement: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--measurement",
+            consume_multiple=True,
+            negative="",
+            help="Recording of the valve, for results of klack stroke and shots; several files "
+            "make one set. VARIANT=FILE for another variant than the first: dry=FILE.",
+        ),
+    ] = None,
+    case: _Case = None,
     calculix: Annotated[
-        Path,
+        Path | None,
         Parameter(
             name="--calculix",
-            help="NAME.dat of a run of CalculiX on the deck of klack export; NAME.sta and NAME.log "
-            "beside it tell iterations and time.",
+            help="NAME.dat of a run of CalculiX on the deck of klack export, for results of klack "
+            "impact; NAME.sta and NAME.log beside it tell iterations and time.",
         ),
-    ],
+    ] = None,
     level: Annotated[
-        str, Parameter(name="--level", help="Level of the result that is compared.")
+        str, Parameter(name="--level", help="Level of an impact that is compared.")
     ] = "full",
+    report: Annotated[
+        bool, Parameter(help="Write report.html and report.pdf beside a measurement.")
+    ] = True,
     out: Annotated[
-        Path | None, Parameter(name="--out", help="Folder for the picture. [default: RESULT]")
+        Path | None,
+        Parameter(
+            name="--out",
+            help="Folder for what is written. [default: RESULT, or RESULT/measured for a "
+            "measurement]",
+        ),
     ] = None,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
-    """Compare a result with that of CalculiX: force history, energy balance, wall time."""
+    """Compare a result with a measurement, or with CalculiX: curves, numbers, residuals."""
     require_json_target(json)
-    folder = out if out is not None else result
+    if (calculix is None) == (not measurement):
+        raise InputError(
+            "klack compare",
+            got="neither --measurement nor --calculix" if calculix is None else "both of them",
+            expected="one: a measurement, or a run of CalculiX",
+            hint="klack compare RESULT --measurement strokes.csv.",
+        )
+    if calculix is not None:
+        folder = out if out is not None else result
+        _with_calculix(result, calculix, level, folder, json, quiet)
+        return 0
+    folder = out if out is not None else result / _MEASURED
+    _with_measurement(result, measurement or [], case, folder, report, json, quiet)
+    return 0
 
+
+# --------------------------------------------------------------------------- measurement
+
+
+def _with_measurement(
+    result: Path,
+    given: Sequence[str],
+    case: Path | None,
+    folder: Path,
+    report: bool,
+    json: Path | None,
+    quiet: bool,
+) -> None:
+    from klack.workflow.record_store import stored_format
+    from klack.workflow.shots_store import SHOTS_FORMAT
+    from klack.workflow.stroke_store import STROKE_FORMAT
+
+    kind = stored_format(result)
+    if kind not in (STROKE_FORMAT.name, SHOTS_FORMAT.name):
+        raise InputError(
+            f"result {result}",
+            got=f"a result of another kind ({kind})",
+            expected="one of klack stroke or klack shots",
+            hint="run `klack stroke CASE` for strokes, `klack shots CASE` for drops.",
+        )
+    require_folder(folder)
+    if kind == STROKE_FORMAT.name:
+        _strokes(result, given, case, folder, report, json, quiet)
+    else:
+        _drops(result, given, case, folder, report, json, quiet)
+
+
+def _strokes(
+    result: Path,
+    given: Sequence[str],
+    case: Path | None,
+    folder: Path,
+    report: bool,
+    json: Path | None,
+    quiet: bool,
+) -> None:
+    from klack.workflow.measured_store import save_measured_strokes
+    from klack.workflow.measured_strokes import compare_strokes
+    from klack.workflow.measured_summary import measured_to_json
+    from klack.workflow.stroke_store import load_stroke
+
+    study = load_stroke(result)
+    files = _files(given, study.reference.name)
+    section, text = _section(study.case_text, result, case)
+    with show_progress(quiet) as progress:
+        compared = compare_strokes(study, files, section, case_text=text, progress=progress)
+        failure = write_result(
+            compared, folder, save_measured_strokes, report=report, progress=progress
+        )
+    if not quiet:
+        _print_strokes(compared, to_stderr=str(json) == "-")
+        _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
+    if json is not None:
+        write_json(json, measured_to_json(compared))
+    if failure:
+        raise failure
+
+
+def _drops(
+    result: Path,
+    given: Sequence[str],
+    case: Path | None,
+    folder: Path,
+    report: bool,
+    json: Path | None,
+    quiet: bool,
+) -> None:
+    from klack.workflow.measured_shots import compare_shots
+    from klack.workflow.measured_shots_summary import measured_shots_to_json
+    from klack.workflow.measured_store import save_measured_shots
+    from klack.workflow.shots_store import load_shots
+
+    study = load_shots(result)
+    paths = [path for paths in _files(given, "dry").values() for path in paths]
+    section, text = _section(study.case_text, result, case)
+    with show_progress(quiet) as progress:
+        compared = compare_shots(study, paths, section, case_text=text, progress=progress)
+        failure = write_result(
+            compared, folder, save_measured_shots, report=report, progress=progress
+        )
+    if not quiet:
+        _print_drops(compared, to_stderr=str(json) == "-")
+        _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
+    if json is not None:
+        write_json(json, measured_shots_to_json(compared))
+    if failure:
+        raise failure
+
+
+def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
+    """Files by variant; all of them must be there."""
+    from klack.case.valve import VARIANTS
+
+    files: dict[str, list[Path]] = {}
+    for text in given:
+        variant, sign, name = text.partition("=")
+        if not sign or variant not in VARIANTS:
+            variant, name = usual, text
+        path = Path(name)
+        if not path.is_file():
+            raise InputError(
+                f"--measurement {text}",
+                got="a folder" if path.is_dir() else "no such file",
+                expected="a recording, as FILE or VARIANT=FILE",
+                hint=f"variants are {', '.join(VARIANTS)}; check spelling and folder.",
+            )
+        files.setdefault(variant, []).append(path)
+    return files
+
+
+def _section(
+    text: str, result: Path, case: Path | None
+) -> "tuple[CaseMeasurement | None, str | None]":
+    """Section ``measurement`` of the result, or of another case with its text."""
+    from klack.case.shipped import find_case
+    from klack.case.valve_reader import load_any_case, read_any_case
+
+    if case is None:
+        return read_any_case(text, result / "case.yaml").measurement, None
+    other = load_any_case(find_case(case))
+    return other.measurement, other.source
+
+
+def _print_strokes(study: "MeasuredStrokeStudy", *, to_stderr: bool) -> None:
+    from klack.workflow.measured_summary import (
+        CURVE_COLUMNS,
+        IMPACT_COLUMNS,
+        curve_rows,
+        impact_rows,
+        rule,
+        verdict,
+    )
+
+    stream = sys.stderr if to_stderr else sys.stdout
+    for variant in study.variants.values():
+        aside = f", {len(variant.rejected)} put aside" if variant.rejected else ""
+        title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
+        print_table(title, CURVE_COLUMNS, curve_rows(variant), to_stderr=to_stderr)
+        rows = impact_rows(variant)
+        print_table("Impacts", IMPACT_COLUMNS, rows, left=2, to_stderr=to_stderr)
+        for item in variant.rejected:
+            print(f"Put aside: {item.name}: {item.reason}", file=stream)
+        for note in variant.notes:
+            print(f"Note: {note}", file=stream)
+    for variant in study.variants.values():
+        print(verdict(study, variant), file=stream)
+    print(rule(study), file=stream)
+    for warning in study.warnings:
+        print(f"Note: {warning}", file=stream)
+
+
+def _print_drops(study: "MeasuredShotsStudy", *, to_stderr: bool) -> None:
+    from klack.workflow.measured_shots_summary import (
+        DROP_COLUMNS,
+        bias_sentence,
+        drop_rows,
+        drop_rule,
+        drop_verdict,
+    )
+
+    stream = sys.stderr if to_stderr else sys.stdout
+    title = f"{study.title}: beside {len(study.names)} measured drops"
+    print_table(title, DROP_COLUMNS, drop_rows(study), left=2, to_stderr=to_stderr)
+    for item in study.rejected:
+        print(f"Put aside: {item.name}: {item.reason}", file=stream)
+    for line in (drop_verdict(study), bias_sentence(study), drop_rule(study)):
+        print(line, file=stream)
+    for note in (*study.notes, *study.warnings):
+        print(f"Note: {note}", file=stream)
+
+
+def _print_folder(folder: Path, report: bool, *, to_stderr: bool) -> None:
+    made = ["result.zarr", *(REPORTS if report else ())]
+    print(f"Results in {folder}: {', '.join(made)}", file=sys.stderr if to_stderr else sys.stdout)
+
+
+# --------------------------------------------------------------------------- CalculiX
+
+
+def _with_calculix(
+    result: Path, calculix: Path, level: str, folder: Path, json: Path | None, quiet: bool
+) -> None:
     from klack.exchange.calculix_result import other_run, read_calculix
     from klack.report.figures import force_chart
     from klack.report.printed import svg_chart
@@ -60,7 +298,6 @@ def compare(
         _print(comparison, study.title, folder / _PICTURE, to_stderr=str(json) == "-")
     if json is not None:
         write_json(json, comparison_to_json(comparison))
-    return 0
 
 
 def _print(comparison: "Comparison", title: str, picture: Path, *, to_stderr: bool) -> None:

@@ -41,6 +41,12 @@ def report(
 
 def _load(result: Path) -> "Study":
     """Read whichever kind of study the store holds."""
+    from klack.workflow.measured_store import (
+        MEASURED_SHOTS_FORMAT,
+        MEASURED_STROKES_FORMAT,
+        load_measured_shots,
+        load_measured_strokes,
+    )
     from klack.workflow.noise_store import NOISE_FORMAT, load_noise
     from klack.workflow.record_store import stored_format
     from klack.workflow.shots_store import SHOTS_FORMAT, load_shots
@@ -50,6 +56,10 @@ def _load(result: Path) -> "Study":
     name = stored_format(result)
     if name == STROKE_FORMAT.name:
         return load_stroke(result)
+    if name == MEASURED_STROKES_FORMAT.name:
+        return load_measured_strokes(result)
+    if name == MEASURED_SHOTS_FORMAT.name:
+        return load_measured_shots(result)
     if name == NOISE_FORMAT.name:
         return load_noise(result)
     return load_shots(result) if name == SHOTS_FORMAT.name else load_study(result)

@@ -1,9 +1,12 @@
 """The content of a report of any kind of study."""
 
 from klack.report.content import Content, report_content
+from klack.report.measured_content import measured_shots_content, measured_strokes_content
 from klack.report.noise_content import noise_content
 from klack.report.shots_content import shots_content
 from klack.report.stroke_content import stroke_content
+from klack.workflow.measured_shots_study import MeasuredShotsStudy
+from klack.workflow.measured_study import MeasuredStrokeStudy
 from klack.workflow.noise_study import NoiseStudy
 from klack.workflow.shots_study import ShotsStudy
 from klack.workflow.stroke_study import StrokeStudy
@@ -11,7 +14,9 @@ from klack.workflow.study import ImpactStudy
 
 __all__ = ["Study", "study_content"]
 
-Study = ImpactStudy | StrokeStudy | ShotsStudy | NoiseStudy
+Study = (
+    ImpactStudy | StrokeStudy | ShotsStudy | MeasuredStrokeStudy | MeasuredShotsStudy | NoiseStudy
+)
 
 
 def study_content(study: Study) -> Content:
@@ -20,6 +25,10 @@ def study_content(study: Study) -> Content:
         return stroke_content(study)
     if isinstance(study, ShotsStudy):
         return shots_content(study)
+    if isinstance(study, MeasuredStrokeStudy):
+        return measured_strokes_content(study)
+    if isinstance(study, MeasuredShotsStudy):
+        return measured_shots_content(study)
     if isinstance(study, NoiseStudy):
         return noise_content(study)
     return report_content(study)

@@ -1,0 +1,350 @@
+r"""Computed strokes beside measured ones: the same trigger, the same sensor, the same readings.
+
+The computed lift is shown as the sensor would show it, counted from the same crossing of the same
+channel as the measured strokes, and put on their grid.  Velocity and impacts are read off both in
+the same way, so that what a differentiator or a fit takes away is taken from both.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from math import isfinite
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack import __version__
+from klack.case.measurement import CaseMeasurement
+from klack.errors import InputError
+from klack.measurement.computed_stroke import recorded_stroke, trigger_instant
+from klack.measurement.differentiation import velocity_of
+from klack.measurement.impacts import measure_stroke
+from klack.measurement.loading import load_stroke_set
+from klack.measurement.sensor import LiftSensor
+from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
+from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.trigger import Trigger
+from klack.units import format_si
+from klack.workflow.measured_study import (
+    IMPACT_MEASURES,
+    Compared,
+    ComparedImpact,
+    ComparedVariant,
+    MeasuredStrokeStudy,
+)
+from klack.workflow.progress import Progress, silent
+from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+
+__all__ = ["EXCELLENT", "FAIR", "compare_numbers", "compare_strokes", "sensor_words"]
+
+Floats = NDArray[np.float64]
+
+EXCELLENT, FAIR = 2.0, 5.0
+"""Differences over the scatter up to which an agreement is called so."""
+_NOTICED = 0.05
+"""Share of the fastest approach of a stroke below which an impact does not count."""
+_REACHED = 0.1
+"""Share of the way that may be missing where the needle has met the opening stop."""
+_BY_DRAWING = (
+    "The needle never rests on the opening stop in some strokes; there its level is that of the "
+    "seat plus the lift of the drawing."
+)
+_STOPS: tuple[Stop, ...] = ("opening", "seat")
+
+
+def compare_strokes(
+    study: StrokeStudy,
+    measurements: Mapping[str, Sequence[Path]],
+    section: CaseMeasurement | None,
+    *,
+    case_text: str | None = None,
+    progress: Progress = silent,
+) -> MeasuredStrokeStudy:
+    """Lay the variants of a stroke study beside their measured sets.
+
+    Parameters
+    ----------
+    study : StrokeStudy
+    measurements : mapping of variant to files
+        Of one set each.
+    section : CaseMeasurement or None
+        Channels, trigger and sensor; with None, channels are found by their names, each recording
+        is one stroke, and the sensor is perfect.
+    case_text : str, optional
+        The case that ``section`` stands in, if it is not that of the study.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        For a variant that the study does not hold, and for recordings that cannot be used.
+    """
+    begin = perf_counter()
+    used = CaseMeasurement() if section is None else section
+    clock = StageClock(progress)
+    variants = {}
+    with collected_warnings() as notes:
+        for name, paths in measurements.items():
+            variant = _variant(study, name)
+            clock(f"read {name}", 0.0)
+            strokes = load_stroke_set(paths, _needed(used), lambda _: None)
+            clock(f"compare {name}", 0.0)
+            variants[name] = _compare(study, variant, strokes, used)
+    return MeasuredStrokeStudy(
+        case=study.case,
+        title=study.title,
+        description=study.description,
+        case_text=study.case_text if case_text is None else case_text,
+        version=__version__,
+        versions={name: version(name) for name in LIBRARIES},
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        wall_time=perf_counter() - begin,
+        stage_times=clock.times(),
+        trigger=_trigger_words(used.trigger),
+        sensor=sensor_words(used.sensor),
+        zero=used.zero,
+        point=study.channels.lift.removesuffix(" displacement"),
+        variants=variants,
+        excellent=EXCELLENT,
+        fair=FAIR,
+        warnings=tuple(notes),
+    )
+
+
+def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
+    if name not in study.variants:
+        raise InputError(
+            f"--measurement {name}=...",
+            got=f"a result without the variant '{name}'",
+            expected=f"one of: {', '.join(study.variants)}",
+            hint=f"run `klack stroke {study.case} --variant {name}` first, or name another.",
+        )
+    return study.variants[name]
+
+
+def _needed(section: CaseMeasurement) -> CaseMeasurement:
+    """Only lift and the channel of the trigger: a dry bench records no pressure."""
+    roles = {"lift"} if section.trigger is None else {"lift", section.trigger.channel}
+    channels = {role: choice for role, choice in section.channels.items() if role in roles}
+    return section.model_copy(update={"channels": channels})
+
+
+# --------------------------------------------------------------------------- one variant
+
+
+def _compare(
+    study: StrokeStudy, variant: StrokeVariant, strokes: StrokeSet, section: CaseMeasurement
+) -> ComparedVariant:
+    time, computed = _computed_lift(study, variant, strokes.time, section)
+    lift = strokes.matrix("lift")[:, : time.size]
+    estimate = velocity_of(time, lift, bandwidth=section.velocity_bandwidth)
+    speed = velocity_of(time, computed, bandwidth=estimate.bandwidth)
+    low, median, high = _band(lift)
+    slow, middle, fast = _band(estimate.velocity)
+    sensor = section.sensor
+    if section.zero == "start":
+        sensor = sensor.model_copy(update={"offset": 0.0})
+    model, guessed = _read(time, computed, sensor, study.lift)
+    both = [_read(time, row, sensor, study.lift) for row in lift]
+    readings = [measures for measures, _ in both]
+    notes = strokes.notes
+    if guessed or any(by_drawing for _, by_drawing in both):
+        notes = (*notes, _BY_DRAWING)
+    return ComparedVariant(
+        variant=variant.name,
+        label=variant.label,
+        source=strokes.source,
+        count=strokes.count,
+        rejected=strokes.rejected,
+        notes=notes,
+        time=time,
+        lift=lift.astype(np.float32),
+        velocity=estimate.velocity.astype(np.float32),
+        lift_median=median,
+        lift_low=low,
+        lift_high=high,
+        velocity_median=middle,
+        velocity_low=slow,
+        velocity_high=fast,
+        computed_lift=computed,
+        computed_velocity=speed.velocity,
+        velocity_bandwidth=estimate.bandwidth,
+        velocity_noise=estimate.noise,
+        lift_rms=_rms(computed - median),
+        velocity_rms=_rms(speed.velocity - middle),
+        lift_scatter=_scatter(lift, median),
+        velocity_scatter=_scatter(estimate.velocity, middle),
+        way=compare_numbers(
+            model.lift, [item.lift for item in readings], [item.level_se for item in readings]
+        ),
+        impacts=_impacts(model, readings),
+    )
+
+
+def _read(
+    time: Floats, lift: Floats, sensor: LiftSensor, way: float
+) -> tuple[StrokeMeasures, bool]:
+    """Read a lift; True where the opening stop had to be put above the seat by the drawing."""
+    measures = measure_stroke(time, lift, sensor=sensor)
+    seat = measures.seat_level
+    if isfinite(measures.opening_level) or not isfinite(seat) or not isfinite(way):
+        return measures, False
+    if float(np.max(lift)) < seat + (1.0 - _REACHED) * way:
+        return measures, False  # a short stroke
+    return measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way), True
+
+
+def _computed_lift(
+    study: StrokeStudy, variant: StrokeVariant, time: Floats, section: CaseMeasurement
+) -> tuple[Floats, Floats]:
+    """Grid up to the end of the computation, and the computed lift on it, as the sensor shows it.
+
+    Before the start of the computation the valve rests.
+    """
+    result, trigger = variant.result, section.trigger
+    lift = result.channels[study.channels.lift].values
+    channels = {"lift": lift - lift[0]}
+    begin = 0.0
+    if trigger is not None:
+        triggering = channels.setdefault(trigger.channel, _of_role(study, variant, trigger.channel))
+        step = float(time[1] - time[0])
+        begin = trigger_instant(result.time, triggering, trigger, step)
+    grid = time[time <= result.time[-1] - begin]
+    shown = recorded_stroke(
+        result.time,
+        channels,
+        grid,
+        sensor=section.sensor,
+        trigger=trigger,
+        zeroed=section.zero == "start",
+    )
+    return grid, shown["lift"]
+
+
+def _of_role(study: StrokeStudy, variant: StrokeVariant, role: str) -> Floats:
+    """Computed channel that a measured one stands for, SI."""
+    names = {
+        "lift": (study.channels.lift,),
+        "velocity": (study.channels.lift_velocity,),
+        "current": study.channels.current,
+        "voltage": study.channels.voltage,
+        "force": study.channels.magnetic_force,
+        "pressure": study.channels.pressures,
+    }.get(role, ())
+    for name in names:
+        data = variant.channel(name)
+        if data is not None:
+            return data.values
+    raise InputError(
+        "measurement.trigger.channel",
+        got=f"'{role}', which the variant '{variant.name}' does not compute",
+        expected="a channel of the model: lift, velocity, current, voltage, pressure",
+        hint="trigger on lift: channel: lift, share: 20 %.",
+    )
+
+
+def _band(records: Floats) -> tuple[Floats, Floats, Floats]:
+    """5 %, median and 95 % of the strokes at every time."""
+    low, median, high = np.quantile(records, (0.05, 0.5, 0.95), axis=0)
+    return low, median, high
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _scatter(records: Floats, median: Floats) -> float:
+    return _rms(records - median) if len(records) > 1 else float("nan")
+
+
+# --------------------------------------------------------------------------- impacts
+
+
+def _impacts(
+    model: StrokeMeasures, readings: Sequence[StrokeMeasures]
+) -> tuple[ComparedImpact, ...]:
+    """Impacts of the model beside those of the same number on the same stop."""
+    found = []
+    for stop in _STOPS:
+        computed = _counted(model, stop)
+        measured = [_counted(item, stop) for item in readings]
+        for i, hit in enumerate(computed):
+            same = [hits[i] for hits in measured if len(hits) > i]
+            if 2 * len(same) < len(measured) or not same:
+                break
+            found.append(_impact(stop, i + 1, hit, same))
+    return tuple(sorted(found, key=lambda item: item.time.computed))
+
+
+def _counted(measures: StrokeMeasures, stop: Stop) -> tuple[MeasuredImpact, ...]:
+    """Impacts on a stop from the first one that is no trembling at rest."""
+    hits = measures.on(stop)
+    fastest = max((h.approach_speed for h in measures.impacts), default=0.0)
+    real = [i for i, hit in enumerate(hits) if hit.approach_speed > _NOTICED * fastest]
+    return hits[real[0] : real[-1] + 1] if real else ()
+
+
+def _impact(
+    stop: Stop, number: int, hit: MeasuredImpact, same: Sequence[MeasuredImpact]
+) -> ComparedImpact:
+    numbers = {
+        kind.field: compare_numbers(
+            getattr(hit, kind.field),
+            [getattr(other, kind.field) for other in same],
+            [getattr(other, _ERRORS[kind.field]) for other in same],
+        )
+        for kind in IMPACT_MEASURES
+    }
+    return ComparedImpact(stop=stop, number=number, **numbers)
+
+
+_ERRORS = {
+    "time": "time_se",
+    "approach_speed": "approach_se",
+    "restitution": "restitution_se",
+    "rebound_height": "rebound_height_se",
+}
+
+
+def compare_numbers(computed: float, values: Iterable[float], errors: Iterable[float]) -> Compared:
+    """A computed number beside the same number of several strokes; nan are left out."""
+    both = np.array([(v, e) for v, e in zip(values, errors, strict=True) if isfinite(v)])
+    if not both.size:
+        nan = float("nan")
+        return Compared(computed=computed, measured=nan, scatter=nan, error=nan, count=0)
+    known, error = both[:, 0], float(np.median(both[:, 1]))
+    return Compared(
+        computed=float(computed),
+        measured=float(np.median(known)),
+        scatter=float(np.std(known, ddof=1)) if known.size > 1 else error,
+        error=error,
+        count=int(known.size),
+    )
+
+
+# --------------------------------------------------------------------------- words
+
+
+def _trigger_words(trigger: Trigger | None) -> str:
+    if trigger is None:
+        return "none: each recording is one stroke from its first sample"
+    at = trigger.level or f"{100 * trigger.share_of_way:g} % of its way"
+    return f"{trigger.channel} {trigger.slope} through {at}"
+
+
+def sensor_words(sensor: LiftSensor) -> str:
+    """A lift sensor in one line."""
+    if sensor.bandwidth is None:
+        words = ["unlimited bandwidth"]
+    else:
+        words = [f"bandwidth {format_si(sensor.bandwidth, 'Hz')} (order {sensor.order})"]
+    if sensor.sensitivity != 1.0:
+        words.append(f"sensitivity {sensor.sensitivity:g}")
+    if sensor.offset != 0.0:
+        words.append(f"offset {format_si(sensor.offset, 'm')}")
+    if sensor.resolution > 0.0:
+        words.append(f"resolution {format_si(sensor.resolution, 'm')}")
+    return ", ".join(words)

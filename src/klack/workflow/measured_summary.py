@@ -1,0 +1,202 @@
+"""The few numbers of a comparison with a measurement that a script or a terminal wants."""
+
+from math import isfinite
+from typing import Any
+
+from klack.units import format_si
+from klack.workflow.measured_study import (
+    IMPACT_MEASURES,
+    Compared,
+    ComparedImpact,
+    ComparedVariant,
+    MeasuredStrokeStudy,
+    stop_words,
+)
+
+__all__ = [
+    "CURVE_COLUMNS",
+    "IMPACT_COLUMNS",
+    "RULE",
+    "agreement",
+    "curve_rows",
+    "impact_rows",
+    "measured_to_json",
+    "verdict",
+]
+
+CURVE_COLUMNS = ("over the whole record", "difference, rms", "scatter, rms", "over scatter")
+IMPACT_COLUMNS = (
+    "impact",
+    "number",
+    "computed",
+    "measured",
+    "scatter",
+    "reading error",
+    "strokes",
+    "difference",
+    "over scatter",
+)
+
+RULE = (
+    "Rule: the agreement is excellent if every number of the first impact on each stop lies within "
+    "{excellent:g} standard deviations of single strokes from the measured median, and the root "
+    "mean square differences of lift and velocity are at most {excellent:g} times those of single "
+    "strokes; fair up to {fair:g}."
+)
+_KEYS = {
+    "time": "time{}_s",
+    "approach_speed": "approach_speed{}_m_s",
+    "restitution": "restitution{}",
+    "rebound_height": "rebound_height{}_m",
+}
+
+
+def agreement(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
+    """``excellent``, ``fair``, ``none``, or ``unknown`` without any scatter."""
+    worst = variant.worst()[1]
+    if not isfinite(worst):
+        return "unknown"
+    if worst <= study.excellent:
+        return "excellent"
+    return "fair" if worst <= study.fair else "none"
+
+
+def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
+    """Say in one sentence whether a variant agrees with its measurement, and what is worst."""
+    words, worst = variant.worst()
+    found = agreement(study, variant)
+    strokes = f"{variant.count} measured stroke{'s' if variant.count != 1 else ''}"
+    if found == "unknown":
+        return (
+            f"'{variant.variant}' beside {strokes}: no scatter, no impact to compare; look at the "
+            "curves."
+        )
+    called = {"excellent": "Excellent agreement", "fair": "Fair agreement", "none": "No agreement"}
+    return (
+        f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference is "
+        f"{worst:.1f} times the scatter, in the {words}."
+    )
+
+
+def rule(study: MeasuredStrokeStudy) -> str:
+    """How the verdict is found."""
+    return RULE.format(excellent=study.excellent, fair=study.fair)
+
+
+def curve_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`CURVE_COLUMNS`: lift and velocity."""
+    return tuple(
+        (name, format_si(rms, unit, 3), _si(scatter, unit, 3), _text(rms / scatter, ".2f"))
+        for name, rms, scatter, unit in (
+            ("lift", variant.lift_rms, variant.lift_scatter, "m"),
+            ("velocity", variant.velocity_rms, variant.velocity_scatter, "m/s"),
+        )
+    )
+
+
+def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`IMPACT_COLUMNS`: the first ``most`` impacts on each stop."""
+    rows = []
+    for stop in ("opening", "seat"):
+        for impact in variant.impacts:
+            if impact.stop == stop and impact.number <= most:
+                rows += _impact_rows(impact)
+    if isfinite(variant.way.difference):
+        rows.append(("between the stops", "lift", *_cells(variant.way, "m")))
+    return tuple(rows)
+
+
+def _impact_rows(impact: ComparedImpact) -> list[tuple[str, ...]]:
+    heads = [f"{stop_words(impact.stop)} #{impact.number}", "", "", ""]
+    return [
+        (head, kind.name, *_cells(impact.measure(kind), kind.unit))
+        for head, kind in zip(heads, IMPACT_MEASURES, strict=True)
+    ]
+
+
+def _cells(number: Compared, unit: str) -> tuple[str, ...]:
+    return (
+        _si(number.computed, unit, 5),
+        _si(number.measured, unit, 5),
+        _si(number.scatter, unit, 2),
+        _si(number.error, unit, 2),
+        str(number.count),
+        _si(number.difference, unit, 3, sign=True),
+        _text(number.in_scatter, "+.1f"),
+    )
+
+
+def _si(value: float, unit: str, digits: int, *, sign: bool = False) -> str:
+    if not isfinite(value):
+        return "–"
+    plus = "+" if sign and value > 0.0 else ""
+    return plus + (format_si(value, unit, digits) if unit else f"{value:.4f}")
+
+
+def _text(value: float, form: str) -> str:
+    return f"{value:{form}}" if isfinite(value) else "–"
+
+
+# --------------------------------------------------------------------------- JSON
+
+
+def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        ``case``, ``variant`` (the first one) and its numbers: ``lift_rms_m``,
+        ``velocity_rms_m_s``, both with ``..._scatter_...``; ``impacts``: per impact each number
+        computed, ``_measured``, ``_scatter``, ``_reading_error`` and ``_difference_in_scatter``;
+        ``variants``: the same of all.  Numbers that do not exist (nan) are None.
+    """
+    variants = {name: _variant(study, variant) for name, variant in study.variants.items()}
+    first = next(iter(variants))
+    return {
+        "case": study.case,
+        "klack": study.version,
+        "variant": first,
+        **variants[first],
+        "variants": variants,
+        "rule": rule(study),
+    }
+
+
+def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> dict[str, Any]:
+    return {
+        "agreement": agreement(study, variant),
+        "verdict": verdict(study, variant),
+        "strokes": variant.count,
+        "rejected": [{"name": item.name, "reason": item.reason} for item in variant.rejected],
+        "lift_rms_m": _number(variant.lift_rms),
+        "lift_scatter_m": _number(variant.lift_scatter),
+        "velocity_rms_m_s": _number(variant.velocity_rms),
+        "velocity_scatter_m_s": _number(variant.velocity_scatter),
+        "velocity_bandwidth_Hz": _number(variant.velocity_bandwidth),
+        **_compared(variant.way, "lift{}_m"),
+        "impacts": [_impact(impact) for impact in variant.impacts],
+    }
+
+
+def _impact(impact: ComparedImpact) -> dict[str, Any]:
+    numbers: dict[str, Any] = {"stop": impact.stop, "number": impact.number}
+    for kind in IMPACT_MEASURES:
+        numbers |= _compared(impact.measure(kind), _KEYS[kind.field])
+    return numbers
+
+
+def _compared(number: Compared, key: str) -> dict[str, float | None]:
+    return {
+        key.format(""): _number(number.computed),
+        key.format("_measured"): _number(number.measured),
+        key.format("_scatter"): _number(number.scatter),
+        key.format("_reading_error"): _number(number.error),
+        key.format("_difference"): _number(number.difference),
+        key.split("{}")[0] + "_difference_in_scatter": _number(number.in_scatter),
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if isfinite(value) else None
