@@ -9,6 +9,7 @@ from scipy.integrate import quad
 
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.force_spectrum import averaged, force_spectrum
+from klack.acoustics.spectrum import force_spectrum as spectrum_up_to
 from klack.acoustics.third_octave import band_edges
 from klack.signals import TimeSeries
 from klack.simulation.network_result import (
@@ -35,6 +36,19 @@ def half_sine_magnitude(f: float) -> float:
     if abs(x - 1.0) < 1e-9:
         return 0.5 * PEAK * DURATION
     return 2.0 * PEAK * DURATION / np.pi * abs(np.cos(0.5 * np.pi * x) / (1.0 - x**2))
+
+
+@pytest.mark.parametrize("high", [30.0, 200.0, 5e3, 2e5])
+def test_a_short_pulse_keeps_its_impulse_at_any_highest_frequency(high):
+    """The record is then averaged over up to 208 us, longer than it is."""
+    pulse = half_sine(-STEP, DURATION + 2.0 * STEP)  # one step of rest on both sides
+
+    spectrum = spectrum_up_to(pulse, high=high, resolution=0.05 * high)
+
+    expected = np.array([half_sine_magnitude(f) for f in spectrum.frequency[1:]])
+    scale = 2.0 / np.pi * PEAK * DURATION
+    # averages over 1/160 of the shortest period fold a little back
+    np.testing.assert_allclose(np.abs(spectrum.values[1:]), expected, atol=2e-4 * scale)
 
 
 def test_a_pulse_has_its_closed_spectrum():

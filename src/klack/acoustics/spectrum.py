@@ -14,7 +14,6 @@ whose length is the caller's decision.
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.signal import zoom_fft
 
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError, require_positive
@@ -153,6 +152,8 @@ def change_spectrum(
     InputError
         Series too coarse for ``high``.
     """
+    from scipy.signal import zoom_fft  # takes a second to load, which other commands save
+
     require_positive("change_spectrum: high", high, "Hz")
     if series.step * high * _COARSE > 1.0 + 1e-9:
         raise InputError(
@@ -162,14 +163,14 @@ def change_spectrum(
             hint="record in finer steps, or ask for less.",
         )
     many = max(int(1.0 / (_FINE * high * series.step)), 1)
-    missing = -series.values.size % many
-    held = np.concatenate((series.values, np.full(missing, series.values[-1])))
+    # both ends are held for one mean more, which then has the value that holds outside
+    held = np.pad(series.values, (many, many + -series.values.size % many), mode="edge")
     step = many * series.step
     changes = np.diff(held.reshape(-1, many).mean(axis=1))
     if not np.any(changes):
         return np.zeros(count, dtype=complex)
     f = np.linspace(0.0, high, count)
-    first = series.start + step - 0.5 * series.step - origin  # time of the first change
+    first = series.start - 0.5 * series.step - origin  # time of the first change
     spectrum = zoom_fft(changes, (0.0, high), m=count, fs=1.0 / step, endpoint=True)
     whole: NDArray[np.complex128] = (
         spectrum * np.exp(-2j * np.pi * f * first) / np.sinc(f * step) ** 2
