@@ -94,7 +94,8 @@ def find_channels(
             choice = (channels or {})[role]
             series[role] = [_as_named(recording, role, choice, info) for info in named[role]]
         elif infos := _guess(recording, role, free, role in needed or role == "lift"):
-            series[role] = [_as_guessed(recording, role, info) for info in infos]
+            note = _guess_note(recording, role, infos)
+            series[role] = [_as_guessed(recording, role, info, note) for info in infos]
         elif role in needed:
             raise _not_found(recording, role)
     if not series:
@@ -153,10 +154,17 @@ def _as_named(
     )
 
 
-def _as_guessed(recording: Recording, role: Role, info: ChannelInfo) -> FoundChannel:
+def _guess_note(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -> str:
+    """One sentence for a whole series."""
+    first, last = infos[0], infos[-1]
+    which = f"'{first.name}'" if first is last else f"{len(infos)} channels, '{first.name}' to "
+    which += "" if first is last else f"'{last.name}'"
+    return f"{recording.path.name}: {which} [{first.unit}] taken as {role}."
+
+
+def _as_guessed(recording: Recording, role: Role, info: ChannelInfo, note: str) -> FoundChannel:
     where = f"{recording.path.name}: channel '{info.name}' ({role})"
     si = unit_factor(info.unit, role, where)
-    note = f"{recording.path.name}: '{info.name}' [{info.unit}] taken as {role}."
     return FoundChannel(
         name=info.name, unit=info.unit, factor=si.factor, offset=si.offset, note=note
     )

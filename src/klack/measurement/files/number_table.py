@@ -18,6 +18,7 @@ __all__ = ["NumberTable"]
 
 _KEPT = 32_000_000  # numbers kept in memory, 256 MB
 _BLOCK = 1_000_000  # numbers parsed at once
+_RECENT = 16  # blocks of a large table kept, 128 MB
 _CELL = 40  # bytes of a faulty cell shown
 
 
@@ -121,7 +122,7 @@ class NumberTable:
 
     def _block(self, k: int) -> NDArray[np.float64]:
         if k not in self._kept:
-            if self.rows * self._dialect.width >= _KEPT and len(self._kept) > 2:
+            if self.rows * self._dialect.width >= _KEPT and len(self._kept) >= _RECENT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[k], _ = self._parse(self._offsets[k])
         return self._kept[k]
