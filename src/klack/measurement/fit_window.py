@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FitWindow", "fit_windows", "sample_weights", "window_taper"]
+__all__ = ["FitWindow", "fit_windows", "sample_weights", "touch_shifts", "window_taper"]
 
 Vector = NDArray[np.float64]
 
@@ -19,6 +19,7 @@ _GUARD = 3.0
 """Standard deviations of the impact time that a window ends before it."""
 _LEAST_GUARD = 5e-6  # [s]
 _LEAD = 0.1e-3  # [s] of rest before the needle leaves the opening stop
+_APPROACH = 40e-6  # [s]
 _LEFT = 0.03
 """Share of the lift by which the needle has left its stop."""
 _TAPER = 20e-6  # [s]
@@ -46,47 +47,77 @@ class FitWindow:
 
 def fit_windows(
     time: Vector,
-    lift: Vector,
-    impacts: Mapping[str, Sequence[Sequence[float]]],
+    strokes: NDArray[np.float64],
+    impacts: Mapping[str, Sequence[float]],
     count: int = 1,
 ) -> tuple[FitWindow, ...]:
     """Windows up to the impact after the last one that is fitted, on each stop.
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
-    lift : array, shape (n,) [m]
-        Mean stroke.
-    impacts : mapping of "opening" and "seat" to impact times [s], stroke by stroke
+    time : array, shape (k,) [s]
+    strokes : array, shape (n, k) [m]
+        Lift.
+    impacts : mapping of "opening" and "seat" to impact times [s]
+        Of the mean stroke.
     count : int
         Impacts on each stop that are fitted.
     """
-    end = float(time[-1])
-    opening = _times(impacts.get("opening", ()))
-    seat = _times(impacts.get("seat", ()))
-    if opening:
-        seat = [item for item in seat if item[0] > opening[0][0]]
+    mean = strokes.mean(axis=0)
+    start, end = float(time[0]), float(time[-1])
+    opening = list(impacts.get("opening", ()))
+    # what noise of the resting needle looks like an impact is none
+    seat = [instant for instant in impacts.get("seat", ()) if not opening or instant > opening[0]]
     plural = "impact" if count == 1 else f"{count} impacts"
-    windows = []
-    if opening:
-        last = _before(opening, count, end if not seat else _release(time, lift, opening, seat))
-        windows.append(
-            FitWindow(first=float(time[0]), last=last, what=f"opening, {plural}, flight after it")
+
+    def flight_end(times: Sequence[float], otherwise: float) -> float:
+        if len(times) <= count:
+            return otherwise
+        scatter = float(np.std(touch_shifts(time, strokes, times[count])))
+        return times[count] - max(_GUARD * scatter, _LEAST_GUARD)
+
+    if not opening and not seat:
+        return (FitWindow(first=start, last=end, what="whole record"),)
+    if not opening:
+        return (
+            FitWindow(
+                first=start, last=flight_end(seat, end), what=f"stroke, {plural} on the seat"
+            ),
         )
-        if seat:
-            first = max(_release(time, lift, opening, seat), last)
-            last = _before(seat, count, end)
-            windows.append(
-                FitWindow(first=first, last=last, what=f"closing, {plural}, flight after it")
+    release = _release(time, mean, opening[0], seat[0]) if seat else end
+    last = flight_end(opening, release)
+    windows = [FitWindow(first=start, last=last, what=f"opening, {plural}, flight after it")]
+    if seat:
+        windows.append(
+            FitWindow(
+                first=max(release, last),
+                last=flight_end(seat, end),
+                what=f"closing, {plural}, flight after it",
             )
-    elif seat:
-        last = _before(seat, count, end)
-        windows.append(
-            FitWindow(first=float(time[0]), last=last, what=f"stroke, {plural} on the seat")
         )
-    else:
-        windows.append(FitWindow(first=float(time[0]), last=end, what="whole record"))
     return tuple(windows)
+
+
+def touch_shifts(time: Vector, strokes: NDArray[np.float64], instant: float) -> Vector:
+    r"""By how much each stroke meets a stop later than the mean stroke, shape (n,) [s].
+
+    .. math:: \delta t_s = -\frac{\int v\, (y_s - \bar y)\, dt}{\int v^2 dt}
+
+    over the 40 us before the mean touch, with the speed *v* of the mean stroke.
+
+    Parameters
+    ----------
+    time : array, shape (k,) [s]
+    strokes : array, shape (n, k) [m]
+    instant : float [s]
+        Touch of the mean stroke.
+    """
+    near = (time > instant - _APPROACH) & (time <= instant)
+    if near.sum() < 2:
+        return np.zeros(strokes.shape[0])
+    mean = strokes.mean(axis=0)
+    v = np.gradient(mean, time)[near]
+    return np.asarray(-((strokes - mean)[:, near] @ v) / max(float(v @ v), 1e-30))
 
 
 def window_taper(time: Vector, windows: Sequence[FitWindow]) -> Vector:
@@ -134,38 +165,11 @@ def sample_weights(strokes: NDArray[np.float64], step: float) -> Vector:
     return np.asarray(1.0 / (np.maximum(variance, noise**2) + floor**2))
 
 
-def _times(strokes: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
-    """Median time of every impact and its standard deviation, of those that most strokes have."""
-    result: list[tuple[float, float]] = []
-    longest = max((len(times) for times in strokes), default=0)
-    for k in range(longest):
-        found = np.array([times[k] for times in strokes if len(times) > k])
-        if 2 * found.size <= len(strokes):
-            break
-        centre = float(np.median(found))
-        spread = 1.4826 * float(np.median(np.abs(found - centre)))
-        result.append((centre, spread))
-    return result
-
-
-def _before(impacts: Sequence[tuple[float, float]], count: int, otherwise: float) -> float:
-    """End of the flight after the impact ``count``."""
-    if len(impacts) <= count:
-        return otherwise
-    time, spread = impacts[count]
-    return time - max(_GUARD * spread, _LEAST_GUARD)
-
-
-def _release(
-    time: Vector,
-    lift: Vector,
-    opening: Sequence[tuple[float, float]],
-    seat: Sequence[tuple[float, float]],
-) -> float:
+def _release(time: Vector, lift: Vector, opening: float, seat: float) -> float:
     """Start of the closing window: some rest before the needle leaves the opening stop."""
-    between = (time > opening[0][0]) & (time < seat[0][0])
+    between = (time > opening) & (time < seat)
     if not between.any():
-        return seat[0][0]
+        return seat
     last = time[between]
     late = last > 0.5 * (last[0] + last[-1])
     level, rest = float(np.median(lift[between][late])), float(lift[0])
