@@ -1,6 +1,7 @@
 """Straight edges and circular arcs in the meridian (r, z)."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,7 @@ class Curve:
 
     def quadrature(self, order: int = 24) -> tuple[NDArray, NDArray, NDArray]:
         """Points (q, 2) [m], tangents times weight (q, 2) [m], lengths times weight (q,) [m]."""
-        x, w = np.polynomial.legendre.leggauss(order)
+        x, w = _gauss(order)
         s, w = 0.5 * (x + 1), 0.5 * w
         points = self.at(s)
         if self.centre is None:
@@ -92,6 +93,12 @@ class Curve:
             d = points - np.array(self.centre)
             tangent = self.angle * np.column_stack([-d[:, 1], d[:, 0]])
         return points, tangent * w[:, None], self.length * w
+
+
+@cache
+def _gauss(order: int) -> tuple[NDArray, NDArray]:
+    """Points and weights of Gauss on [-1, 1]; the eigenvalues behind them take their time."""
+    return np.polynomial.legendre.leggauss(order)
 
 
 def on_axis(curve: Curve) -> bool:
