@@ -6,6 +6,7 @@ from importlib.metadata import version
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack import __version__
 from klack.acoustics.air import Air
@@ -23,6 +24,7 @@ from klack.input.problem import one_of
 from klack.materials import Material
 from klack.signals import TimeSeries
 from klack.units import format_si
+from klack.workflow.noise_balance import net_share
 from klack.workflow.noise_body import ASSUMED_DAMPING, Surroundings, body_noise, port_transfers
 from klack.workflow.noise_source import NoiseSource, SourceStop
 from klack.workflow.noise_study import (
@@ -88,11 +90,11 @@ def run_noise(
 def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock) -> NoiseDesign:
     clock("force spectra", 0.0)
     stops = tuple(_stop_force(stop) for stop in source.stops)
-    around = _surroundings(source)
+    share = net_share(source.net, [stop.bands for stop in stops])
+    around = _surroundings(source, share, stops[0].bands)
     forces = {stop.name: stop.force for stop in source.stops}
     clock("vibration and radiation", 0.0)
-    bands = np.column_stack([stops[0].bands.low, stops[0].bands.high])
-    found = [body_noise(structure, forces, around, bands) for structure in source.structures]
+    found = [body_noise(structure, forces, around) for structure in source.structures]
     bodies = tuple(body for body in found if body is not None)
     clock("sound", 0.0)
     pressure = _pressure(source, around)
@@ -108,6 +110,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         valid_from=1.0 / (record.values.size * record.step),
         valid_up_to=source.kept_up_to,
         stops=stops,
+        net_share=share,
         bodies=bodies,
         sound=sound,
         settings=_settings(source),
@@ -146,7 +149,9 @@ def _level_at(force: TimeSeries, frequency: np.ndarray) -> np.ndarray:
 # --------------------------------------------------------------------------- surroundings
 
 
-def _surroundings(source: NoiseSource) -> Surroundings:
+def _surroundings(
+    source: NoiseSource, share: NDArray[np.float64], octaves: ThirdOctaves
+) -> Surroundings:
     noise = source.noise
     mount, plate = noise.mount, noise.plate
     return Surroundings(
@@ -164,6 +169,8 @@ def _surroundings(source: NoiseSource) -> Surroundings:
         air=Air(density=noise.air_density, sound_speed=noise.sound_speed),
         efficiency=noise.radiation,
         period=1.0 / noise.drive.rate,
+        share=share,
+        octaves=octaves,
     )
 
 

@@ -16,8 +16,10 @@ from klack.acoustics.plate import Plate
 from klack.acoustics.port_forces import port_forces
 from klack.acoustics.radiation import Efficiency, power_transfer
 from klack.acoustics.surface_bands import face_band_velocity, radiated_bands
+from klack.acoustics.third_octave import ThirdOctaves
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
+from klack.workflow.noise_balance import share_at
 from klack.workflow.noise_study import BodyNoise, Surface
 
 __all__ = ["ASSUMED_DAMPING", "Surroundings", "body_noise", "port_transfers"]
@@ -43,6 +45,10 @@ class Surroundings:
     efficiency : "piston" or "unity"
     period : float [s]
         From click to click.
+    share : array, shape (b,) [-]
+        Of the energy of the forces per band that is not balanced within the valve.
+    octaves : ThirdOctaves
+        The bands.
     """
 
     mount: Mount | None
@@ -50,13 +56,14 @@ class Surroundings:
     air: Air
     efficiency: Efficiency
     period: float
+    share: Floats
+    octaves: ThirdOctaves
 
 
 def body_noise(
     structure: Structure,
     stop_forces: Mapping[str, TimeSeries],
     around: Surroundings,
-    bands: Floats,
 ) -> BodyNoise | None:
     """Vibration and radiation of one body; None if no stop pushes it.
 
@@ -67,14 +74,13 @@ def body_noise(
     stop_forces : mapping of stop to TimeSeries [N]
     around : Surroundings
         Of the radiation.
-    bands : array, shape (b, 2) [Hz]
-        Edges.
     """
     forces = port_forces(structure, stop_forces)
     if not forces:
         return None
     moved = modal_response(structure, forces)
     sounding = damped(structure)
+    bands = np.column_stack([around.octaves.low, around.octaves.high])
     frequency = frequency_lines(structure, None, _LOWEST, _HIGHEST)
     estimate, bound = (
         radiated_bands(
@@ -117,13 +123,13 @@ def body_noise(
         blocked_bands=force_bands(moved.blocked_force),
         groups=estimate.names,
         area=np.array(area),
-        radiated=estimate.energy,
-        upper_bound=bound.energy,
+        radiated=estimate.energy * around.share,
+        upper_bound=bound.energy * around.share,
         surface=Surface(
             points=structure.points,
             faces=structure.faces,
             face_group=structure.face_group,
-            velocity=velocity.astype(np.float32),
+            velocity=(velocity * np.sqrt(around.share)[:, None]).astype(np.float32),
         ),
     )
 
@@ -145,7 +151,8 @@ def port_transfers(
             efficiency=around.efficiency,
             air=around.air,
         )
-        found.append((force, frequency, transfer.total))
+        left = share_at(frequency, around.octaves, around.share)
+        found.append((force, frequency, transfer.total * left))
     return found
 
 

@@ -63,6 +63,10 @@ class NoiseSource:
         Name of the variant or level, and in words.
     stops : tuple of SourceStop
     structures : tuple of Structure
+    net : TimeSeries or None [N]
+        Mass times acceleration of the needle, means over records: the force that all of the valve
+        together exerts on it.  None where it is the contact force (a needle that only falls), or
+        where it is not known.
     kept_up_to : float [Hz]
         Lowest of the highest kept modes of all bodies; nan for rigid ones.
     noise : CaseNoise
@@ -84,6 +88,7 @@ class NoiseSource:
     noise: CaseNoise
     given: bool
     materials: Mapping[str, CaseMaterial]
+    net: TimeSeries | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -210,6 +215,7 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 noise=noise,
                 given=given,
                 materials=materials,
+                net=_net_force(study, variant),
                 notes=_notes(variant),
             )
         )
@@ -265,6 +271,20 @@ def _end(event: ImpactEvent) -> float:
     if np.isfinite(event.separation_time):
         return event.separation_time
     return event.time + event.contact_time
+
+
+def _net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
+    """Mass times acceleration of the centre of mass of the needle [N], in records."""
+    masses = [body.mass for body in study.bodies if body.name == study.needle]
+    speed = variant.channel(study.channels.velocity)
+    if not masses or speed is None:
+        return None
+    time = variant.result.time
+    step = float(time[1] - time[0])
+    force = masses[0] * np.diff(speed.values) / step
+    return TimeSeries(
+        step=step, values=force, unit="N", start=float(time[0]) + 0.5 * step, name="net force"
+    )
 
 
 def _notes(variant: StrokeVariant) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ NOISE_FORMAT = RecordFormat(
     units={
         "frequency": "Hz",
         "level": "dB re 1 uN s",
+        "net_share": "1",
         "middle": "Hz",
         "low": "Hz",
         "high": "Hz",

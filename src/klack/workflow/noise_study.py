@@ -232,6 +232,10 @@ class NoiseDesign:
     valid_from, valid_up_to : float [Hz]
         One over the record; lowest of the highest kept modes of the bodies, nan without any.
     stops : tuple of StopForce
+    net_share : array, shape (b,) [-]
+        Share of the energy of the forces per band that springs, magnets and fluid do not balance
+        within the valve: (mass times acceleration of the needle)^2 over the forces squared.
+        Radiated energy, surface velocity and sound have it.
     bodies : tuple of BodyNoise
         Empty if there is no elastic held body.
     sound : ClickSound or None
@@ -249,6 +253,7 @@ class NoiseDesign:
     valid_from: float
     valid_up_to: float
     stops: tuple[StopForce, ...]
+    net_share: Floats
     bodies: tuple[BodyNoise, ...]
     sound: ClickSound | None
     settings: NoiseSettings
@@ -263,6 +268,12 @@ class NoiseDesign:
     def band_energy(self) -> Floats:
         """Energy of the forces of all stops together per band [N^2 s]."""
         return np.asarray(np.sum([stop.bands.energy for stop in self.stops], axis=0))
+
+    @property
+    def balanced_below(self) -> float:
+        """Frequency below which half of the forces or more is balanced in the valve [Hz]; or 0."""
+        balanced = np.flatnonzero(self.net_share < 0.5)
+        return float(self.stops[0].bands.high[balanced[-1]]) if balanced.size else 0.0
 
     @property
     def injected_energy(self) -> float:

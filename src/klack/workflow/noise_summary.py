@@ -81,6 +81,7 @@ def _design(design: NoiseDesign) -> dict[str, Any]:
         "radiated_energy_J": _finite(design.radiated_energy),
         "radiated_energy_upper_bound_J": _finite(design.upper_bound),
         "valid_from_Hz": _finite(design.valid_from),
+        "balanced_below_Hz": _finite(design.balanced_below),
         "valid_up_to_Hz": _finite(design.valid_up_to),
         **_sound(design.sound),
         "stops": {
