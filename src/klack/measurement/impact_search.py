@@ -96,7 +96,7 @@ def _sharp(away: NDArray[np.float64], peak: int, half: int) -> bool:
 def _arrivals(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
     """Samples at which the needle comes from far and does not leave again."""
     here = max(smooth.least_height, 0.01 * span)
-    far = 4.0 * here
+    far = 2.0 * here
     out: list[int] = []
     coming = bool(away[0] > far)
     for i in np.flatnonzero((away < here) | (away > far)).tolist():

@@ -24,11 +24,12 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.measurement.flight import Crossing, Flight, correlation_factor, fit_flight
+from klack.measurement.flight_train import FlightTrain, join_flights
 from klack.measurement.impact_search import Touch, find_touches
 from klack.measurement.lift_sensor import sensor_poles, sensor_polynomial
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.stop_levels import SmoothLift, find_levels, smooth_lift
-from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
+from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.uniform import uniform_step
 
 __all__ = ["measure_stroke"]
@@ -36,9 +37,6 @@ __all__ = ["measure_stroke"]
 _SETTLED = 4.0  # time constants of the sensor after which it shows nothing of an impact
 _FEWEST = 9  # samples of a flight that is fitted
 _SIGNIFICANT = 3.0  # standard errors of a rebound height that is seen
-_SPRING, _FRICTION = 3, 4  # terms of a flight that turns
-_USUAL_FRICTION = 0.05  # usual spread of friction over the mean force
-_USUAL_SPRING = 0.05  # of the change of force over the highest rebound, over that force
 _AGREES = 3.0  # standard errors within which nested stretches agree
 _OWN_NOISE = 60e-6  # [s] before a touch, from which the noise of an approach is taken
 _ROUNDS = 4  # of finding touch and release, each of which bounds the samples of the other
@@ -78,6 +76,7 @@ def measure_stroke(
     seat: float | None = None,
     opening: float | None = None,
     sensor: LiftSensor | None = None,
+    shapes: Mapping[Stop, FlightShape] | None = None,
 ) -> StrokeMeasures:
     """Read impacts, speeds, restitution, rebound heights and periods off one lift.
 
@@ -95,6 +94,9 @@ def measure_stroke(
         rests without.  ``nan`` for a stop that does not exist.
     sensor : LiftSensor, optional
         Its sensitivity and offset are taken out, its low pass is undone in the fits.
+    shapes : mapping of stop to FlightShape, optional
+        What other strokes of the same valve say of the flights (:func:`klack.measurement.
+        set_measures.measure_set` gives each stroke what the others say).
 
     Returns
     -------
@@ -114,8 +116,9 @@ def measure_stroke(
         fits = _fit_all(record, touches)
     factor = correlation_factor(tuple(f.flight.residuals for f in fits if f is not None))
     record = replace(record, correlation=factor, noise=_noise(fits))
-    fits = _pooled(record, touches, _fit_all(record, touches))
-    impacts = _impacts(record, touches, fits)
+    fits = _fit_all(record, touches)
+    trains = _joined(record, touches, fits, shapes or {})
+    impacts = _impacts(record, touches, trains)
     noise = _noise(fits)
     return StrokeMeasures(
         impacts=impacts,
@@ -125,6 +128,9 @@ def measure_stroke(
         noise=record.smooth.noise if noise is None else noise,
         least_height=record.smooth.least_height,
         notes=notes,
+        shapes={
+            touches[run.start].stop: train.shape for run, train in trains if train.shape is not None
+        },
     )
 
 
@@ -364,117 +370,57 @@ def _noise(fits: list[_Ends | None]) -> float | None:
     return float(np.sqrt(sum(float(r @ r) for r in residuals) / free))
 
 
-def _pooled(
-    record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]
-) -> list[_Ends | None]:
-    """Every flight told of friction and acceleration of the others on its stop."""
-    out = list(fits)
-    for stop in record.levels:
-        bounces: dict[int, Flight] = {}
-        arrivals: dict[int, Flight] = {}
-        for k, (touch, fit) in enumerate(zip(touches, fits, strict=True)):
-            if touch.stop == stop and fit is not None:
-                (bounces if fit.flight.turns else arrivals)[k] = fit.flight
-        bounces = _told(bounces, _SPRING, _spring_scales(bounces), _USUAL_SPRING)
-        bounces = _told(bounces, _FRICTION, _sizes(bounces), _USUAL_FRICTION)
-        bounces = _told(bounces, 2, np.ones(len(bounces)), None, arrivals)
-        for k, flight in bounces.items():
-            out[k] = _with_ends(record, stop, flight)
+def _joined(
+    record: _Record,
+    touches: tuple[Touch, ...],
+    fits: list[_Ends | None],
+    shapes: Mapping[Stop, FlightShape],
+) -> list[tuple[range, FlightTrain]]:
+    """Runs of impacts on one stop, each with its flights estimated together."""
+    out = []
+    first = 0
+    for k in range(1, len(touches) + 1):
+        if k < len(touches) and touches[k].stop == touches[first].stop:
+            continue
+        stop = touches[first].stop
+        flights = tuple(None if fit is None else fit.flight for fit in fits[first:k])
+        away = 1.0 if stop == "seat" else -1.0
+        level, error = record.levels[stop], record.level_se[stop]
+        train = join_flights(flights, level, error, away, shapes.get(stop))
+        out.append((range(first, k), train))
+        first = k
     return out
-
-
-def _sizes(flights: dict[int, Flight]) -> NDArray[np.float64]:
-    return np.array([flight.coefficients[2] for flight in flights.values()])
-
-
-def _spring_scales(flights: dict[int, Flight]) -> NDArray[np.float64]:
-    """Coefficients of ``s^4`` at which the longest flight's force would double to its top."""
-    if not flights:
-        return np.empty(0)
-    half = 0.5 * max(flight.last - flight.first for flight in flights.values())
-    return -_sizes(flights) / (6.0 * half**2)
-
-
-def _told(
-    flights: dict[int, Flight],
-    index: int,
-    scales: NDArray[np.float64],
-    usual: float | None,
-    beside: dict[int, Flight] | None = None,
-) -> dict[int, Flight]:
-    """Each flight told one coefficient by the others.
-
-    ``scales``: coefficient over this is the same in all of them, but for a scatter of its own.
-    ``usual``: its usual spread about zero.  ``beside``: flights whose coefficient is alike, but
-    only up to friction.
-    """
-    if not flights:
-        return {}
-    c = np.array([flight.coefficients[index] for flight in flights.values()]) / scales
-    var = np.array([flight.covariance[index, index] for flight in flights.values()]) / scales**2
-    scatter = _scatter(c, var) if c.size > 1 else 0.0
-    values, variances = c.tolist(), (var + scatter).tolist()
-    if usual is not None:
-        values.append(0.0)
-        variances.append(usual**2)
-    for flight in (beside or {}).values():
-        values.append(float(flight.coefficients[index]))
-        unlike = 2.0 * _USUAL_FRICTION * float(np.median(np.abs(c)))
-        variances.append(float(flight.covariance[index, index]) + scatter + unlike**2)
-    out = {}
-    for i, (k, flight) in enumerate(flights.items()):
-        weight = 1.0 / np.delete(variances, i)
-        if not weight.size:
-            return flights
-        mean = float(weight @ np.delete(values, i) / weight.sum())
-        spread = scatter + 1.0 / float(weight.sum())
-        out[k] = flight.told(index, mean * scales[i], spread * scales[i] ** 2)
-    return out
-
-
-def _scatter(values: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
-    """Variance of the values beyond their own (DerSimonian & Laird 1986), 0 or more."""
-    w = 1.0 / variances
-    mean = w @ values / w.sum()
-    excess = float(w @ (values - mean) ** 2) - (values.size - 1)
-    return max(0.0, excess / float(w.sum() - w @ w / w.sum()))
 
 
 def _impacts(
-    record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]
+    record: _Record, touches: tuple[Touch, ...], trains: list[tuple[range, FlightTrain]]
 ) -> tuple[MeasuredImpact, ...]:
-    out: list[MeasuredImpact] = []
-    for k, touch in enumerate(touches):
-        following = touches[k + 1] if k + 1 < len(touches) else None
-        returns = following is not None and following.stop == touch.stop
-        out.append(_impact(record, touch, fits[k], fits[k + 1] if returns else None))
+    out = [_impact(record, touches[k], train, k - run.start) for run, train in trains for k in run]
     return tuple(_with_periods(out))
 
 
-def _impact(
-    record: _Record, touch: Touch, arriving: _Ends | None, leaving: _Ends | None
-) -> MeasuredImpact:
+def _impact(record: _Record, touch: Touch, train: FlightTrain, k: int) -> MeasuredImpact:
     away = 1.0 if touch.stop == "seat" else -1.0
-    level, level_se = record.levels[touch.stop], record.level_se[touch.stop]
     step = float(record.time[1] - record.time[0])
-    arrival = arriving.touch if arriving is not None else None
-    rough = float(record.time[touch.index])
+    arrival, release = train.touches[k], train.releases[k]
     v, v_se = (-away * arrival.velocity, arrival.velocity_se) if arrival else (_NAN, _NAN)
-    release = leaving.release if leaving is not None else None
     w, w_se = (away * release.velocity, release.velocity_se) if release else (_NAN, _NAN)
     height, height_se = _NAN, _NAN
-    if leaving is not None and leaving.flight.turns:
-        top, top_se = leaving.flight.top()
-        height, height_se = away * (top - level), float(np.hypot(top_se, level_se))
+    last = k + 1 == len(train.flights)
+    leaving = None if last else train.flights[k + 1]
+    if leaving is not None and leaving.turns:
+        top, top_se = leaving.top()
+        height, height_se = away * (top - train.level), float(np.hypot(top_se, train.level_se))
+    e, e_se = w / v, train.restitution_se[k]
     ends = touch.index + 4 * record.smooth.half >= record.time.size  # before it could rebound
-    if leaving is None and not ends:
+    if last and not ends:
         fall = abs(arrival.acceleration) if arrival else _NAN
         w, w_se = 0.0, float(np.sqrt(2.0 * fall * record.smooth.least_height))
         height, height_se = 0.0, record.smooth.least_height
-    e = w / v
+        e, e_se = 0.0 * v, w_se / v
     return MeasuredImpact(
         stop=touch.stop,
-        time=arrival.time if arrival else rough,
+        time=arrival.time if arrival else float(record.time[touch.index]),
         time_se=arrival.time_se if arrival else record.smooth.half * step,
         release=release.time if release else _NAN,
         release_se=release.time_se if release else _NAN,
@@ -483,7 +429,7 @@ def _impact(
         rebound_speed=w,
         rebound_se=w_se,
         restitution=e,
-        restitution_se=float(np.hypot(w_se, e * v_se)) / v,
+        restitution_se=e_se,
         rebound_height=height,
         rebound_height_se=height_se,
         period=_NAN,

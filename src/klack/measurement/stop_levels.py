@@ -10,7 +10,7 @@ from klack.measurement.differentiation import VelocityEstimate, velocity_of
 __all__ = ["SmoothLift", "StopLevels", "find_levels", "smooth_lift"]
 
 _LEAST_SMOOTHING = 20e-6  # [s] window that averages the vibration of the needle out
-_MOST_SMOOTHING = 80e-6  # [s] flights shorter than this are not told apart anyway
+_MOST_SMOOTHING = 50e-6  # [s] flights shorter than this are not told apart anyway
 _REST_SPEED = 0.03  # of the fastest motion
 _REST_TIME = 25e-6  # [s]
 _NEAR = 0.12  # of the span: rests farther from its ends are turning points
@@ -87,7 +87,7 @@ def smooth_lift(time: NDArray[np.float64], lift: NDArray[np.float64]) -> SmoothL
 def find_levels(
     time: NDArray[np.float64], lift: NDArray[np.float64], smooth: SmoothLift
 ) -> StopLevels:
-    """Levels of rest at the lower and upper end of the motion, as medians.
+    """Levels of rest at the lower and upper end of the motion: medians over half a rest.
 
     The needle rests where its speed stays below 3 % of the fastest motion (and within its noise)
     for 25 us, at most 12 % of the span away from the ends of the motion; not where its speed runs
@@ -138,13 +138,19 @@ def _level(lift: NDArray[np.float64], run: tuple[int, int]) -> float:
     return float(np.median(lift[run[0] : run[1]]))
 
 
+def _settled(run: tuple[int, int]) -> tuple[int, int]:
+    """Half of a rest: away from the motion, and from the last small bounces."""
+    middle = (run[0] + run[1]) // 2
+    return (0, middle) if run[0] == 0 else (middle, run[1])
+
+
 def _longest(lift: NDArray[np.float64], runs: list[tuple[int, int]]) -> float:
     if not runs:
         return float("nan")
-    return _level(lift, max(runs, key=lambda run: run[1] - run[0]))
+    return _level(lift, _settled(max(runs, key=lambda run: run[1] - run[0])))
 
 
 def _error(noise: float, runs: list[tuple[int, int]]) -> float:
     if not runs:
         return float("nan")
-    return 1.2533 * noise / float(np.sqrt(max(b - a for a, b in runs)))
+    return 1.2533 * noise / float(np.sqrt(max((b - a) // 2 for a, b in runs)))

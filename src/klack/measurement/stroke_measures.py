@@ -1,11 +1,34 @@
 """Numbers that are read off the lift of one stroke, each with its standard error."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
-__all__ = ["MeasuredImpact", "Stop", "StrokeMeasures"]
+__all__ = ["FlightShape", "MeasuredImpact", "Stop", "StrokeMeasures"]
 
 Stop = Literal["opening", "seat"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightShape:
+    """What the flights on one stop have in common, each with its standard error.
+
+    Parameters
+    ----------
+    acceleration, acceleration_se : float [m/s^2]
+        Towards the stop, at the turning point, mean of rise and fall.
+    stiffness, stiffness_se : float [1/s^2]
+        Of the spring, over the mass: change of the acceleration with lift.
+    friction, friction_se : float [-]
+        Over the mean force.
+    """
+
+    acceleration: float
+    acceleration_se: float
+    stiffness: float
+    stiffness_se: float
+    friction: float
+    friction_se: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +100,8 @@ class StrokeMeasures:
         Bounces lower than this are not told from noise, and not counted.
     notes : tuple of str
         What could not be done, and why.
+    shapes : mapping of stop to FlightShape
+        Of the stops with bounces.
     """
 
     impacts: tuple[MeasuredImpact, ...]
@@ -86,6 +111,7 @@ class StrokeMeasures:
     noise: float
     least_height: float
     notes: tuple[str, ...] = ()
+    shapes: Mapping[Stop, FlightShape] = field(default_factory=dict)
 
     @property
     def lift(self) -> float:
