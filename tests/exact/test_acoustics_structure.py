@@ -4,9 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse.linalg import spsolve
 
+from klack.acoustics.air import Air
+from klack.acoustics.radiation import power_transfer
 from klack.elasticity.body import elastic_body
-from klack.elasticity.eigen import Modes
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.statics import Flexibility
 from klack.mesh.boundary import outer_surface
 from klack.mesh.mesh import Mesh
 from klack.reduction.damping import ModalDamping
@@ -144,3 +148,47 @@ def test_participation_of_a_rod() -> None:
 
     odd = 2 * np.arange(1, 5) - 1
     assert share == pytest.approx(8 / (np.pi * odd) ** 2, rel=1e-4)  # mesh of 80 elements
+
+
+@pytest.mark.parametrize(("modes", "most"), [(6, 5e-3), (20, 1e-4)])
+def test_power_transfer_against_the_full_body(modes: int, most: float) -> None:
+    """A thick ring with Poisson's ratio, loaded at its inner edge: direct harmonic solution."""
+    lines = [np.linspace(2e-3, 5e-3, 5), np.linspace(0, 8e-3, 9)]
+    mesh = lattice_mesh("quad8", lines)
+    body = elastic_body("ring", mesh, {"solid": STEEL}, fixed_nodes=mesh.surface("bottom").nodes)
+    port = surface_port(mesh, "inner", "z", name="port")
+    with Flexibility(body) as flexibility:
+        structure = build_structure(
+            body,
+            modes=eigenmodes(body, count=modes, flexibility=flexibility),
+            damping=ModalDamping(ratio=0.0),
+            ports=[StructurePort(port=port)],
+            deflections=flexibility.solve(port.pattern[:, None]),
+            surfaces=("top", "outer"),
+        )
+    frequency = np.array([2e3, 2e4, 8e4, 1.45e5])  # first modes at 163 and 248 kHz
+    powers = power_transfer(structure, frequency, "port", efficiency="unity").values
+
+    keep = body.free
+    for f, computed in zip(frequency, powers.T, strict=True):
+        omega = 2 * np.pi * f
+        u = np.zeros(body.dof_count)
+        dynamic = (body.K - omega**2 * body.M)[keep][:, keep]
+        u[keep] = spsolve(dynamic.tocsc(), port.pattern[keep])
+        exact = [_squares(mesh, name, omega * u) for name in ("top", "outer")]
+        assert computed == pytest.approx(Air().impedance * np.array(exact), rel=most)
+
+
+def _squares(mesh: Mesh, surface: str, u: np.ndarray) -> float:
+    """Integral of the squared normal displacement over a flat or round surface."""
+    total = 0.0
+    normal = 1 if surface == "top" else 0
+    xi, weight = np.polynomial.legendre.leggauss(5)
+    shape = np.stack([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi**2], axis=1)  # ends, middle
+    for block in mesh.surface(surface).blocks:
+        for nodes in block.connectivity:
+            r = shape @ mesh.points[nodes, 0]
+            length = np.linalg.norm(mesh.points[nodes[1]] - mesh.points[nodes[0]])
+            moved = shape @ u.reshape(-1, 2)[nodes, normal]
+            total += float(np.sum(weight * moved**2 * 2 * np.pi * r) * length / 2)
+    return total

@@ -200,6 +200,21 @@ def test_limits_of_the_radiation_of_a_plate() -> None:
     assert share == pytest.approx([lost / (lost + 0.02)], rel=1e-12)
 
 
+def test_corners_and_edges_in_the_notation_of_maidanik() -> None:
+    """Efficiency 2 lambda_c^2 g_1 / A + P lambda_c g_2 / A; here corners give a good part."""
+    plate = Plate(thickness=1e-3, area=0.04, material=STEEL)
+    wave = AIR.sound_speed / plate.coincidence(AIR)
+    a = np.sqrt(0.15)
+    g1 = 4 / np.pi**4 * (1 - 2 * a**2) / (a * np.sqrt(1 - a**2))
+    g2 = ((1 - a**2) * np.log((1 + a) / (1 - a)) + 2 * a) / (4 * np.pi**2 * (1 - a**2) ** 1.5)
+    corners, edges = 2 * wave**2 * g1 / 0.04, 4 * 0.2 * wave * g2 / 0.04
+
+    sigma = plate.efficiency(np.array([0.15 * plate.coincidence(AIR)]), AIR)
+
+    assert corners > 0.1 * edges
+    assert sigma == pytest.approx([corners + edges], rel=1e-12)
+
+
 def test_all_power_of_a_lossless_valve_goes_into_the_plate() -> None:
     plate = Plate(thickness=1.5e-3, area=0.5, material=STEEL)
     body = rod_structure(modes=8)
@@ -244,7 +259,20 @@ def test_radiated_power_from_velocities_face_by_face() -> None:
     assert piston.total == pytest.approx(sigma * power.total, rel=1e-12)
 
 
-def test_a_mounted_sphere_of_the_oscillator_radiates_what_it_should() -> None:
+@pytest.mark.parametrize("modes", [1, 4])
+def test_the_static_rest_radiates_as_well(modes: int) -> None:
+    """Far below resonance the end moves by L / (E A) per force, whatever the number of modes."""
+    body, f = rod_structure(modes=modes), np.array([50.0])
+
+    power = power_transfer(body, f, "tip", efficiency="unity")
+
+    end = body.group_area[body.group_names.index("bottom")]
+    velocity = 2 * np.pi * 50.0 * body.static_compliance[0, 0]
+    assert power.group("bottom") == pytest.approx(AIR.impedance * end * velocity**2, rel=1e-5)
+    assert body.residual_compliance[0, 0] > 0.04 * body.static_compliance[0, 0]
+
+
+def test_a_face_that_moves_with_the_mount_radiates_what_it_should() -> None:
     """Rigid oscillation of a face of 1 cm^2: rho c A v^2 with v = 1 / (omega M)."""
     body = oscillator(mass=MASS, stiffness=1e12, base=BASE)
     f = np.array([300.0])
