@@ -97,14 +97,10 @@ def _number_table(study: NoiseStudy) -> Table:
         rows.append((title, *cells))
     heads = [
         f"{design.name}{' (reference)' if i == 0 and len(study.designs) > 1 else ''}\n"
-        f"{_short_label(design)}"
+        f"{design.detail}"
         for i, design in enumerate(study.designs)
     ]
     return Table(columns=("", *heads), rows=tuple(rows))
-
-
-def _short_label(design: NoiseDesign) -> str:
-    return design.label.removeprefix(f"{design.name}: ")
 
 
 def _text(value: float, unit: str) -> str:
@@ -137,7 +133,7 @@ def _of_sound(read: Callable[[ClickSound], float]) -> Cell:
 
 _ROWS: tuple[tuple[str, Cell, str, str], ...] = (
     ("peak force", lambda d: max(stop.peak_force for stop in d.stops), "N", "amplitude"),
-    ("level of the force, all bands", force_level, "dB", "level"),
+    ("level of the unbalanced force", force_level, "dB", "level"),
     ("structure-borne energy injected", lambda d: d.injected_energy, "J", "energy"),
     ("sound energy radiated (estimate)", lambda d: d.radiated_energy, "J", "energy"),
     (
@@ -236,7 +232,7 @@ def _force_table(study: NoiseStudy) -> Table:
             "impacts",
             "peak force",
             "impulse of the record",
-            "level re (1 µN)²s",
+            "level re 1 pN²s",
             "highest band",
             "90 % of it below",
         ),
@@ -382,9 +378,16 @@ def _modes(design: NoiseDesign) -> str:
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "level of the force",
-        "Third octaves after IEC 61260-1 (base ten) of ∫ F² dt, in dB re (1 µN)² s: the level re "
-        "1 µN of a steady force with the same energy in one second. The force is held at its first "
-        "and last value outside the record.",
+        "Third octaves after IEC 61260-1 (base ten) of ∫ F² dt, in dB re 1 pN² s = (1 µN)² s: the "
+        "level re 1 µN of a steady force with the same energy in one second. The force is held at its "
+        "first and last value outside the record.",
+    ),
+    (
+        "unbalanced force",
+        "Springs, magnet and fluid push the needle from the housing that it hits; below about one "
+        "over the time of flight they balance the contact forces. What is left is mass times "
+        "acceleration of the needle. Sound and surface motion have this share of every band; "
+        "injected energy, mobility and blocked force have the contact forces alone.",
     ),
     (
         "structure-borne energy",
@@ -428,6 +431,11 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
             "Estimate",
             "Levels in dB, not tenths of them: mount, plate and damping decide, and they are known "
             "roughly. Differences between two designs on the same mount are better than levels.",
+        ),
+        (
+            "Click",
+            "All of a click is heard at once here, where a real plate rings on: peak level, crest "
+            "factor, kurtosis and loudest moment are on the high side; exposure levels are not.",
         ),
         (
             "Force",

@@ -173,8 +173,8 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
                     x = 1e-3 * stop.frequency
                     curves.append(_curve(x, stop.level, i, design.label, listed=listed))
         if curves:
-            panels.append(_level_panel(f"{name}: level", "dB re 1 µN s", curves, 70.0))
-    bands, gathered, differences = [], [], []
+            panels.append(_level_panel(name, "dB re 1 µN s", curves, 70.0))
+    bands, left, gathered, differences = [], [], [], []
     reference = study.reference
     for i, design in _designs(study):
         octaves = design.stops[0].bands
@@ -182,14 +182,20 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
         listed = design.label not in named
         named.add(design.label)
         bands.append(_steps(octaves, level, i, design.label, listed=listed))
-        total = np.cumsum(design.band_energy)
+        if design.balanced_below:
+            unbalanced = _level(design.unbalanced_energy, ENERGY_REFERENCE)
+            steps = _steps(octaves, unbalanced, i, "")
+            left.append(replace(steps, width=0.9, style="dotted"))
+        total = np.cumsum(design.unbalanced_energy)
         x = np.append(1e-3 * octaves.low[0], 1e-3 * octaves.high)
         share = 100.0 * np.append(0.0, total) / max(float(total[-1]), _SMALLEST)
         gathered.append(_curve(x, share, i, design.label, listed=False))
         if design is not reference and _same_bands(design, reference):
-            apart = level - _level(reference.band_energy, ENERGY_REFERENCE)
+            apart = _level(design.unbalanced_energy, ENERGY_REFERENCE) - _level(
+                reference.unbalanced_energy, ENERGY_REFERENCE
+            )
             differences.append(_steps(octaves, apart, i, design.label))
-    bands_panel = _level_panel("third octaves", "dB re 1 µN²s", bands, 70.0)
+    bands_panel = _level_panel("bands", "dB re 1 pN²s", [*bands, *left], 70.0)
     panels.append(replace(bands_panel, bands=_trusted(study)))
     if differences:
         panels.append(_difference_panel(differences))
@@ -200,6 +206,11 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
         "end is the impulse. Third octaves: ∫ F² dt of the whole record per band, all stops "
         "together. Bottom: share of it below each frequency."
     )
+    if left:
+        note += (
+            " Thin dotted lines: what springs, magnet and fluid do not balance within the valve "
+            "(mass times acceleration of the needle); difference and share are those of it."
+        )
     if differences:
         note += f" Difference: minus '{reference.name}', with lines at ±3 dB."
     return Chart(
@@ -362,7 +373,7 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         )
         steps = [_steps(b, level, i, d.label, listed=True) for b, level, i, d in bands]
         panels = [
-            replace(_level_panel("level", "dB re 1 µN²s", steps, 80.0), bands=_trusted(study))
+            replace(_level_panel("level", "dB re 1 pN²s", steps, 80.0), bands=_trusted(study))
         ]
         if differences:
             panels.append(
@@ -397,7 +408,7 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
         if design is not first and _same_bands(design, first):
             apart = level - _level(first.radiated_bands, SOUND_ENERGY_REFERENCE)
             differences.append(_steps(octaves, apart, i, design.label))
-    panel = _level_panel("sound energy", "dB re 1 pJ", [*curves, *bounds], 80.0)
+    panel = _level_panel("energy", "dB re 1 pJ", [*curves, *bounds], 80.0)
     panels = [replace(panel, bands=_trusted(study))]
     if differences:
         panels.append(_difference_panel(differences))
@@ -423,11 +434,12 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         return ()
     waves, loud, bands, differences = [], [], [], []
     first = heard[0][2]
-    ends = []
+    ends = [_end(sound.pressure.time, sound.pressure.values) for *_, sound in heard]
+    begin = 1e3 * min(float(sound.pressure.time[0]) for *_, sound in heard)
+    window = (begin, 1e3 * max(ends))
     for i, design, sound in heard:
-        x, y = thinned(1e3 * sound.pressure.time, 1e3 * sound.pressure.values)
+        x, y = thinned(1e3 * sound.pressure.time, 1e3 * sound.pressure.values, window=window)
         waves.append(_curve(x, y, i, design.label))
-        ends.append(_end(sound.pressure.time, sound.pressure.values))
         loud.append(
             _curve(
                 1e3 * sound.loudness.time, sound.loudness.loudness, i, design.label, listed=False
@@ -438,12 +450,11 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         if sound is not first:
             apart = level - _level(first.bands.energy, EXPOSURE_REFERENCE)
             differences.append(_steps(sound.bands, apart, i, design.label))
-    begin = 1e3 * min(float(sound.pressure.time[0]) for *_, sound in heard)
     distance = quantity(heard[0][1].settings.distance, "m", 3)
     over_time = Chart(
         name="click",
         title=f"One click at {distance}: sound pressure and loudness",
-        x=AxisSpec(label="time", unit="ms", range=(begin, 1e3 * max(ends))),
+        x=AxisSpec(label="time", unit="ms", range=window),
         panels=(
             Panel(y=AxisSpec(label="pressure", unit="mPa"), curves=tuple(waves)),
             Panel(y=AxisSpec(label="loudness", unit="sone"), curves=tuple(loud), share=0.6),
@@ -454,7 +465,7 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             "sound, as hearing does."
         ),
     )
-    panels = [_level_panel("exposure level", "dB re (20 µPa)²s", bands, _SILENCE)]
+    panels = [_level_panel("level", "dB re (20 µPa)²s", bands, _SILENCE)]
     if differences:
         panels.append(_difference_panel(differences))
     over_bands = Chart(

@@ -5,12 +5,14 @@ solid is shown in parallel projection, seen from the front and above; faces that
 out.  One row per design, all colours to one scale.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -31,6 +33,7 @@ _MAP = "viridis"
 _HEARING = 20e3  # [Hz]
 _VIEW = (np.radians(35.0), np.radians(25.0))  # turned about z, seen from above
 _VECTOR_FACES = 3000
+_MOST = 4  # pictures side by side
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,38 +56,29 @@ def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
 
 
 def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
-    """Draw every body of every design in the loudest bands; None without bodies."""
+    """Draw all bodies of every design in the loudest bands; None without bodies."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
         return None
     bands = shown_bands(study)
-    rows = [(design, band) for design in designs for band in bands]
-    names = list(dict.fromkeys(body.name for design in designs for body in design.bodies))
+    shown = [(design, band) for design in designs for band in bands]
     octaves = designs[0].stops[0].bands
     scale = _scale(designs, bands)
+    columns = min(len(shown), _MOST)
+    rows = ceil(len(shown) / columns)
     with rc_context(STYLE | {"axes.grid": False}):
-        wide = [_width_over_height(_body(designs, name).surface) for name in names]
-        tall = float(np.clip(5.2 / sum(wide), 1.5, 2.8))
-        figure = Figure(figsize=(6.7, tall * len(rows) + 0.9), layout="constrained")
-        grid = figure.subplots(len(rows), len(names), squeeze=False, width_ratios=wide)
-        for (design, band), line in zip(rows, grid, strict=True):
-            for name, axes in zip(names, line, strict=True):
-                found = [body for body in design.bodies if body.name == name]
-                title = _title(study, design, name, octaves, band)
-                _draw(axes, found[0].surface if found else None, band, scale, title)
+        shape = min(_width_over_height(body.surface) for d in designs for body in d.bodies)
+        tall = float(np.clip(6.0 / columns / max(shape, 0.2), 1.8, 4.2))
+        figure = Figure(figsize=(6.7, tall * rows + 0.9), layout="constrained")
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axes in grid.ravel()[len(shown) :]:
+            axes.set_axis_off()
+        for (design, band), axes in zip(shown, grid.ravel(), strict=False):
+            whose = f"{design.name}\n" if len(study.designs) > 1 else ""
+            _draw(axes, design.bodies, band, scale)
+            axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"), fontsize=8)
         _bar(figure, grid, scale)
         return SurfaceFigure(svg(figure), _note(designs, octaves, bands))
-
-
-def _body(designs: list[NoiseDesign], name: str) -> BodyNoise:
-    return next(body for design in designs for body in design.bodies if body.name == name)
-
-
-def _title(
-    study: NoiseStudy, design: NoiseDesign, name: str, octaves: ThirdOctaves, band: int
-) -> str:
-    whose = f"{design.name}, " if len(study.designs) > 1 else ""
-    return f"{whose}{name}, {nominal_label(int(octaves.number[band]))}"
 
 
 def _level(velocity: NDArray[np.float32]) -> Floats:
@@ -103,21 +97,19 @@ def _scale(designs: list[NoiseDesign], bands: tuple[int, ...]) -> Normalize:
 # --------------------------------------------------------------------------- drawing
 
 
-def _draw(axes: Any, surface: Surface | None, band: int, scale: Normalize, title: str) -> None:
-    axes.set_title(plain(title), fontsize=8)
+def _draw(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Normalize) -> None:
     axes.set_aspect("equal")
-    if surface is None:
-        axes.set_axis_off()
-        return
-    level = _level(surface.velocity[band])
-    if surface.points.shape[1] == 2:
-        _draw_section(axes, surface, level, scale)
+    solid = [body for body in bodies if body.surface.points.shape[1] == 3]
+    flat = [body for body in bodies if body.surface.points.shape[1] == 2]
+    if solid:
+        _draw_solids(axes, solid, band, scale)
     else:
-        _draw_solid(axes, surface, level, scale)
+        _draw_sections(axes, flat, band, scale)
 
 
-def _draw_section(axes: Any, surface: Surface, level: Floats, scale: Normalize) -> None:
-    lines = 1e3 * surface.points[surface.faces]
+def _draw_sections(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Normalize) -> None:
+    lines = np.concatenate([1e3 * b.surface.points[b.surface.faces] for b in bodies])
+    level = np.concatenate([_level(body.surface.velocity[band]) for body in bodies])
     both = np.concatenate([lines, lines * np.array([-1.0, 1.0])])
     collection = LineCollection(list(both), linewidths=3.5, capstyle="round", cmap=_MAP, norm=scale)
     collection.set_array(np.concatenate([level, level]))
@@ -132,39 +124,45 @@ def _draw_section(axes: Any, surface: Surface, level: Floats, scale: Normalize) 
     axes.set_ylabel("height [mm]")
 
 
-def _draw_solid(axes: Any, surface: Surface, level: Floats, scale: Normalize) -> None:
-    corners = 1e3 * surface.points[surface.faces]
+def _draw_solids(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Normalize) -> None:
     right, up, towards = _axes_of_view()
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
-    # a quadrangle that repeats its last corner is a triangle
-    repeated = np.all(corners[:, -1] == corners[:, -2], axis=1)
-    normals[repeated] = np.cross(
-        corners[repeated, 1] - corners[repeated, 0], corners[repeated, 2] - corners[repeated, 0]
-    )
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    facing = normals @ towards
-    order = np.argsort((corners @ towards).mean(axis=1))
-    order = order[facing[order] > 0.0]
-    flat = np.stack([corners @ right, corners @ up], axis=-1)[order]
-    shade = 0.72 + 0.28 * facing[order, None]
-    from matplotlib import colormaps
-
-    colours = colormaps[_MAP](scale(level[order]))
-    colours[:, :3] *= shade
+    flat, depth, level, facing = [], [], [], []
+    for body in bodies:
+        corners = 1e3 * body.surface.points[body.surface.faces]
+        turned = _normals(corners) @ towards
+        seen = turned > 0.0
+        kept = corners[seen]
+        if kept.shape[1] == 3:
+            kept = np.concatenate([kept, kept[:, 2:]], axis=1)
+        flat.append(np.stack([kept @ right, kept @ up], axis=-1))
+        depth.append((kept @ towards).mean(axis=1))
+        level.append(_level(body.surface.velocity[band])[seen])
+        facing.append(turned[seen])
+    order = np.argsort(np.concatenate(depth))
+    shapes = np.concatenate(flat)[order]
+    colours = colormaps[_MAP](scale(np.concatenate(level)[order]))
+    colours[:, :3] *= 0.72 + 0.28 * np.concatenate(facing)[order, None]
     axes.add_collection(
         PolyCollection(
-            list(flat),
+            list(shapes),
             facecolors=colours,
             edgecolors=colours,
             linewidths=0.2,
             rasterized=len(order) > _VECTOR_FACES,
         )
     )
-    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    low, high = shapes.min(axis=(0, 1)), shapes.max(axis=(0, 1))
     margin = 0.05 * float((high - low).max())
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_axis_off()
+
+
+def _normals(corners: Floats) -> Floats:
+    """Outward normals of faces, shape (f, 3); a quadrangle that repeats a corner is a triangle."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.maximum(size, 1e-300))
 
 
 def _axes_of_view() -> tuple[Floats, Floats, Floats]:
@@ -186,8 +184,6 @@ def _width_over_height(surface: Surface) -> float:
 
 
 def _bar(figure: Figure, grid: Any, scale: Normalize) -> None:
-    from matplotlib.cm import ScalarMappable
-
     bar = figure.colorbar(
         ScalarMappable(norm=scale, cmap=_MAP),
         ax=list(grid.ravel()),

@@ -10,8 +10,8 @@ __all__ = ["decibels", "force_level", "noise_answer"]
 
 
 def force_level(design: NoiseDesign) -> float:
-    """Level of all bands of the force together [dB re (1 uN)^2 s]."""
-    return 10.0 * log10(max(float(design.band_energy.sum()), 1e-300) / ENERGY_REFERENCE)
+    """Level of all bands of the unbalanced force together [dB re (1 uN)^2 s]."""
+    return 10.0 * log10(max(float(design.unbalanced_energy.sum()), 1e-300) / ENERGY_REFERENCE)
 
 
 def decibels(value: float, decimals: int = 1) -> str:
@@ -27,7 +27,7 @@ def noise_answer(study: NoiseStudy) -> str:
     """Say in plain words how loud the first design is, and how the others differ from it."""
     first = study.reference
     strongest = max(first.stops, key=lambda stop: stop.peak_force)
-    begin = f"One {first.kind} of {first.name}" if len(study.designs) > 1 else f"One {first.kind}"
+    begin = f"One {first.kind} of '{first.name}'" if len(study.designs) > 1 else f"One {first.kind}"
     where = f" on '{strongest.stop}'" if first.kind == "stroke" else ""
     text = f"{begin} has a peak force of {quantity(strongest.peak_force, 'N', 3)}{where}. "
     if not first.bodies:
@@ -57,12 +57,12 @@ def _sone(value: float) -> str:
 def _compared(first: NoiseDesign, other: NoiseDesign) -> str:
     if first.sound is None or other.sound is None:
         difference = signed(force_level(other) - force_level(first), 1, "dB")
-        return f"The force of {other.name} is {difference} from it."
+        return f"The level of the force of '{other.name}' differs by {difference}."
     level = other.sound.statistics.exposure_level_A - first.sound.statistics.exposure_level_A
     loudness = other.sound.loudness.maximum
     times = loudness / first.sound.loudness.maximum if first.sound.loudness.maximum else 0.0
     factor = f", {times:.2g} times as loud" if times else ""
     return (
-        f"{other.name[:1].upper()}{other.name[1:]} has {_sone(loudness)}{factor}; its A-weighted "
-        f"level differs by {signed(level, 1, 'dB')}."
+        f"That of '{other.name}' has {_sone(loudness)}{factor}; its A-weighted level differs by "
+        f"{signed(level, 1, 'dB')}."
     )

@@ -102,7 +102,8 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     record = source.stops[0].force
     return NoiseDesign(
         name=name,
-        label=f"{name}: {source.label}" if several else source.label,
+        label=name if several else source.label,
+        detail=source.label,
         kind=source.kind,
         case=source.case,
         case_text=source.case_text,

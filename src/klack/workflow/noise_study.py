@@ -223,8 +223,8 @@ class NoiseDesign:
     ----------
     name : str
         Short, unique in the study.
-    label : str
-        What a legend says.
+    label, detail : str
+        What a legend says; what was run, in words.
     kind : str
         ``"impact"`` or ``"stroke"``.
     case, case_text, run : str
@@ -246,6 +246,7 @@ class NoiseDesign:
 
     name: str
     label: str
+    detail: str
     kind: str
     case: str
     case_text: str
@@ -268,6 +269,11 @@ class NoiseDesign:
     def band_energy(self) -> Floats:
         """Energy of the forces of all stops together per band [N^2 s]."""
         return np.asarray(np.sum([stop.bands.energy for stop in self.stops], axis=0))
+
+    @property
+    def unbalanced_energy(self) -> Floats:
+        """Energy of the forces per band that is not balanced within the valve [N^2 s]."""
+        return np.asarray(self.band_energy * self.net_share)
 
     @property
     def balanced_below(self) -> float:

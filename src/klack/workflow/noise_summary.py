@@ -13,7 +13,7 @@ __all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json"]
 NOISE_COLUMNS = (
     "design",
     "peak force [N]",
-    "force [dB re 1 uN^2 s]",
+    "force [dB]",
     "injected [uJ]",
     "radiated [nJ]",
     "SEL [dB]",
@@ -31,7 +31,7 @@ def noise_rows(study: NoiseStudy) -> tuple[tuple[str, ...], ...]:
 
 def _row(design: NoiseDesign) -> tuple[str, ...]:
     sound = design.sound
-    level = 10.0 * np.log10(max(design.band_energy.sum(), 1e-300) / ENERGY_REFERENCE)
+    level = 10.0 * np.log10(max(design.unbalanced_energy.sum(), 1e-300) / ENERGY_REFERENCE)
     heard = (
         ("–",) * 4
         if sound is None
