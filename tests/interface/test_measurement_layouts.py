@@ -3,6 +3,7 @@
 Truth: the arrays that were given to the writers of the formats' own libraries.
 """
 
+import re
 import sys
 
 import numpy as np
@@ -192,3 +193,26 @@ def test_damaged_files_end_in_a_clear_error(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=name.replace(".", r"\.")):
         open_recording(tmp_path / name)
+
+
+def test_mdf_channels_outside_their_record_are_refused(tmp_path):
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(STROKES[0], TIME, unit="um", name="lift")])
+    file.save(tmp_path / "a.mf4")
+    file.close()
+    content = bytearray((tmp_path / "a.mf4").read_bytes())
+    # place of the values in their record: 4 bytes, 92 bytes behind the start of the channel block
+    places = [m.start() + 92 for m in re.finditer(b"##CN", content)]
+    (place,) = (p for p in places if content[p : p + 4] == b"\x08\0\0\0")
+    content[place + 3] = 0x48
+    (tmp_path / "a.mf4").write_bytes(content)
+    with pytest.raises(InputError, match="'lift': got a place outside its record"):
+        open_recording(tmp_path / "a.mf4")
+
+
+def test_hdf5_arrays_larger_than_the_file_are_refused(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["dt"] = 1e-5
+        file.create_dataset("lift_um", (10**12,), "f8", chunks=(1000,))
+    with pytest.raises(InputError, match="'lift_um': got 1000000000000 values in 0 bytes"):
+        open_recording(tmp_path / "a.h5")

@@ -4,6 +4,7 @@ Links to other files and data that lie in other files are not followed: a measur
 own data.
 """
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.foreign import foreign_reading
 from klack.measurement.files.stored_arrays import ArrayRecording, StoredArray, StoredGroup
 
 __all__ = ["Hdf5File"]
@@ -19,6 +21,7 @@ Vector = NDArray[np.float64]
 
 _DEEPEST = 8
 _LONGEST_TEXT = 200
+_MOST_PACKED = 1100  # deflate packs 1032 bytes into one at best
 
 
 class Hdf5File(ArrayRecording):
@@ -34,7 +37,9 @@ class Hdf5File(ArrayRecording):
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         self._file = _opened(path)
         try:
-            super().__init__(path, _group(self._file, "", 0), time_step)
+            with _damage(str(path)):
+                root = _group(self._file, "", 0)
+            super().__init__(path, root, time_step)
         except BaseException:
             self._file.close()
             raise
@@ -49,15 +54,14 @@ def _opened(path: Path) -> Any:
         import h5py
     except ImportError as error:
         raise MissingExtraError("h5py", f"reading {path.name} (HDF5)", "measurement") from error
-    try:
+    with _damage(str(path)):
         return h5py.File(path, "r")
-    except OSError as error:
-        raise InputError(
-            str(path),
-            got=f"an HDF5 file that cannot be opened ({str(error)[:80]})",
-            expected="a complete HDF5 file",
-            hint="it may be cut off, or still be open in the program that writes it.",
-        ) from error
+
+
+def _damage(where: str) -> AbstractContextManager[None]:
+    return foreign_reading(
+        where, "an HDF5 file", "it may be cut off, or still be open in the program that writes it."
+    )
 
 
 def _group(node: Any, path: str, depth: int) -> StoredGroup:
@@ -85,14 +89,30 @@ def _group(node: Any, path: str, depth: int) -> StoredGroup:
 
 
 def _array(name: str, item: Any) -> StoredArray:
+    _check_size(name, item)
+
     def read(line: int, axis: int, first: int, last: int) -> Vector:
-        if item.ndim == 1:
-            values = item[first:last]
-        else:
-            values = item[first:last, line] if axis == 0 else item[line, first:last]
+        with _damage(f"{Path(item.file.filename).name}: '{name}'"):
+            if item.ndim == 1:
+                values = item[first:last]
+            else:
+                values = item[first:last, line] if axis == 0 else item[line, first:last]
         return np.asarray(values, dtype=np.float64)
 
     return StoredArray(name=name, shape=item.shape, read=read, about=_attributes(item))
+
+
+def _check_size(name: str, item: Any) -> None:
+    """Refuse an array that cannot lie in the bytes that are stored for it."""
+    packed = 1 if item.chunks is None else _MOST_PACKED
+    if item.size * item.dtype.itemsize <= packed * item.id.get_storage_size():
+        return
+    raise InputError(
+        f"{Path(item.file.filename).name}: '{name}'",
+        got=f"{item.size} values in {item.id.get_storage_size()} bytes",
+        expected="an array that was written as a whole",
+        hint="the file is damaged, or this array was never filled: remove it.",
+    )
 
 
 def _single(item: Any) -> str | float | None:

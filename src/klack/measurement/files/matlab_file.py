@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.measurement.files.foreign import foreign_reading
 from klack.measurement.files.stored_arrays import ArrayRecording, StoredArray, StoredGroup
 
 __all__ = ["MatlabFile"]
@@ -41,15 +42,8 @@ def _loaded(path: Path) -> dict[str, Any]:
             expected="at most 2 GB (this version is read as a whole)",
             hint="save it with save(..., '-v7.3').",
         )
-    try:
+    with foreign_reading(str(path), "a MATLAB file", "save it again in MATLAB."):
         content = loadmat(path, struct_as_record=True, squeeze_me=False)
-    except Exception as error:  # a damaged file ends in any kind of error there
-        raise InputError(
-            str(path),
-            got=f"a MATLAB file that cannot be read ({str(error)[:80]})",
-            expected="a complete file of version 5 to 7.3",
-            hint="save it again in MATLAB.",
-        ) from error
     return {key: value for key, value in content.items() if not key.startswith("__")}
 
 

@@ -4,7 +4,7 @@ Values come converted to physical units.  A conversion that is a formula written
 computed: such channels are left out, with a note.
 """
 
-from contextlib import redirect_stdout
+from contextlib import AbstractContextManager, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from traceback import walk_tb
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.clock import no_clock, unique_names
+from klack.measurement.files.foreign import foreign_reading, keep_quiet
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
@@ -28,6 +29,7 @@ _NUMBERS_3 = (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16)
 _FORMULA_4, _TEXTS_4 = 3, (7, 8, 9, 10, 11)
 _FORMULA_3, _TEXTS_3 = 10, (11, 12)
 _SYNC_TIME = 1
+_VIRTUAL = (3, 6)  # types of channels that are counted, not stored
 
 
 class MdfFile(Recording):
@@ -41,6 +43,7 @@ class MdfFile(Recording):
     """
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
+        self.path = path
         self._file = path.open("rb")
         try:
             self._mdf = _opened(path, self._file)
@@ -60,11 +63,16 @@ class MdfFile(Recording):
         for g, group in enumerate(self._mdf.groups):
             if group.channel_group.cycles_nr < 2:
                 continue
+            master = self._mdf.masters_db.get(g)
+            if master is not None and not _in_record(group, group.channels[master], old):
+                raise _outside(path, group.channels[master])
             for c, channel in enumerate(group.channels):
-                if c == self._mdf.masters_db.get(g) or not _is_number(channel, old):
+                if c == master or not _is_number(channel, old):
                     continue
                 if group.channel_dependencies[c]:
                     continue
+                if not _in_record(group, channel, old):
+                    raise _outside(path, channel)
                 kind = getattr(channel.conversion, "conversion_type", 0)
                 if kind == (_FORMULA_3 if old else _FORMULA_4):
                     notes.append(f"{path.name}: '{channel.name}' left out, its unit is a formula.")
@@ -116,7 +124,8 @@ class MdfFile(Recording):
         )
 
     def _master(self, g: int, first: int, last: int) -> Vector:
-        with redirect_stdout(StringIO()):  # asammdf prints when a disk is slow
+        # asammdf prints when a disk is slow
+        with redirect_stdout(StringIO()), _damage(f"{self.path.name}: time"):
             time = self._mdf.get_master(g, record_offset=first, record_count=last - first)
         return self._second[g] * np.asarray(time, dtype=np.float64)
 
@@ -127,7 +136,7 @@ class MdfFile(Recording):
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         g, c = self._place[channel.name]
-        with redirect_stdout(StringIO()):  # as above
+        with redirect_stdout(StringIO()), _damage(f"{self.path.name}: '{channel.name}'"):
             samples, invalid = self._mdf.get(
                 group=g,
                 index=c,
@@ -159,17 +168,18 @@ def _opened(path: Path, file: Any) -> Any:
         from asammdf import MDF
     except ImportError as error:
         raise MissingExtraError("asammdf", f"reading {path.name} (MDF)", "measurement") from error
-    try:
-        # of an open file asammdf reads only the records that are asked for
-        return MDF(file, raise_on_multiple_occurrences=False)
-    except Exception as error:  # a damaged file ends in any kind of error there
-        _forget_half_open(error)
-        raise InputError(
-            str(path),
-            got=f"an MDF file that cannot be opened ({str(error)[:80]})",
-            expected="MDF version 3 or 4",
-            hint="repair or convert it with the program that wrote it.",
-        ) from error
+    keep_quiet("asammdf")
+    with _damage(str(path)):
+        try:
+            # of an open file asammdf reads only the records that are asked for
+            return MDF(file, raise_on_multiple_occurrences=False)
+        except Exception as error:
+            _forget_half_open(error)
+            raise
+
+
+def _damage(where: str) -> AbstractContextManager[None]:
+    return foreign_reading(where, "an MDF file", "repair it with the program that wrote it.")
 
 
 def _forget_half_open(error: Exception) -> None:
@@ -182,6 +192,30 @@ def _forget_half_open(error: Exception) -> None:
 
 def _is_number(channel: Any, old: bool) -> bool:
     return channel.data_type in (_NUMBERS_3 if old else _NUMBERS_4)
+
+
+def _in_record(group: Any, channel: Any, old: bool) -> bool:
+    """False if the channel claims bytes behind its record; asammdf would read there."""
+    if not old and channel.channel_type in _VIRTUAL:
+        return True
+    if old:
+        first = channel.start_offset + 8 * channel.additional_byte_offset
+    else:
+        first = 8 * channel.byte_offset + channel.bit_offset
+        flags = 8 * group.channel_group.invalidation_bytes_nr
+        if flags and not 0 <= channel.pos_invalidation_bit < flags:
+            return False
+    last = first + channel.bit_count
+    return 0 <= first < last <= min(8 * group.channel_group.samples_byte_nr, first + 64)
+
+
+def _outside(path: Path, channel: Any) -> InputError:
+    return InputError(
+        f"{path.name}: channel '{channel.name}'",
+        got="a place outside its record",
+        expected="a whole MDF file",
+        hint="repair it with the program that wrote it.",
+    )
 
 
 def _unit_of(channel: Any) -> str:

@@ -5,15 +5,17 @@ channel of its group that is a time.  Names are ``group/channel``, without the g
 only one.
 """
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import MissingExtraError
 from klack.measurement.files.clock import clock_factor, is_clock, no_clock
 from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.files.foreign import foreign_reading, keep_quiet
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit
 
@@ -33,6 +35,7 @@ class TdmsFile(Recording):
     """
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
+        self.path = path
         self._tdms = _opened(path)
         self._channel: dict[str, Any] = {}
         self._clock: dict[str, tuple[Any, float]] = {}
@@ -86,7 +89,7 @@ class TdmsFile(Recording):
         same = [c for c in clocks if len(c) == len(channel)] or clocks[:1]
         if same and not (time_step is not None and not _name_and_unit(same[0])[1]):
             clock = same[0]
-            ends = _read(clock, 0, 1)[0], _read(clock, len(clock) - 1, len(clock))[0]
+            ends = self._read(clock, 0, 1)[0], self._read(clock, len(clock) - 1, len(clock))[0]
             step = float(ends[1] - ends[0]) / (len(clock) - 1)
             factor, note = clock_factor(
                 _name_and_unit(clock)[1], step, f"{path.name}: {clock.name}"
@@ -100,13 +103,18 @@ class TdmsFile(Recording):
         return 0.0, time_step, ""
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        return _read(self._channel[channel.name], first, last)
+        return self._read(self._channel[channel.name], first, last)
 
     def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         if not channel.clock:
             return super()._time(channel, first, last)
         clock, factor = self._clock[channel.clock]
-        return factor * _read(clock, first, last)
+        return factor * self._read(clock, first, last)
+
+    def _read(self, channel: Any, first: int, last: int) -> Vector:
+        with _damage(f"{self.path.name}: channel '{channel.name}'"):
+            values = channel.read_data(offset=first, length=last - first)
+            return np.asarray(values, dtype=np.float64)
 
     def close(self) -> None:
         """Let go of the file."""
@@ -118,15 +126,15 @@ def _opened(path: Path) -> Any:
         import nptdms
     except ImportError as error:
         raise MissingExtraError("npTDMS", f"reading {path.name} (TDMS)", "measurement") from error
-    try:
+    keep_quiet("nptdms")
+    with _damage(str(path)):
         return nptdms.TdmsFile.open(path)
-    except Exception as error:  # a damaged file ends in any kind of error there
-        raise InputError(
-            str(path),
-            got=f"a TDMS file that cannot be opened ({str(error)[:80]})",
-            expected="TDMS of LabVIEW or DIAdem",
-            hint="open and save it again with the program that wrote it.",
-        ) from error
+
+
+def _damage(where: str) -> AbstractContextManager[None]:
+    return foreign_reading(
+        where, "a TDMS file", "open and save it again with the program that wrote it."
+    )
 
 
 def _numbers(group: Any) -> list[Any]:
@@ -137,7 +145,3 @@ def _name_and_unit(channel: Any) -> tuple[str, str]:
     name, unit = split_label(channel.name)
     written = str(channel.properties.get("unit_string", "") or "")
     return name, unit if no_unit(written) else plain_unit(written)
-
-
-def _read(channel: Any, first: int, last: int) -> Vector:
-    return np.asarray(channel.read_data(offset=first, length=last - first), dtype=np.float64)

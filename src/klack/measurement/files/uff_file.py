@@ -4,6 +4,7 @@ A universal file says of its values what kind of quantity they are, in SI or in 
 text.  Sets are read one at a time; the last one stays in memory.
 """
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.clock import unique_names
 from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.files.foreign import foreign_reading
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
@@ -93,15 +95,8 @@ class UffFile(Recording):
     def _data(self, number: int) -> Any:
         """Set ``number``, kept until another one is read."""
         if self._last is None or self._last[0] != number:
-            try:
+            with _damage(f"{self.path.name}: set {number + 1}"):
                 self._last = number, self._uff.read_sets(number)
-            except Exception as error:  # pyuff raises bare exceptions
-                raise InputError(
-                    f"{self.path.name}: set {number + 1}",
-                    got=f"values that cannot be read ({str(error)[:80]})",
-                    expected="a set 58 or 58b",
-                    hint="export it again, as text (58) if binary (58b) fails.",
-                ) from error
         return self._last[1]
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
@@ -135,15 +130,14 @@ def _opened(path: Path) -> Any:
             expected="at most 2 GB (it is read as a whole)",
             hint="export MDF4, TDMS or HDF5.",
         )
-    try:
+    with _damage(str(path)):
         return pyuff.UFF(str(path))
-    except Exception as error:  # pyuff raises bare exceptions
-        raise InputError(
-            str(path),
-            got=f"a universal file that cannot be opened ({str(error)[:80]})",
-            expected="sets 58 or 58b",
-            hint="export it again.",
-        ) from error
+
+
+def _damage(where: str) -> AbstractContextManager[None]:
+    return foreign_reading(
+        where, "a universal file", "export it again, as text (58) if binary (58b) fails."
+    )
 
 
 def _in_si(uff: Any) -> bool:
@@ -155,15 +149,8 @@ def _in_si(uff: Any) -> bool:
 
 
 def _header(path: Path, uff: Any, number: int) -> Any:
-    try:
+    with _damage(f"{path.name}: set {number + 1}"):
         return uff.read_sets(number, header_only=True)
-    except Exception as error:  # pyuff raises bare exceptions
-        raise InputError(
-            f"{path.name}: set {number + 1}",
-            got="a header that cannot be read",
-            expected="a set 58 or 58b",
-            hint="export it again.",
-        ) from error
 
 
 def _name(head: Any) -> str:

@@ -1,0 +1,39 @@
+"""What libraries of other people raise on damaged files, told as every other error."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from klack.errors import InputError, KlackError
+
+__all__ = ["foreign_reading", "keep_quiet"]
+
+_LONGEST = 80
+
+
+@contextmanager
+def foreign_reading(where: str, what: str, hint: str) -> Iterator[None]:
+    """Turn any error of a foreign reader into :class:`InputError`.
+
+    Parameters
+    ----------
+    where : str
+        File, and channel if there is one.
+    what : str
+        What was read, "an MDF file".
+    hint : str
+    """
+    try:
+        yield
+    except KlackError:
+        raise
+    except Exception as error:  # readers meet damage with any kind of error, bare ones as well
+        said = " ".join(str(error).split())[:_LONGEST] or type(error).__name__
+        raise InputError(
+            where, got=f"{what} that cannot be read ({said})", expected="a whole file", hint=hint
+        ) from error
+
+
+def keep_quiet(package: str) -> None:
+    """Stop a foreign reader from writing parts of damaged files to the terminal."""
+    logging.getLogger(package).setLevel(logging.CRITICAL)
