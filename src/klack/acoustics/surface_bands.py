@@ -26,7 +26,13 @@ from klack.errors import InputError, require_positive
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 
-__all__ = ["RadiatedBands", "face_band_velocity", "radiated_bands"]
+__all__ = [
+    "RadiatedBands",
+    "SurfaceSpectra",
+    "face_band_velocity",
+    "radiated_bands",
+    "surface_spectra",
+]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -58,6 +64,94 @@ class RadiatedBands:
         return np.asarray(self.energy.sum(axis=0))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Decade:
+    """Spectra over some bands: frequency (k,), fields (k, b), force (k,), weights (n, k) [Hz]."""
+
+    frequency: Floats
+    fields: Complexes
+    support_force: Complexes
+    weights: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurfaceSpectra:
+    """Velocity spectra of a surface in some bands, computed once for several questions.
+
+    Parameters
+    ----------
+    structure : Structure
+    plate : Plate or None
+    bands : array, shape (n, 2) [Hz]
+    parts : tuple
+        Spectra, decade by decade.
+    """
+
+    structure: Structure
+    plate: Plate | None
+    bands: Floats
+    parts: tuple[_Decade, ...]
+
+    def face_velocity(self, *, period: float = 1.0) -> Floats:
+        """Normal velocity of every face in every band; see :func:`face_band_velocity`."""
+        require_positive("face velocity: period", period, "s")
+        own = self.structure
+        shapes = np.hstack([own.face_shapes, own.face_residual, own.axial_normals[:, None]])
+        shapes = shapes.astype(np.float64)
+        rows = [
+            np.einsum("fb,fb->f", shapes @ _products(part.fields, weights), shapes)
+            for part in self.parts
+            for weights in part.weights
+        ]
+        return np.sqrt(np.maximum(rows, 0.0) / period)
+
+    def radiated(
+        self, *, efficiency: Efficiency = "piston", air: Air | None = None
+    ) -> RadiatedBands:
+        """Energy radiated in every band; see :func:`radiated_bands`."""
+        own, air = self.structure, air or Air()
+        names = own.group_names if self.plate is None else (*own.group_names, PLATE)
+        columns = []
+        for part in self.parts:
+            sigma = surface_efficiency(own, part.frequency, efficiency, air)
+            for weights in part.weights:
+                C = air.impedance * _products(part.fields, weights * sigma)
+                column = np.einsum("gij,ij->g", own.group_gram, C).tolist()
+                if self.plate is not None:
+                    bending = self.plate.mobility * 2.0 * np.abs(part.support_force) ** 2
+                    share = self.plate.radiated_share(part.frequency, air)
+                    column.append(float(weights @ (bending * share)))
+                columns.append(column)
+        energy = np.array(columns).reshape(len(columns), len(names)).T
+        return RadiatedBands(names=names, bands=self.bands, energy=energy)
+
+
+def surface_spectra(
+    structure: Structure,
+    forces: Mapping[str, TimeSeries],
+    bands: Floats,
+    *,
+    mount: Mount | None = None,
+    plate: Plate | None = None,
+) -> SurfaceSpectra:
+    """Velocity spectra of the surface under all forces together.
+
+    Parameters
+    ----------
+    structure : Structure
+    forces : mapping of port name to TimeSeries [N]
+        Along +z, means over intervals; held at their first and last values outside.
+    bands : array, shape (n, 2) [Hz]
+        Lower and upper edges, ascending.
+    mount, plate : Mount, Plate or None
+        What is below the held surfaces.
+    """
+    aligned_forces(structure, forces)
+    edges = _edges(bands, forces)
+    parts = tuple(_decades(structure, forces, edges, mount, plate))
+    return SurfaceSpectra(structure=structure, plate=plate, bands=edges, parts=parts)
+
+
 def face_band_velocity(
     structure: Structure,
     forces: Mapping[str, TimeSeries],
@@ -71,13 +165,8 @@ def face_band_velocity(
 
     Parameters
     ----------
-    structure : Structure
-    forces : mapping of port name to TimeSeries [N]
-        Along +z, means over intervals; held at their first and last values outside.
-    bands : array, shape (n, 2) [Hz]
-        Lower and upper edges, ascending.
-    mount, plate : Mount, Plate or None
-        What is below the held surfaces.
+    structure, forces, bands, mount, plate
+        See :func:`surface_spectra`.
     period : float [s]
         From click to click.
 
@@ -85,16 +174,8 @@ def face_band_velocity(
     -------
     array, shape (n, f) [m/s]
     """
-    require_positive("face_band_velocity: period", period, "s")
-    shapes = np.hstack(
-        [structure.face_shapes, structure.face_residual, structure.axial_normals[:, None]]
-    ).astype(np.float64)
-    rows = []
-    for part in _decades(structure, forces, bands, mount, plate):
-        for weights in part.weights:
-            C = _products(part.fields, weights)
-            rows.append(np.einsum("fb,fb->f", shapes @ C, shapes))
-    return np.sqrt(np.maximum(rows, 0.0) / period)
+    spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
+    return spectra.face_velocity(period=period)
 
 
 def radiated_bands(
@@ -115,47 +196,22 @@ def radiated_bands(
     Parameters
     ----------
     structure, forces, bands, mount, plate
-        See :func:`face_band_velocity`.
+        See :func:`surface_spectra`.
     efficiency : "piston" or "unity"
     air : Air, optional
     """
-    air = air or Air()
-    columns = []
-    for part in _decades(structure, forces, bands, mount, plate):
-        sigma = surface_efficiency(structure, part.frequency, efficiency, air)
-        for weights in part.weights:
-            C = air.impedance * _products(part.fields, weights * sigma)
-            column = np.einsum("gij,ij->g", structure.group_gram, C).tolist()
-            if plate is not None:
-                bending = plate.mobility * 2.0 * np.abs(part.support_force) ** 2
-                share = plate.radiated_share(part.frequency, air)
-                column.append(float(weights @ (bending * share)))
-            columns.append(column)
-    names = structure.group_names if plate is None else (*structure.group_names, PLATE)
-    energy = np.array(columns).reshape(len(columns), len(names)).T
-    return RadiatedBands(names=names, bands=np.asarray(bands, dtype=float), energy=energy)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Decade:
-    """Spectra over some bands: frequency (k,), fields (k, b), force (k,), weights (n, k) [Hz]."""
-
-    frequency: Floats
-    fields: Complexes
-    support_force: Complexes
-    weights: Floats
+    spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
+    return spectra.radiated(efficiency=efficiency, air=air)
 
 
 def _decades(
     structure: Structure,
     forces: Mapping[str, TimeSeries],
-    bands: Floats,
+    edges: Floats,
     mount: Mount | None,
     plate: Plate | None,
 ) -> Iterator[_Decade]:
     """Spectra of the surface fields, decade by decade: low bands need fine frequencies."""
-    aligned_forces(structure, forces)
-    edges = _edges(bands, forces)
     first = 0
     while first < len(edges):
         within = edges[first:, 1] <= max(_DECADE * edges[first, 0], edges[first, 1]) * 1.0001
