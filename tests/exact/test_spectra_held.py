@@ -99,6 +99,18 @@ def test_share_of_a_half_sine():
     assert np.all(np.diff(cumulative.share) >= 0.0)
 
 
+def test_share_counts_from_the_lower_limit():
+    """A constant density between 20 and 120 Hz: half of its energy lies below 70 Hz."""
+    density = Spectrum(
+        frequency=np.linspace(0.0, 200.0, 21), values=np.full(21, 3.0), unit="N^2 s/Hz"
+    )
+    cumulative = cumulative_energy(density, low=20.0, high=120.0)
+
+    assert cumulative.total == pytest.approx(300.0, rel=1e-12)
+    assert cumulative.frequency_below(0.5) == pytest.approx(70.0, rel=1e-12)
+    assert (cumulative.frequency[0], cumulative.frequency[-1]) == (20.0, 120.0)
+
+
 def test_level_of_a_density_is_relative_to_one_micronewton_squared_second_per_hertz():
     density = Spectrum(
         frequency=np.array([0.0, 1.0]), values=np.array([1e-12, 1e-6]), unit="N^2 s/Hz"

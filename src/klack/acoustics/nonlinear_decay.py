@@ -26,7 +26,6 @@ __all__ = ["nonlinear_decay"]
 
 _SHORT, _LONG, _VARIABLE = 5e-3, 15e-3, 75e-3  # [s]
 _STEP, _FINE = 0.5e-3, 24  # [s], steps within each
-_SAME = 1e-5  # [sone/Bark] differences that count as none
 
 
 def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -50,13 +49,12 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
         float(np.exp(-h / _LONG)),
         float(np.exp(-h / _VARIABLE)),
         _FINE,
-        _SAME,
     )
     return out
 
 
 @njit(cache=True, nogil=True)
-def _follow(core, both, alone, charge, fine, same):  # type: ignore[no-untyped-def]
+def _follow(core, both, alone, charge, fine):  # type: ignore[no-untyped-def]
     bands, n = core.shape
     out = np.empty((bands, n))
     for i in range(bands):
@@ -68,8 +66,7 @@ def _follow(core, both, alone, charge, fine, same):  # type: ignore[no-untyped-d
             u = core[i, j]
             for k in range(fine):
                 if u >= v:
-                    level = u - v < same and u <= w
-                    w = u if level else u + (w - u) * charge
+                    w = u + (w - u) * charge
                     v = u
                 elif v > w:
                     next_v = max(both[0, 0] * v + both[0, 1] * w, u)
