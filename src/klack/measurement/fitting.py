@@ -24,6 +24,7 @@ Model = Callable[[Sequence[Vector]], list[Vector]]
 
 _FIRST_STEP = 0.01
 _SMALLEST_STEP, _LARGEST_STEP = 1e-3, 0.03
+_POLISHING, _SHARES = 2, (1.0, 0.5)
 _MOVED = 0.5
 """Root mean square change of the model that a step aims at, in standard deviations."""
 
@@ -122,20 +123,53 @@ def fit_within_bounds(
             bounds=(0.0, 1.0),
             method="trf",
             ftol=tolerance,
-            xtol=1e-7,
+            xtol=1e-4,
             gtol=1e-12,
             max_nfev=most,
         )
         z = whole(found.x)
-    values = model([z])[0]
+    z, values, jacobian, cost = _polished(model, data, root, z, steps, free)
     return Fit(
         z=z,
         model=values,
-        jacobian=sensitivities(model, z, steps, np.ones(start.size, dtype=bool)),
-        cost=float(np.sum(weights * (values - data) ** 2)),
+        jacobian=jacobian,
+        cost=cost,
         converged=bool(not free.any() or found.status > 0),
         iterations=rounds,
     )
+
+
+def _polished(
+    model: Model,
+    data: Vector,
+    root: Vector,
+    z: Vector,
+    steps: Vector,
+    free: NDArray[np.bool_],
+) -> tuple[Vector, Vector, NDArray[np.float64], float]:
+    """Whole steps of Gauss and Newton with the final derivatives, as long as they help.
+
+    The search ends where the computed motion is no longer smooth; steps of the size of the
+    differences still see the slope there.
+    """
+    every = np.ones(z.size, dtype=bool)
+    jacobian = sensitivities(model, z, steps, every)
+    values = model([z])[0]
+    for _ in range(_POLISHING):
+        r = root * (values - data)
+        inside = free & (z > 0.0) & (z < 1.0)
+        if not inside.any():
+            break
+        whole = np.zeros_like(z)
+        whole[inside] = np.linalg.lstsq(root[:, None] * jacobian[:, inside], -r, rcond=1e-10)[0]
+        trials = [np.clip(z + share * whole, 0.0, 1.0) for share in _SHARES]
+        computed = model(trials)
+        costs = [float(np.sum((root * (v - data)) ** 2)) for v in computed]
+        best = int(np.argmin(costs))
+        if not costs[best] < float(r @ r):
+            break
+        z, values = trials[best], computed[best]
+    return z, values, jacobian, float(np.sum((root * (values - data)) ** 2))
 
 
 def sensitivities(

@@ -278,10 +278,11 @@ def _calibrate(
     start = np.array([p.start for p in parameters])
     at_start = whole.motion(start, whole.duration)
     before = whole.recorded(at_start, start)
-    measured: Impacts = _measured_impacts(strokes, whole.sensor)
+    mean = strokes.matrix("lift").mean(axis=0)
+    measured = _impacts_of(strokes.time, mean, whole.sensor)
     if not any(measured.values()):  # nothing to be seen: take the model's
         measured = _computed_impacts(whole, at_start, start)
-    time, lift = strokes.time, strokes.matrix("lift").mean(axis=0)
+    time, lift = strokes.time, mean
     windows = fit_windows(time, strokes.matrix("lift"), measured, section.impacts)
     taper = window_taper(time, windows)
     counted = taper > 0.0
@@ -310,7 +311,12 @@ def _calibrate(
     at_end = whole.motion(values, whole.duration)
     after = whole.recorded(at_end, values)
     misfit = _misfit(fit.cost, strokes.count, taper, len(section.channels))
-    impacts = _impacts(whole, strokes, measured, (at_start, start), (at_end, values))
+    impacts = _impacts(
+        strokes,
+        measured,
+        _impacts_of(time, before["lift"], whole.sensor_of(start)),
+        _impacts_of(time, after["lift"], whole.sensor_of(values)),
+    )
     names = [p.name for p in parameters]
     return _Result(
         fit=fit,
@@ -396,14 +402,14 @@ def _curve(parameter: FreeParameter, profile: Profile) -> ProfileCurve:
 # --------------------------------------------------------------------------- impacts
 
 
-def _measured_impacts(strokes: StrokeSet, sensor: LiftSensor) -> dict[str, list[float]]:
-    """Impact times of the mean stroke on both stops [s]."""
-    mean = strokes.matrix("lift").mean(axis=0)
-    impacts = measure_stroke(strokes.time, mean, sensor=sensor).impacts
-    return {stop: [i.time for i in impacts if i.stop == stop] for stop in _STOPS}
+def _impacts_of(time: Vector, lift: Vector, sensor: LiftSensor) -> Impacts:
+    """Impact times on both stops [s], as they are read off a lift, measured or computed."""
+    found = measure_stroke(time, lift, sensor=sensor).impacts
+    return {stop: [i.time for i in found if i.stop == stop] for stop in _STOPS}
 
 
 def _computed_impacts(model: StrokeModel, motion: Motion, values: Vector) -> Impacts:
+    """Impact times as the solver knows them, from the trigger [s]."""
     begin = _begin(model, motion, values)
     return {stop: [t - begin for t in times] for stop, times in motion.impacts.items()}
 
@@ -420,14 +426,10 @@ def _begin(model: StrokeModel, motion: Motion, values: Vector) -> float:
 
 
 def _impacts(
-    model: StrokeModel,
-    strokes: StrokeSet,
-    measured: Impacts,
-    before: tuple[Motion, Vector],
-    after: tuple[Motion, Vector],
+    strokes: StrokeSet, measured: Impacts, before: Impacts, after: Impacts
 ) -> tuple[FittedImpact, ...]:
-    """First impact on both stops, measured and computed."""
-    runs = [measured, _computed_impacts(model, *before), _computed_impacts(model, *after)]
+    """First impact on both stops, measured and computed, all read in the same way."""
+    runs = [measured, before, after]
     lifts = strokes.matrix("lift")
     openings = [_first(run, "opening", -np.inf) for run in runs]
     result = []
