@@ -21,14 +21,7 @@ from klack.acoustics.plate import Plate
 from klack.errors import InputError
 from klack.reduction.structure import Structure
 
-__all__ = [
-    "HarmonicResponse",
-    "apparent_mass",
-    "blocked_force",
-    "harmonic_response",
-    "response_axis",
-    "support_fields",
-]
+__all__ = ["HarmonicResponse", "harmonic_response", "response_axis"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,12 +66,15 @@ def harmonic_response(
     """
     f, at = response_axis(frequency), structure.port_index(port)
     m, count = len(structure.omega), len(structure.port_names)
-    receptance, omega = _receptance(structure, f), 2.0 * np.pi * f
+    omega = 2.0 * np.pi * f[:, None]
+    w, zeta = structure.omega, structure.damping
+    receptance = 1.0 / (w**2 - omega**2 + 2j * zeta * w * omega)
     phi, p = structure.port_shapes[:, at], structure.participation
+    omega = omega[:, 0]
     blocked = np.asarray(1.0 + omega**2 * (receptance @ (p * phi)), dtype=complex)
     velocity, force = np.zeros(f.size, dtype=complex), blocked
     if mount is not None or plate is not None:
-        apparent = moved_mass([structure], mount) + omega**2 * (receptance @ p**2)
+        apparent = moved_mass(structure, mount) + omega**2 * (receptance @ p**2)
         below = support_mobility(f, mount, plate)
         force = blocked / (1.0 + 1j * omega * apparent * below)
         velocity = force * below
@@ -90,50 +86,6 @@ def harmonic_response(
     return HarmonicResponse(
         frequency=f, fields=fields, support_velocity=velocity, support_force=force
     )
-
-
-def support_fields(
-    structure: Structure, frequency: NDArray[np.float64], velocity: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
-    """Velocities of the surface fields while the support moves, shape (k, b).
-
-    Parameters
-    ----------
-    structure : Structure
-    frequency : array, shape (k,) [Hz]
-    velocity : complex array, shape (k,)
-        Of the support; the answer has its unit.
-    """
-    f = response_axis(frequency)
-    m, count = len(structure.omega), len(structure.port_names)
-    omega = 2.0 * np.pi * f
-    fields = np.zeros((f.size, m + count + 1), dtype=complex)
-    driven = (omega**2 * velocity)[:, None] * structure.participation
-    fields[:, :m] = _receptance(structure, f) * driven
-    fields[:, -1] = velocity
-    return fields
-
-
-def blocked_force(
-    structure: Structure, frequency: NDArray[np.float64], port: str
-) -> NDArray[np.complex128]:
-    """Force on the rigid hold per force at a port [-], shape (k,)."""
-    omega = 2.0 * np.pi * frequency
-    carried = structure.participation * structure.port_shapes[:, structure.port_index(port)]
-    return np.asarray(1.0 + omega**2 * (_receptance(structure, frequency) @ carried))
-
-
-def apparent_mass(structure: Structure, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """What the modes add to the rigid mass that moves with the support [kg], shape (k,)."""
-    omega = 2.0 * np.pi * frequency
-    squares = structure.participation**2
-    return np.asarray(omega**2 * (_receptance(structure, frequency) @ squares))
-
-
-def _receptance(structure: Structure, f: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """``H_i`` of every mode [s^2], shape (k, m)."""
-    omega, w = 2.0 * np.pi * f[:, None], structure.omega
-    return np.asarray(1.0 / (w**2 - omega**2 + 2j * structure.damping * w * omega))
 
 
 def response_axis(frequency: NDArray[np.float64]) -> NDArray[np.float64]:

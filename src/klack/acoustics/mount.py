@@ -12,7 +12,6 @@ with the participations ``p = R_z^T M phi``.  What the kept modes miss of the ma
 mount.  The force of the impacts stays that of the rigidly held body.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +35,7 @@ class Mount:
         Along the axis.
     loss_factor : float [-]
     mass : float [kg] or None
-        Of all that moves on it; the mass of the held bodies without.
+        Of all that moves on it; the mass of the structure without.
     """
 
     stiffness: float
@@ -48,24 +47,22 @@ class Mount:
         require_nonnegative("Mount.loss_factor", self.loss_factor, "-")
 
 
-def moved_mass(structures: Sequence[Structure], mount: Mount | None) -> float:
+def moved_mass(structure: Structure, mount: Mount | None) -> float:
     """Mass that moves with the support [kg].
 
     Raises
     ------
     InputError
-        If it is less than what the modes of the structures carry.
+        If it is less than what the modes of the structure carry.
     """
-    own = sum(structure.mass for structure in structures)
-    mass = own if mount is None or mount.mass is None else mount.mass
-    carried = sum(float(s.participation @ s.participation) for s in structures)
+    mass = structure.mass if mount is None or mount.mass is None else mount.mass
+    carried = float(structure.participation @ structure.participation)
     if not mass > carried:
-        names = " and ".join(f"'{structure.name}'" for structure in structures)
         raise InputError(
-            f"mount of {names}: mass",
+            f"mount of '{structure.name}': mass",
             got=f"{mass:g} kg",
-            expected=f"more than {carried:g} kg, which the modes move",
-            hint=f"the held bodies alone have {own:g} kg; leave the mass out to take that.",
+            expected=f"more than {carried:g} kg, which the modes of the body move",
+            hint=f"the body alone has {structure.mass:g} kg; leave the mass out to take that.",
         )
     return mass
 
@@ -107,7 +104,7 @@ def mounted(structure: Structure, mount: Mount) -> Structure:
         Rigidly held.
     mount : Mount
     """
-    mass, m = moved_mass([structure], mount), len(structure.omega)
+    mass, m = moved_mass(structure, mount), len(structure.omega)
     M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])
     M[m, :m] = M[:m, m] = structure.participation
     M[m, m] = mass
