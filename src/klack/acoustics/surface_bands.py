@@ -263,8 +263,12 @@ def _spacing(structure: Structure, edges: Floats, mount: Mount | None, length: f
 
 def _products(fields: Complexes, weights: Floats) -> Floats:
     """Integral of ``2 Re(y y^*)`` with these weights, shape (b, b)."""
-    parts = (fields.real, fields.imag)
-    return np.asarray(2.0 * sum((y * weights[:, None]).T @ y for y in parts))
+    within = np.flatnonzero(weights)
+    if not within.size:
+        return np.zeros((fields.shape[1], fields.shape[1]))
+    band = slice(int(within[0]), int(within[-1]) + 1)  # few of the lines of a decade
+    parts = (fields[band].real, fields[band].imag)
+    return np.asarray(2.0 * sum((y * weights[band, None]).T @ y for y in parts))
 
 
 def _edges(bands: Floats, forces: Mapping[str, TimeSeries]) -> Floats:
