@@ -24,6 +24,7 @@ from klack.case.consistency import check_consistency
 from klack.case.guide import CaseGuide
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
+from klack.case.noise_consistency import check_noise
 from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
@@ -269,6 +270,7 @@ class Case(CaseFile):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         check_consistency(self)
+        check_noise(self)
         return self
 
     @property

@@ -9,6 +9,7 @@ from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Red
 from klack.case.calibration import CaseCalibration, free_parameters
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
+from klack.case.noise_consistency import check_noise
 from klack.case.schema import Lumped
 from klack.case.valve_consistency import check_valve
 from klack.errors import InputError
@@ -149,6 +150,7 @@ class ValveCase(CaseFile):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         check_valve(self)
+        check_noise(self)
         free_parameters(self)
         return self
 
