@@ -123,19 +123,21 @@ def _number_table(variants: tuple[ComparedVariant, ...]) -> Table:
         for name, rms, scatter, over in curve_rows(variant):
             title = f"{head}{name}, root mean square"
             rows.append((title, "", "", scatter, "", str(variant.count), rms, over))
-        for stop, kind, *cells in impact_rows(variant, most=1):
-            rows.append((f"{head}{kind}\n{stop}", *cells))
-    return Table(columns=("", *IMPACT_COLUMNS[2:]), rows=tuple(rows))
+        rows += [(f"{head}{first}", *cells) for first, *cells in _one_column(variant, most=1)]
+    return Table(
+        columns=("", *IMPACT_COLUMNS[2:]), rows=tuple(tuple(map(_typeset, row)) for row in rows)
+    )
 
 
 def _variant_sections(variant: ComparedVariant) -> list[Section]:
     touches = (first_touch_chart(variant, stop) for stop in ("opening", "seat"))
-    rows = tuple((f"{a}\n{b}" if a else b, *rest) for a, b, *rest in _all_rows(variant))
+    rows = tuple(tuple(map(_typeset, row)) for row in _one_column(variant, most=_MOST_IMPACTS))
+    curves = tuple(tuple(map(_typeset, row)) for row in curve_rows(variant))
     return [
         Section(
             title=f"The whole stroke: {variant.variant}",
             charts=(lift_chart(variant),),
-            tables=(Table(columns=CURVE_COLUMNS, rows=curve_rows(variant)),),
+            tables=(Table(columns=CURVE_COLUMNS, rows=curves),),
         ),
         Section(
             title=f"First impacts: {variant.variant}",
@@ -149,8 +151,15 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
     ]
 
 
-def _all_rows(variant: ComparedVariant) -> list[tuple[str, ...]]:
-    return list(impact_rows(variant, most=_MOST_IMPACTS))
+def _one_column(variant: ComparedVariant, *, most: int) -> list[tuple[str, ...]]:
+    """Rows of impacts with number and stop in one cell."""
+    return [(f"{kind}\n{stop}", *cells) for stop, kind, *cells in impact_rows(variant, most)]
+
+
+def _typeset(text: str) -> str:
+    """A terminal writes um and -; a page has better signs."""
+    text = text.replace("[us]", "[µs]").replace("[um]", "[µm]")
+    return text.replace("-", "\N{MINUS SIGN}") if text[:1] == "-" else text
 
 
 def _measured(study: MeasuredStrokeStudy) -> Section:
@@ -204,7 +213,9 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "reading error",
-        "Standard error with which a number is read off one stroke, median of the strokes.",
+        "Standard error with which a number is read off one stroke, median of the strokes; of "
+        "times, with the spacing of the samples that find the trigger. Where few strokes happen to "
+        "scatter less than that, differences count in reading errors.",
     ),
     (
         "time, approach speed, restitution",

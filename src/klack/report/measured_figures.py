@@ -1,6 +1,7 @@
 """The figures of a report beside a measurement: computed black, measured blue, in all of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite
 
 import numpy as np
@@ -70,16 +71,17 @@ def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
     if impact is None or not isfinite(impact.time.measured):
         return None
     window = _around(variant, impact)
-    mark = Mark(value=1e3 * impact.time.measured, label="measured first touch")
-    computed = Mark(value=1e3 * impact.time.computed, label="computed")
+    mark = Mark(value=1e3 * impact.time.measured, label="first touch, measured")
+    computed = Mark(value=1e3 * impact.time.computed, label="first touch, computed")
     lift, velocity = (_lift_panel(variant, window, 0.9), _velocity_panel(variant, window, 0.8))
     marks = tuple(sorted((mark, computed), key=lambda item: item.value))
+    axis = replace(lift.y, range=_with_room(lift))
     return Chart(
         name=f"touch-{variant.variant}-{stop}",
         title=f"First impact on the {stop_words(stop)}: {variant.variant}",
         x=AxisSpec(label="time from the trigger", unit="ms", range=window),
         panels=(
-            Panel(y=lift.y, curves=lift.curves, marks=marks, share=lift.share),
+            Panel(y=axis, curves=lift.curves, marks=marks, share=lift.share),
             Panel(
                 y=velocity.y,
                 curves=velocity.curves,
@@ -89,6 +91,13 @@ def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
         ),
         note="First touch: where the fitted flight reaches the level of the stop.",
     )
+
+
+def _with_room(panel: Panel) -> tuple[float, float]:
+    """Range of y with room above the curves for the words of the marks."""
+    low = min(float(curve.y.min()) for curve in panel.curves)
+    high = max(float(curve.y.max()) for curve in panel.curves)
+    return low - 0.05 * (high - low), high + 0.45 * (high - low)
 
 
 def side_by_side_chart(variants: Sequence[ComparedVariant]) -> Chart:
@@ -247,7 +256,7 @@ def measured_distribution_chart(of: MeasuredDistribution) -> Chart:
         x=AxisSpec(label=of.name, unit=unit, range=(low - 0.06 * span, high + 0.3 * span)),
         panels=(
             Panel(
-                y=AxisSpec(label="share of shots up to it", unit="%", range=(-2.0, 105.0)),
+                y=AxisSpec(label="share of shots up to it", unit="%", range=(-2.0, 130.0)),
                 curves=(*curves, *tops),
                 marks=tuple(sorted(marks, key=lambda mark: mark.value)),
             ),

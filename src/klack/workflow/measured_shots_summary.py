@@ -28,7 +28,10 @@ def drop_verdict(study: MeasuredShotsStudy) -> str:
     both = f"{len(study.names)} measured drops"
     if not apart:
         return f"The distributions of the computed shots and of {both} agree."
-    words = " and ".join(f"the {d.name} (by {100 * d.statistic:.0f} %)" for d in apart)
+    words = " and ".join(
+        f"the {d.name} (by {100 * d.statistic:.0f} % of the shots where they are farthest apart)"
+        for d in apart
+    )
     return f"The distributions of the computed shots and of {both} differ in {words}."
 
 
@@ -36,8 +39,7 @@ def drop_rule(study: MeasuredShotsStudy) -> str:
     """How the verdict is found."""
     return (
         "Rule: two distributions agree if shots of one and the same valve would differ more in "
-        f"at least {100 * study.likely:g} of 100 repetitions (test of Kolmogorov and Smirnov; in "
-        "brackets its largest distance of the cumulative curves)."
+        f"at least {100 * study.likely:g} of 100 repetitions (test of Kolmogorov and Smirnov)."
     )
 
 

@@ -8,7 +8,7 @@ the same way, so that what a differentiator or a fit takes away is taken from bo
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
-from math import isfinite
+from math import hypot, isfinite, sqrt
 from pathlib import Path
 from time import perf_counter
 
@@ -22,6 +22,7 @@ from klack.measurement.computed_stroke import recorded_stroke, trigger_instant
 from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
+from klack.measurement.roles import ROLES
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.stroke_set import StrokeSet
@@ -127,9 +128,19 @@ def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
 
 def _needed(section: CaseMeasurement) -> CaseMeasurement:
     """Only lift and the channel of the trigger: a dry bench records no pressure."""
-    roles = {"lift"} if section.trigger is None else {"lift", section.trigger.channel}
+    roles = _roles(section)
     channels = {role: choice for role, choice in section.channels.items() if role in roles}
     return section.model_copy(update={"channels": channels})
+
+
+def _roles(section: CaseMeasurement) -> set[str]:
+    return {"lift"} if section.trigger is None else {"lift", section.trigger.channel}
+
+
+def _about(notes: Sequence[str], roles: set[str]) -> tuple[str, ...]:
+    """Notes without those on channels that are found, but not compared."""
+    others = tuple(f"taken as {role}." for role in ROLES if role not in roles)
+    return tuple(note for note in notes if not note.endswith(others))
 
 
 # --------------------------------------------------------------------------- one variant
@@ -150,7 +161,7 @@ def _compare(
     model, guessed = _read(time, computed, sensor, study.lift)
     both = [_read(time, row, sensor, study.lift) for row in lift]
     readings = [measures for measures, _ in both]
-    notes = strokes.notes
+    notes = _about(strokes.notes, _roles(section))
     if guessed or any(by_drawing for _, by_drawing in both):
         notes = (*notes, _BY_DRAWING)
     return ComparedVariant(
@@ -180,7 +191,7 @@ def _compare(
         way=compare_numbers(
             model.lift, [item.lift for item in readings], [item.level_se for item in readings]
         ),
-        impacts=_impacts(model, readings),
+        impacts=_impacts(model, readings, strokes.step),
     )
 
 
@@ -264,7 +275,7 @@ def _scatter(records: Floats, median: Floats) -> float:
 
 
 def _impacts(
-    model: StrokeMeasures, readings: Sequence[StrokeMeasures]
+    model: StrokeMeasures, readings: Sequence[StrokeMeasures], step: float
 ) -> tuple[ComparedImpact, ...]:
     """Impacts of the model beside those of the same number on the same stop."""
     found = []
@@ -275,26 +286,32 @@ def _impacts(
             same = [hits[i] for hits in measured if len(hits) > i]
             if 2 * len(same) < len(measured) or not same:
                 break
-            found.append(_impact(stop, i + 1, hit, same))
+            found.append(_impact(stop, i + 1, hit, same, step))
     return tuple(sorted(found, key=lambda item: item.time.computed))
 
 
 def _counted(measures: StrokeMeasures, stop: Stop) -> tuple[MeasuredImpact, ...]:
     """Impacts on a stop from the first one that is no trembling at rest."""
     hits = measures.on(stop)
-    fastest = max((h.approach_speed for h in measures.impacts), default=0.0)
+    known = (hit.approach_speed for hit in measures.impacts if isfinite(hit.approach_speed))
+    fastest = max(known, default=0.0)
     real = [i for i, hit in enumerate(hits) if hit.approach_speed > _NOTICED * fastest]
     return hits[real[0] : real[-1] + 1] if real else ()
 
 
 def _impact(
-    stop: Stop, number: int, hit: MeasuredImpact, same: Sequence[MeasuredImpact]
+    stop: Stop, number: int, hit: MeasuredImpact, same: Sequence[MeasuredImpact], step: float
 ) -> ComparedImpact:
+    """Numbers of one impact; times are not better known than the sampled trigger."""
+    sampled = {"time": step / sqrt(12.0)}
     numbers = {
         kind.field: compare_numbers(
             getattr(hit, kind.field),
             [getattr(other, kind.field) for other in same],
-            [getattr(other, _ERRORS[kind.field]) for other in same],
+            [
+                hypot(getattr(other, _ERRORS[kind.field]), sampled.get(kind.field, 0.0))
+                for other in same
+            ],
         )
         for kind in IMPACT_MEASURES
     }

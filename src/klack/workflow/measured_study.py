@@ -57,26 +57,46 @@ class Compared:
 
     @property
     def in_scatter(self) -> float:
-        """Difference in units of the scatter [-]; nan without."""
-        if not isfinite(self.difference) or not self.scatter > 0.0:
+        """Difference over the scatter, or over the reading error where that is larger [-]."""
+        width = max(self.scatter, self.error)
+        if not isfinite(self.difference) or not width > 0.0:
             return float("nan")
-        return self.difference / self.scatter
+        return self.difference / width
 
 
 @dataclass(frozen=True, slots=True)
 class ImpactMeasure:
-    """One number of an impact: field of :class:`ComparedImpact`, in words, SI unit."""
+    """One number of an impact.
+
+    Parameters
+    ----------
+    field : str
+        Of :class:`ComparedImpact`.
+    name : str
+        In words.
+    unit : str
+        In which people read it; ``factor`` leads to it from SI, ``decimals`` are printed.
+    factor : float
+    decimals : int
+    """
 
     field: str
     name: str
     unit: str
+    factor: float
+    decimals: int
+
+    @property
+    def title(self) -> str:
+        """Name with unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
 IMPACT_MEASURES = (
-    ImpactMeasure("time", "time", "s"),
-    ImpactMeasure("approach_speed", "approach speed", "m/s"),
-    ImpactMeasure("restitution", "restitution", ""),
-    ImpactMeasure("rebound_height", "rebound height", "m"),
+    ImpactMeasure("time", "time", "us", 1e6, 1),
+    ImpactMeasure("approach_speed", "approach speed", "m/s", 1.0, 3),
+    ImpactMeasure("restitution", "restitution", "", 1.0, 3),
+    ImpactMeasure("rebound_height", "rebound height", "um", 1e6, 2),
 )
 """What is compared of every impact."""
 

@@ -3,12 +3,12 @@
 from math import isfinite
 from typing import Any
 
-from klack.units import format_si
 from klack.workflow.measured_study import (
     IMPACT_MEASURES,
     Compared,
     ComparedImpact,
     ComparedVariant,
+    ImpactMeasure,
     MeasuredStrokeStudy,
     stop_words,
 )
@@ -21,6 +21,7 @@ __all__ = [
     "curve_rows",
     "impact_rows",
     "measured_to_json",
+    "rule",
     "verdict",
 ]
 
@@ -85,52 +86,46 @@ def rule(study: MeasuredStrokeStudy) -> str:
 
 def curve_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`CURVE_COLUMNS`: lift and velocity."""
-    return tuple(
-        (name, format_si(rms, unit, 3), _si(scatter, unit, 3), _text(rms / scatter, ".2f"))
-        for name, rms, scatter, unit in (
-            ("lift", variant.lift_rms, variant.lift_scatter, "m"),
-            ("velocity", variant.velocity_rms, variant.velocity_scatter, "m/s"),
-        )
+    return (
+        _curve_row("lift [um]", 1e6 * variant.lift_rms, 1e6 * variant.lift_scatter, 2),
+        _curve_row("velocity [m/s]", variant.velocity_rms, variant.velocity_scatter, 4),
     )
+
+
+def _curve_row(name: str, rms: float, scatter: float, decimals: int) -> tuple[str, ...]:
+    form = f".{decimals}f"
+    return (name, _text(rms, form), _text(scatter, form), _text(rms / scatter, ".1f"))
 
 
 def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`IMPACT_COLUMNS`: the first ``most`` impacts on each stop."""
-    rows = []
-    for stop in ("opening", "seat"):
-        for impact in variant.impacts:
-            if impact.stop == stop and impact.number <= most:
-                rows += _impact_rows(impact)
+    rows = [
+        (f"{stop_words(impact.stop)} #{impact.number}", kind.title, *_cells(impact, kind))
+        for stop in ("opening", "seat")
+        for impact in variant.impacts
+        if impact.stop == stop and impact.number <= most
+        for kind in IMPACT_MEASURES
+    ]
     if isfinite(variant.way.difference):
-        rows.append(("between the stops", "lift", *_cells(variant.way, "m")))
+        rows.append(("between the stops", "lift [um]", *_numbers(variant.way, 1e6, 2)))
     return tuple(rows)
 
 
-def _impact_rows(impact: ComparedImpact) -> list[tuple[str, ...]]:
-    heads = [f"{stop_words(impact.stop)} #{impact.number}", "", "", ""]
-    return [
-        (head, kind.name, *_cells(impact.measure(kind), kind.unit))
-        for head, kind in zip(heads, IMPACT_MEASURES, strict=True)
-    ]
+def _cells(impact: ComparedImpact, kind: ImpactMeasure) -> tuple[str, ...]:
+    return _numbers(impact.measure(kind), kind.factor, kind.decimals)
 
 
-def _cells(number: Compared, unit: str) -> tuple[str, ...]:
+def _numbers(number: Compared, factor: float, decimals: int) -> tuple[str, ...]:
+    form = f".{decimals}f"
     return (
-        _si(number.computed, unit, 5),
-        _si(number.measured, unit, 5),
-        _si(number.scatter, unit, 2),
-        _si(number.error, unit, 2),
+        _text(factor * number.computed, form),
+        _text(factor * number.measured, form),
+        _text(factor * number.scatter, form),
+        _text(factor * number.error, form),
         str(number.count),
-        _si(number.difference, unit, 3, sign=True),
+        _text(factor * number.difference, f"+{form}"),
         _text(number.in_scatter, "+.1f"),
     )
-
-
-def _si(value: float, unit: str, digits: int, *, sign: bool = False) -> str:
-    if not isfinite(value):
-        return "–"
-    plus = "+" if sign and value > 0.0 else ""
-    return plus + (format_si(value, unit, digits) if unit else f"{value:.4f}")
 
 
 def _text(value: float, form: str) -> str:
@@ -146,9 +141,10 @@ def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``case``, ``variant`` (the first one) and its numbers: ``lift_rms_m``,
-        ``velocity_rms_m_s``, both with ``..._scatter_...``; ``impacts``: per impact each number
-        computed, ``_measured``, ``_scatter``, ``_reading_error`` and ``_difference_in_scatter``;
+        ``case``, ``variant`` (the first one) and its numbers: ``lift_rms_m`` and
+        ``velocity_rms_m_s``, with ``..._rms_scatter_...`` of single strokes; ``lift_m`` between
+        the stops; ``impacts``: per impact each number computed, ``_measured``, ``_scatter``,
+        ``_reading_error``, ``_difference`` and ``_difference_in_scatter``;
         ``variants``: the same of all.  Numbers that do not exist (nan) are None.
     """
     variants = {name: _variant(study, variant) for name, variant in study.variants.items()}
@@ -170,9 +166,9 @@ def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> dict[str, 
         "strokes": variant.count,
         "rejected": [{"name": item.name, "reason": item.reason} for item in variant.rejected],
         "lift_rms_m": _number(variant.lift_rms),
-        "lift_scatter_m": _number(variant.lift_scatter),
+        "lift_rms_scatter_m": _number(variant.lift_scatter),
         "velocity_rms_m_s": _number(variant.velocity_rms),
-        "velocity_scatter_m_s": _number(variant.velocity_scatter),
+        "velocity_rms_scatter_m_s": _number(variant.velocity_scatter),
         "velocity_bandwidth_Hz": _number(variant.velocity_bandwidth),
         **_compared(variant.way, "lift{}_m"),
         "impacts": [_impact(impact) for impact in variant.impacts],

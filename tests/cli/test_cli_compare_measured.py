@@ -1,0 +1,180 @@
+"""klack compare RESULT --measurement through main(argv), on the rigid valve of the how-to page.
+
+Truth: the recording is the computed stroke itself, with noise, an offset or a gain put on it, so
+that every residual is known beforehand: noise s leaves a scatter of s, an offset d a difference of
+d, and the restitution is the one of the case.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.cli.main import main
+from klack.workflow.stroke_store import load_stroke
+
+CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
+STROKES, NOISE, RATE = 3, 0.2e-6, 400e3
+REST = 0.3e-3  # [s] before each stroke
+SECTION = """
+measurement:
+  channels: {lift: Hub}
+  trigger: {channel: lift, share: 20 %, before: 0.1 ms, after: 1.7 ms}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory) -> Path:
+    """Folder with the computed strokes and the case that says how they were measured."""
+    folder = tmp_path_factory.mktemp("measured")
+    case = folder / "case.yaml"
+    case.write_text(CASE.read_text() + SECTION)
+    assert main(["stroke", str(case), "--out", str(folder), "--no-report", "-q"]) == 0
+    return folder
+
+
+def record(result: Path, path: Path, variant: str = "wet", **changes: float) -> Path:
+    """Write strokes of the result behind each other, with semicolons and decimal commas."""
+    run = load_stroke(result).variants[variant].result
+    lift = run.channels["needle.tip displacement"].values
+    period = REST + float(run.time[-1])
+    time = np.arange(0.0, STROKES * period, 1.0 / RATE)
+    # the clock of the recorder is no multiple of the stroke
+    shown = np.interp(time % period - REST, run.time, lift)
+    shown = changes.get("gain", 1.0) * shown + changes.get("offset", 0.0)
+    shown += NOISE * np.random.default_rng(7).standard_normal(time.size)
+    rows = [
+        f"{1e3 * t:.4f};{1e6 * x:.3f}".replace(".", ",") for t, x in zip(time, shown, strict=True)
+    ]
+    path.write_text("\n".join(["# made by a test", "Zeit;Hub", "ms;um", *rows]) + "\n")
+    return path
+
+
+def compared(result: Path, *words: str) -> dict:
+    numbers = Path("numbers.json").absolute()
+    assert main(["compare", str(result), *words, "--json", str(numbers), "--no-report", "-q"]) == 0
+    return json.loads(numbers.read_text())
+
+
+def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
+    path = record(result, tmp_path / "strokes.csv")
+    numbers = tmp_path / "numbers.json"
+    words = ["--measurement", str(path), "--json", str(numbers), "--no-report"]
+    assert main(["compare", str(result), *words]) == 0
+    found, out = json.loads(numbers.read_text()), capsys.readouterr().out
+
+    assert found["variant"] == "wet"
+    assert found["strokes"] == STROKES
+    assert found["agreement"] == "excellent"
+    # less than one stroke alone: the rest of the noise, and of the trigger's
+    assert 0.4 * NOISE < found["lift_rms_m"] < NOISE
+    # about the median of three the strokes scatter sqrt(2/3) as much, and more by the trigger
+    assert 0.7 * NOISE < found["lift_rms_scatter_m"] < 1.3 * NOISE
+    first = {impact["stop"]: impact for impact in reversed(found["impacts"])}
+    assert set(first) == {"opening", "seat"}
+    for impact in first.values():
+        assert abs(impact["time_difference_in_scatter"]) < 2
+        assert abs(impact["restitution_difference_in_scatter"]) < 2
+        assert impact["restitution"] == pytest.approx(impact["restitution_measured"], abs=0.01)
+
+    assert "over scatter" in out
+    assert "opening stop #1" in out
+    assert f"Excellent agreement of 'wet' with {STROKES} measured strokes" in out
+    assert "Rule: the agreement is excellent if" in out
+
+
+def test_dry_impacts_have_the_restitution_of_the_case(result, tmp_path):
+    path = record(result, tmp_path / "dry.csv", "dry")
+    found = compared(result, "--measurement", f"dry={path}")
+
+    assert list(found["variants"]) == ["dry"]
+    first = {impact["stop"]: impact for impact in reversed(found["impacts"])}
+    for impact in first.values():
+        assert impact["restitution"] == pytest.approx(0.5, abs=0.01)
+        assert impact["restitution_measured"] == pytest.approx(0.5, abs=0.02)
+
+
+def test_an_offset_is_a_residual_until_the_sensor_has_it(result, tmp_path):
+    away = 3e-6
+    path = record(result, tmp_path / "strokes.csv", offset=away)
+    case = tmp_path / "raw.yaml"
+    case.write_text(CASE.read_text() + SECTION + "  zero: none\n")
+    raw = compared(result, "--measurement", str(path), "--case", str(case))
+    assert raw["lift_rms_m"] == pytest.approx(away, rel=0.05)
+    assert raw["agreement"] == "none"
+
+    case.write_text(CASE.read_text() + SECTION + "  zero: none\n  sensor: {offset: 3 um}\n")
+    known = compared(result, "--measurement", str(path), "--case", str(case))
+    assert known["lift_rms_m"] < NOISE
+    assert known["agreement"] == "excellent"
+
+
+def test_lift_that_is_zeroed_forgets_the_offset(result, tmp_path):
+    path = record(result, tmp_path / "strokes.csv", offset=3e-6)
+    assert compared(result, "--measurement", str(path))["lift_rms_m"] < NOISE
+
+
+def test_another_lift_is_told_from_the_computed_one(result, tmp_path):
+    found = compared(
+        result, "--measurement", str(record(result, tmp_path / "strokes.csv", gain=1.05))
+    )
+    assert found["agreement"] == "none"
+    assert "No agreement" in found["verdict"]
+    assert found["lift_difference_m"] == pytest.approx(-5e-6, rel=0.05)
+
+
+@pytest.mark.slow
+def test_both_variants_and_the_report(result, tmp_path):
+    wet = record(result, tmp_path / "wet.csv")
+    dry = record(result, tmp_path / "dry.csv", "dry")
+    words = ["compare", str(result), "--measurement", str(wet), "--measurement", f"dry={dry}"]
+    assert main([*words, "-q"]) == 0
+    folder = result / "measured"
+    assert (folder / "report.pdf").read_bytes().startswith(b"%PDF")
+    page = (folder / "report.html").read_text()
+    for words in (
+        "Side by side",
+        "The whole stroke: wet",
+        "First impacts: dry",
+        "Rule:",
+        "5 to 95 %",
+    ):
+        assert words in page
+
+    (folder / "report.html").unlink()
+    assert main(["report", str(folder), "-q"]) == 0
+    assert "Side by side" in (folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "neither --measurement nor --calculix"),
+        (("--measurement", "a.csv", "--calculix", "b.dat"), "both of them"),
+        (("--measurement", "nowhere.csv"), "no such file"),
+        (("--measurement", "dry=nowhere.csv"), "VARIANT=FILE"),
+        (("--measurement", "wet-lumped={here}"), "without the variant 'wet-lumped'"),
+        (("--measurement", "{here}", "--case", "nowhere"), "neither a file nor a shipped case"),
+    ],
+)
+def test_wrong_words_are_one_message(result, tmp_path, capsys, words, told):
+    here = str(record(result, tmp_path / "strokes.csv"))
+    words = [word.replace("{here}", here) for word in words]
+    assert main(["compare", str(result), *words, "-q"]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert "Traceback" not in error
+
+
+def test_a_trigger_that_the_model_never_meets(result, tmp_path, capsys):
+    path = record(result, tmp_path / "strokes.csv", gain=2.0)
+    case = tmp_path / "high.yaml"
+    case.write_text(CASE.read_text() + SECTION.replace("share: 20 %", "level: 150 um"))
+    assert main(["compare", str(result), "--measurement", str(path), "--case", str(case)]) == 1
+    assert "never crosses the trigger level" in capsys.readouterr().err
