@@ -269,19 +269,19 @@ class _Problem:
         self, observe: Callable[[dict[int, float], float, float], None], k: int
     ) -> None:
         """Acceleration of the approach at its end against that of the bounces."""
-        f = self._flight(k)
-        if f is None or f.coefficients.size != 3:
+        f, own = self._flight(k), self.flights[k]
+        if f is None or own is None:
             return
-        own = self.flights[k]
-        assert own is not None  # as f
-        told = float(self.unknown[2])
-        spread = float(np.hypot(_UNLIKE, self.scatter) * self.force)
-        if abs(float(own.coefficients[2]) - told) > 3.0 * np.hypot(
-            spread, float(np.sqrt(own.covariance[2, 2]))
-        ):
+        found, _ = own.derivative(own.last, 2)
+        a, gradient = f.derivative(f.last, 2)
+        told = 2.0 * float(self.unknown[2])
+        spread = 2.0 * self.force * float(np.hypot(_UNLIKE, self.scatter))
+        error = float(np.sqrt(max(float(gradient @ own.covariance @ gradient), 0.0)))
+        if abs(found - told) > 3.0 * np.hypot(spread, error):
             return  # another force acts on the way there
         i = self.part[k].start
-        observe({i + 2: 1.0, 2: -1.0}, float(self.unknown[i + 2]) - told, spread)
+        by = {i + j: float(g) for j, g in enumerate(gradient)}
+        observe({**by, 2: -2.0}, a - told, spread)
 
     def _learn_scatter(self) -> None:
         """Scatter of the accelerations beyond their own errors, by their moments."""

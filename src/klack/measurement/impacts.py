@@ -32,12 +32,12 @@ from klack.measurement.stop_levels import SmoothLift, find_levels, smooth_lift
 from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.uniform import uniform_step
 
-__all__ = ["measure_stroke"]
+__all__ = ["FittedStroke", "fit_flights", "measure_stroke", "read_flights"]
 
 _SETTLED = 4.0  # time constants of the sensor after which it shows nothing of an impact
 _FEWEST = 9  # samples of a flight that is fitted
 _SIGNIFICANT = 3.0  # standard errors of a rebound height that is seen
-_AGREES = 3.0  # standard errors within which nested stretches agree
+_AGREES = 3.5  # standard errors within which nested stretches agree
 _OWN_NOISE = 60e-6  # [s] before a touch, from which the noise of an approach is taken
 _ROUNDS = 4  # of finding touch and release, each of which bounds the samples of the other
 _SHORTEST = 30e-6  # [s] stretch before a first touch
@@ -67,6 +67,16 @@ class _Ends:
     flight: Flight
     release: Crossing | None
     touch: Crossing | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedStroke:
+    """Impacts found, and each flight fitted alone; see :func:`fit_flights`."""
+
+    record: _Record
+    touches: tuple[Touch, ...]
+    fits: tuple[_Ends | None, ...]
+    notes: tuple[str, ...]
 
 
 def measure_stroke(
@@ -108,6 +118,20 @@ def measure_stroke(
     InputError
         If the time is not uniform, values are missing, or the lift never changes.
     """
+    return read_flights(
+        fit_flights(time, lift, seat=seat, opening=opening, sensor=sensor), shapes or {}
+    )
+
+
+def fit_flights(
+    time: NDArray[np.float64],
+    lift: NDArray[np.float64],
+    *,
+    seat: float | None = None,
+    opening: float | None = None,
+    sensor: LiftSensor | None = None,
+) -> FittedStroke:
+    """First half of :func:`measure_stroke`: find the impacts, fit each flight alone."""
     record, notes = _prepare(time, lift, seat, opening, sensor)
     touches = find_touches(record.smooth, record.levels)
     fits = _fit_all(record, touches)
@@ -116,18 +140,24 @@ def measure_stroke(
         fits = _fit_all(record, touches)
     factor = correlation_factor(tuple(f.flight.residuals for f in fits if f is not None))
     record = replace(record, correlation=factor, noise=_noise(fits))
-    fits = _fit_all(record, touches)
-    trains = _joined(record, touches, fits, shapes or {})
-    impacts = _impacts(record, touches, trains)
-    noise = _noise(fits)
+    return FittedStroke(
+        record=record, touches=touches, fits=tuple(_fit_all(record, touches)), notes=notes
+    )
+
+
+def read_flights(fitted: FittedStroke, shapes: Mapping[Stop, FlightShape]) -> StrokeMeasures:
+    """Second half of :func:`measure_stroke`: estimate the flights on each stop together."""
+    record, touches = fitted.record, fitted.touches
+    trains = _joined(record, touches, list(fitted.fits), shapes)
+    noise = _noise(list(fitted.fits))
     return StrokeMeasures(
-        impacts=impacts,
+        impacts=_impacts(record, touches, trains),
         seat_level=record.levels.get("seat", _NAN),
         opening_level=record.levels.get("opening", _NAN),
         level_se=max(record.level_se.values(), default=_NAN),
         noise=record.smooth.noise if noise is None else noise,
         least_height=record.smooth.least_height,
-        notes=notes,
+        notes=fitted.notes,
         shapes={
             touches[run.start].stop: train.shape for run, train in trains if train.shape is not None
         },
@@ -213,11 +243,19 @@ def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
         middle = 0.5 * (release + touch)
         if not (release - guard < first < middle < last < touch + guard):
             return ends
+        window = _window(record, first, last)
+        if window is None or _same(window[0], ends.flight):
+            return ends
         better = _whole(record, before.stop, first, last)
         if better is None:
             return ends
         ends = better
     return ends
+
+
+def _same(time: NDArray[np.float64], flight: Flight) -> bool:
+    """Whether a flight was fitted to these very samples."""
+    return bool(time[0] == flight.first and time[-1] == flight.last)
 
 
 def _whole(record: _Record, stop: Stop, first: float, last: float) -> _Ends | None:
@@ -279,6 +317,9 @@ def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | No
     ends = _longest_stretch(record, after.stop, start, touch - guard)
     for _ in range(_ROUNDS):
         if ends is None or ends.touch is None or abs(ends.touch.time - touch) > 2.0 * guard:
+            return ends
+        window = _window(record, ends.flight.first, ends.touch.time)
+        if window is None or _same(window[0], ends.flight):
             return ends
         better = _longest_stretch(record, after.stop, start, ends.touch.time)
         if better is None:

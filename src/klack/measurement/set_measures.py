@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.measurement.impacts import measure_stroke
+from klack.measurement.impacts import fit_flights, read_flights
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.stroke_set import StrokeSet
@@ -225,16 +225,13 @@ def measure_set(
         )
     lifts = strokes.matrix("lift")
 
-    def read(lift: Vector, shapes: Mapping[Stop, FlightShape]) -> StrokeMeasures:
-        return measure_stroke(
-            strokes.time, lift, seat=seat, opening=opening, sensor=sensor, shapes=shapes
-        )
-
-    alone = [read(lift, {}) for lift in lifts]
-    told = (
-        [read(lift, _others(alone, k)) for k, lift in enumerate(lifts)] if len(alone) > 2 else alone
-    )
-    return SetMeasures(names=tuple(stroke.name for stroke in strokes.strokes), strokes=tuple(told))
+    fitted = [
+        fit_flights(strokes.time, lift, seat=seat, opening=opening, sensor=sensor) for lift in lifts
+    ]
+    read = [read_flights(one, {}) for one in fitted]
+    if len(read) > 2:
+        read = [read_flights(one, _others(read, k)) for k, one in enumerate(fitted)]
+    return SetMeasures(names=tuple(stroke.name for stroke in strokes.strokes), strokes=tuple(read))
 
 
 def expected_maximum(count: int) -> float:

@@ -1,0 +1,177 @@
+"""Truth: recordings made here, whose triggers, strokes and defects are known."""
+
+import numpy as np
+import pytest
+
+from klack.case.measurement import CaseMeasurement
+from klack.errors import InputError
+from klack.measurement.alignment import common_axis, onto_axis
+from klack.measurement.cutting import Piece, cut_strokes, trigger_level
+from klack.measurement.loading import load_stroke_set
+from klack.measurement.outliers import find_outliers
+from klack.measurement.trigger import Trigger
+from klack.signals import TimeSeries
+
+STEP = 2e-6  # [s]
+TRIGGER = Trigger(channel="current", share=0.5, before="0.2 ms", after="3 ms")
+
+
+def pulses(instants, duration, *, noise=0.0, step=STEP):
+    """Currents that rise over 50 us, stay for 2 ms and fall."""
+    t = step * np.arange(round(duration / step))
+    x = np.zeros_like(t)
+    for instant in instants:
+        x += np.clip((t - instant) / 50e-6, 0.0, 1.0) * (t < instant + 2e-3)
+    return t, 5.0 * x + noise * np.random.default_rng(3).normal(size=t.size)
+
+
+def in_windows(values, size, overlap):
+    first = 0
+    while True:
+        last = min(first + size, values.size)
+        yield {
+            "current": TimeSeries(
+                step=STEP, values=values[first:last], unit="A", start=first * STEP
+            )
+        }
+        if last == values.size:
+            return
+        first = last - overlap
+
+
+@pytest.mark.parametrize("size", [2000, 2351, 5003, 10**6])
+def test_windows_do_not_change_what_is_cut(size):
+    instants = [3e-3, 10.0007e-3, 17.0013e-3, 24e-3, 31.0001e-3]
+    _, x = pulses(instants, 40e-3)
+    level = trigger_level(in_windows(x, size, 0), TRIGGER)
+    pieces = list(cut_strokes(in_windows(x, size, 1610), TRIGGER, level))
+
+    assert level == pytest.approx(2.5, rel=1e-6)
+    np.testing.assert_allclose(
+        [piece.instant for piece in pieces], np.array(instants) + 25e-6, atol=1e-10
+    )
+    assert all(piece.start <= -0.2e-3 and piece.end >= 3e-3 for piece in pieces)
+
+
+def test_noise_at_the_level_does_not_trigger_twice():
+    instants = np.arange(20) * 10e-3 + 2e-3
+    _, x = pulses(instants, 0.2, noise=0.2)
+    trigger = TRIGGER.model_copy(update={"dead_time": 1e-4})
+    pieces = list(cut_strokes(in_windows(x, 20_000, 1610), trigger, 2.5))
+
+    assert len(pieces) == 20
+    # 0.2 A of noise on a slope of 0.1 A/us, and the first of several crossings
+    np.testing.assert_allclose([piece.instant for piece in pieces], instants + 25e-6, atol=10e-6)
+
+
+def test_falling_slope_and_absolute_level():
+    _, x = pulses([3e-3], 10e-3)
+    trigger = Trigger(channel="current", level="1 A", slope="falling", after="1 ms")
+    (piece,) = cut_strokes(in_windows(x, 10**6, 0), trigger, trigger.value)
+
+    assert piece.instant == pytest.approx(5e-3, abs=STEP)
+
+
+def test_a_still_channel_cannot_trigger():
+    with pytest.raises(InputError, match="stays at"):
+        trigger_level(in_windows(np.ones(100), 100, 0), TRIGGER)
+
+
+def test_alignment_puts_a_cubic_where_it_belongs():
+    t = np.arange(50) * 1e-6
+    piece = Piece(start=-20.3e-6, step=1e-6, values={"lift": (t - 20.3e-6) ** 3}, instant=0.0)
+    axis = common_axis([piece], -1.0, 1.0)
+
+    assert 0.0 in axis
+    np.testing.assert_allclose(onto_axis(piece, axis)["lift"], axis**3, atol=1e-26)
+
+
+def strokes(count=12, noise=0.3e-6):
+    rng = np.random.default_rng(7)
+    t = STEP * np.arange(1500)
+    lift = 80e-6 * np.clip((t - 0.5e-3) / 0.3e-3, 0.0, 1.0)
+    return t, lift + noise * rng.normal(size=(count, t.size)) + 1e-6 * rng.normal(size=(count, 1))
+
+
+def test_good_strokes_are_all_kept():
+    assert find_outliers(*strokes()) == {}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda x: 0.05 * x, "no motion"),
+        (lambda x: np.minimum(x, 60e-6), "clipped"),
+        (lambda x: x + 3e-6 * np.random.default_rng(0).normal(size=x.size), "noise"),
+        (lambda x: np.roll(x, 200), "shape"),
+    ],
+)
+def test_a_spoilt_stroke_is_put_aside_with_its_reason(spoil, reason):
+    t, lift = strokes()
+    lift[4] = spoil(lift[4])
+    found = find_outliers(t, lift)
+
+    assert list(found) == [4]
+    assert found[4].startswith(reason)
+
+
+def write(path, instants, duration):
+    t, current = pulses(instants, duration)
+    lift = np.zeros_like(t)
+    for instant in instants:
+        up = np.clip((t - instant - 0.2e-3) / 0.3e-3, 0.0, 1.0)
+        lift += 80.0 * up * (t < instant + 2.5e-3)
+    lift += 5.0 + 0.1 * np.random.default_rng(1).normal(size=t.size)
+    rows = np.column_stack([1e3 * t, lift, current])
+    np.savetxt(
+        path, rows, delimiter=",", fmt="%.6f", header="time [ms],lift [um],current [A]", comments=""
+    )
+
+
+def section(**more):
+    return CaseMeasurement.model_validate(
+        {"trigger": {"channel": "current", "before": "0.2 ms", "after": "3 ms"}, **more}
+    )
+
+
+def test_a_long_file_becomes_a_set(tmp_path):
+    write(tmp_path / "bench.csv", [1e-3, 6e-3, 11e-3, 16e-3], 17e-3)
+    shares = []
+    found = load_stroke_set([tmp_path / "bench.csv"], section(), shares.append)
+
+    assert [stroke.name for stroke in found.strokes] == [f"bench.csv #{k}" for k in (1, 2, 3)]
+    assert [(bad.name, bad.reason[:10]) for bad in found.rejected] == [
+        ("bench.csv #4", "incomplete")
+    ]
+    assert found.time[0] == pytest.approx(-0.2e-3)
+    assert found.time[-1] == pytest.approx(3e-3)
+    assert found.matrix("lift")[:, found.time < 0.0].mean() == pytest.approx(0.0, abs=0.05e-6)
+    assert found.matrix("lift").max() == pytest.approx(80e-6, abs=1e-6)
+    assert [stroke.start for stroke in found.strokes] == pytest.approx(
+        [1.01e-3, 6.01e-3, 11.01e-3], abs=2e-7
+    )  # 20 % of a rise of 50 us
+    assert shares[0] == 0.0
+    assert shares[-1] == 1.0
+
+
+def test_the_lift_stays_as_measured_if_asked(tmp_path):
+    write(tmp_path / "bench.csv", [1e-3], 6e-3)
+    found = load_stroke_set([tmp_path / "bench.csv"], section(zero="none"))
+
+    assert found.matrix("lift")[0, 0] == pytest.approx(5e-6, abs=0.5e-6)
+
+
+def test_files_without_a_trigger_are_strokes(tmp_path):
+    for k in range(3):
+        write(tmp_path / f"shot{k}.csv", [1e-3], 6e-3)
+    found = load_stroke_set([tmp_path / f"shot{k}.csv" for k in range(3)])
+
+    assert [stroke.name for stroke in found.strokes] == ["shot0.csv", "shot1.csv", "shot2.csv"]
+    assert found.time[0] == 0.0
+
+
+def test_no_stroke_at_all_is_an_error(tmp_path):
+    write(tmp_path / "bench.csv", [1e-3], 6e-3)
+    high = {"channel": "current", "level": "50 A"}
+    with pytest.raises(InputError, match="no stroke"):
+        load_stroke_set([tmp_path / "bench.csv"], section(trigger=high))
