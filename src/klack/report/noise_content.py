@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from klack.acoustics.third_octave import nominal_label
+from klack.acoustics.third_octave import ENERGY_REFERENCE, nominal_label
 from klack.acoustics.wav import level_statement, wav_bytes
 from klack.report.chart import Chart
 from klack.report.content import Content, Section, Sound, Table, date_text, stage_table
@@ -211,10 +211,11 @@ def _force_table(study: NoiseStudy) -> Table:
     for design in study.designs:
         for stop in design.stops:
             whose = f"{design.name}, " if len(study.designs) > 1 else ""
-            energy = stop.bands.energy
-            level = 10.0 * np.log10(max(float(energy.sum()), 1e-300) / 1e-12)
+            energy = stop.bands.energy * design.net_share
+            level = 10.0 * np.log10(max(float(energy.sum()), 1e-300) / ENERGY_REFERENCE)
             top = nominal_label(int(stop.bands.number[int(np.argmax(energy))]))
-            below = float(np.interp(0.9, stop.cumulative, stop.bands.high))
+            gathered = np.cumsum(energy) / max(float(energy.sum()), 1e-300)
+            below = float(np.interp(0.9, gathered, stop.bands.high))
             rows.append(
                 (
                     f"{whose}{stop.stop}",
@@ -232,7 +233,7 @@ def _force_table(study: NoiseStudy) -> Table:
             "impacts",
             "peak force",
             "impulse of the record",
-            "level re 1 pN²s",
+            "unbalanced level",
             "highest band",
             "90 % of it below",
         ),
@@ -379,8 +380,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "level of the force",
         "Third octaves after IEC 61260-1 (base ten) of ∫ F² dt, in dB re 1 pN² s = (1 µN)² s: the "
-        "level re 1 µN of a steady force with the same energy in one second. The force is held at its "
-        "first and last value outside the record.",
+        "level re 1 µN of a steady force with the same energy in one second. The force is held at "
+        "its first and last value outside the record.",
     ),
     (
         "unbalanced force",
@@ -391,8 +392,9 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "structure-borne energy",
-        "Work of the contact and film forces on the modes of the held bodies, ∫ F v dt. The same "
-        "from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df.",
+        "Work of the contact and film forces on the modes of the rigidly held bodies, ∫ F v dt. "
+        "The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df. What a valve "
+        "as a whole passes on to its mount and plate comes on top.",
     ),
     (
         "blocked force",
@@ -426,6 +428,12 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 
 def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
     begins = max(design.valid_from for design in study.designs)
+    short = ""
+    if begins:
+        short = (
+            f"Below {quantity(begins, 'Hz', 2)} the record, which does not end as it began, is "
+            "shorter than a period. "
+        )
     limits = [
         (
             "Estimate",
@@ -448,8 +456,7 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Frequency",
-            f"Below {quantity(begins, 'Hz', 2)} the record is shorter than a period, and only its "
-            "steps count. Above the highest kept mode a body follows through its static "
+            f"{short}Above the highest kept mode a body follows through its static "
             "compliance. Sound files end at 20 kHz.",
         ),
     ]

@@ -279,10 +279,8 @@ def _trusted_words(study: NoiseStudy) -> str:
     low, high = _limits(study)
     if not np.isfinite(high):
         return "Rigid bodies: no wave shapes this force, and no limit is known."
-    return (
-        f"Shaded: from one over the record, {quantity(low, 'Hz', 3)}, to the highest kept mode, "
-        f"{quantity(high, 'Hz', 3)}."
-    )
+    begin = f"from one over the record, {quantity(low, 'Hz', 3)}, " if low else ""
+    return f"Shaded: {begin}up to the highest kept mode, {quantity(high, 'Hz', 3)}."
 
 
 # --------------------------------------------------------------------------- structure

@@ -42,6 +42,7 @@ __all__ = ["run_noise"]
 
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
 _HEARING = 20e3  # [Hz]
+_ENDS_ALIKE = 1e-3  # of the peak
 
 
 def run_noise(
@@ -99,7 +100,6 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     clock("sound", 0.0)
     pressure = _pressure(source, around)
     sound = _heard(pressure, source, clock) if pressure is not None else None
-    record = source.stops[0].force
     return NoiseDesign(
         name=name,
         label=name if several else source.label,
@@ -108,7 +108,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         case=source.case,
         case_text=source.case_text,
         run=source.run,
-        valid_from=1.0 / (record.values.size * record.step),
+        valid_from=_valid_from(source.stops),
         valid_up_to=source.kept_up_to,
         stops=stops,
         net_share=share,
@@ -136,6 +136,15 @@ def _stop_force(stop: SourceStop) -> StopForce:
         level=_level_at(stop.strongest, frequency),
         bands=force_bands(force),
     )
+
+
+def _valid_from(stops: Sequence[SourceStop]) -> float:
+    """One over the record [Hz], unless every force ends as it began."""
+    for stop in stops:
+        values = stop.force.values
+        if abs(values[-1] - values[0]) > _ENDS_ALIKE * np.abs(values).max():
+            return 1.0 / (values.size * stop.force.step)
+    return 0.0
 
 
 def _level_at(force: TimeSeries, frequency: np.ndarray) -> np.ndarray:

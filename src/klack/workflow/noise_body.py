@@ -15,7 +15,7 @@ from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Plate
 from klack.acoustics.port_forces import port_forces
 from klack.acoustics.radiation import Efficiency, power_transfer
-from klack.acoustics.surface_bands import face_band_velocity, radiated_bands
+from klack.acoustics.surface_bands import surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
@@ -82,21 +82,10 @@ def body_noise(
     sounding = damped(structure)
     bands = np.column_stack([around.octaves.low, around.octaves.high])
     frequency = frequency_lines(structure, None, _LOWEST, _HIGHEST)
-    estimate, bound = (
-        radiated_bands(
-            sounding,
-            forces,
-            bands,
-            mount=around.mount,
-            plate=around.plate,
-            efficiency=efficiency,
-            air=around.air,
-        )
-        for efficiency in (around.efficiency, "unity")
-    )
-    velocity = face_band_velocity(
-        sounding, forces, bands, mount=around.mount, plate=around.plate, period=around.period
-    )
+    spectra = surface_spectra(sounding, forces, bands, mount=around.mount, plate=around.plate)
+    estimate = spectra.radiated(efficiency=around.efficiency, air=around.air)
+    bound = spectra.radiated(efficiency="unity", air=around.air)
+    velocity = spectra.face_velocity(period=around.period)
     area = list(structure.group_area) + [np.nan] * (len(estimate.names) - len(structure.group_area))
     ports = tuple(forces)
     stops = dict(zip(structure.port_names, structure.port_stops, strict=True))

@@ -156,6 +156,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
 
     The structure is that of the reduced level, whichever level the force comes from.
     """
+    _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
     noise, given, materials = _noise_section(study.case_text, study.case)
     found = []
@@ -195,6 +196,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
 
 def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
     """Forces of all stops of a stroke, in some variants; in the first one without."""
+    _require_structures(study)
     wanted = tuple(variants) or (study.reference.name,)
     noise, given, materials = _noise_section(study.case_text, study.case)
     found = []
@@ -299,6 +301,18 @@ def _notes(variant: StrokeVariant) -> tuple[str, ...]:
 
 
 # --------------------------------------------------------------------------- what both share
+
+
+def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
+    """Refuse a result with held bodies whose modes were not stored."""
+    held = [body.name for body in study.bodies if body.support != "free"]
+    if held and not study.structures:
+        raise InputError(
+            f"result of case {study.case}",
+            got=f"no modes and surfaces of {one_of(held)}, as an earlier version of klack wrote it",
+            expected="a result that holds them",
+            hint="run the case again, then klack noise.",
+        )
 
 
 def _require(what: str, name: str, held: Mapping[str, object]) -> None:

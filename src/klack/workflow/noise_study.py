@@ -61,11 +61,6 @@ class StopForce:
     level: Floats
     bands: ThirdOctaves
 
-    @property
-    def cumulative(self) -> Floats:
-        """Share of the energy of all bands below the upper edge of each one, shape (b,)."""
-        return np.asarray(np.cumsum(self.bands.energy) / self.bands.energy.sum())
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
@@ -230,7 +225,8 @@ class NoiseDesign:
     case, case_text, run : str
         ``run`` names the variant or level.
     valid_from, valid_up_to : float [Hz]
-        One over the record; lowest of the highest kept modes of the bodies, nan without any.
+        One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
+        the bodies, nan without any.
     stops : tuple of StopForce
     net_share : array, shape (b,) [-]
         Share of the energy of the forces per band that springs, magnets and fluid do not balance

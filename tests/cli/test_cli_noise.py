@@ -1,0 +1,249 @@
+"""klack noise through main(argv), on the axisymmetric demo valve and the rigid valve of the how-to.
+
+Truth: the energy that the impact itself found in the modes of the housing, a dense Fourier sum of
+the stored force, the sound files read back, and the numbers printed on the how-to page.
+"""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
+
+import numpy as np
+import pytest
+
+from klack.cli.main import main
+from klack.report.noise_content import noise_content
+from klack.workflow.noise_store import load_noise
+from klack.workflow.store import load_study, save_study
+
+ROOT = Path(__file__).parents[2]
+HOW_TO = ROOT / "docs" / "how-to"
+RIGID = HOW_TO / "small_valve.yaml"
+NUMBERS = {
+    "third_octave",
+    "injected_energy_J",
+    "radiated_energy_J",
+    "loudness_max_sone",
+    "sharpness_acum",
+    "kurtosis",
+    "crest_factor",
+    "sound_exposure_level_dB",
+    "peak_level_dB",
+    "valid_up_to_Hz",
+    "designs",
+}
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def impact(tmp_path_factory) -> Path:
+    """Stored result of the shipped impact, reduced level."""
+    folder = tmp_path_factory.mktemp("impact") / "out"
+    words = ["--level", "reduced", "--level", "lumped", "--no-certify", "--no-report", "-q"]
+    assert main(["impact", "demo-valve-axisymmetric", *words, "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def heard(impact: Path, tmp_path_factory) -> Path:
+    """Noise of it, with report."""
+    folder = tmp_path_factory.mktemp("noise")
+    words = ["--out", str(folder), "--json", str(folder / "numbers.json"), "-q"]
+    assert main(["noise", str(impact), *words]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def numbers(heard: Path) -> dict:
+    return json.loads((heard / "numbers.json").read_text())
+
+
+def test_numbers_have_the_promised_keys(numbers):
+    assert set(numbers) >= NUMBERS
+    (name,) = numbers["designs"]
+    assert name == "demo-valve-axisymmetric"
+    assert all(numbers["designs"][name][key] == numbers[key] for key in NUMBERS - {"designs"})
+    assert all(isinstance(numbers[key], float) for key in NUMBERS - {"designs", "third_octave"})
+    bands = numbers["third_octave"]
+    # IEC 61260-1, base ten: 20 Hz to 200 kHz
+    exact = 1000.0 * 10.0 ** (np.arange(-17, 24) / 10.0)
+    np.testing.assert_allclose([band["center_Hz"] for band in bands], exact, rtol=1e-12)
+    assert [bands[i]["nominal"] for i in (0, 17, 40)] == ["20 Hz", "1 kHz", "200 kHz"]
+
+
+def test_third_octaves_are_those_of_the_stored_force(impact, numbers):
+    history = load_study(impact).levels["reduced"].history
+    levels = {round(b["center_Hz"]): b["level_dB"] for b in numbers["third_octave"]}
+    time, step = history.time, history.step
+    for k in (-10, 0, 10, 15, 20):
+        middle = 1000.0 * 10.0 ** (k / 10.0)
+        f = np.linspace(middle * 10**-0.05, middle * 10**0.05, 401)
+        spectrum = np.array([(history.force * np.exp(-2j * np.pi * x * time)).sum() for x in f])
+        energy = np.trapezoid(2.0 * np.abs(spectrum * step) ** 2, f)
+        # straight lines between lines of the spectrum, half a decibel in the notch at 40 kHz
+        expected = 10.0 * np.log10(energy / 1e-12)
+        assert levels[round(middle)] == pytest.approx(expected, abs=0.05)
+
+
+def test_injected_energy_is_what_the_impact_left_in_the_modes(impact, numbers):
+    result = load_study(impact).levels["reduced"]
+    (modal,) = [item for item in result.modal_energy if item.body == "housing"]
+
+    # no damping: all that went in is still there; the impact knows it from its own propagation
+    assert numbers["injected_energy_J"] == pytest.approx(modal.energy.sum(), rel=1e-6)
+    assert result.energies["housing vibration"] == pytest.approx(modal.energy.sum(), rel=1e-9)
+
+
+def test_the_stop_has_the_impulse_of_the_impact(impact, numbers):
+    history = load_study(impact).levels["reduced"].history
+
+    (stop,) = numbers["stops"].values()
+    assert stop["impulse_Ns"] == pytest.approx(history.impulse, rel=1e-12)
+
+
+def test_sounds_have_the_stated_level(heard, numbers):
+    soundfile = pytest.importorskip("soundfile")
+    for name in ("click.wav", "pattern.wav"):
+        with soundfile.SoundFile(heard / name) as file:
+            assert (file.samplerate, file.channels, file.subtype) == (48_000, 1, "PCM_24")
+            scale = float(re.search(r"full scale = ([\d.e+-]+) Pa", file.comment)[1])
+            values = scale * file.read()
+        peak = 20.0 * np.log10(np.abs(values).max() / 20e-6)
+        # 24 bit, the scale written with six digits; the pattern has every peak between samples
+        assert peak == pytest.approx(numbers["peak_level_dB"], abs=0.3)
+        if name == "click.wav":
+            exposure = 10.0 * np.log10((values**2).sum() / 48_000 / 4e-10)
+            assert exposure == pytest.approx(numbers["sound_exposure_level_dB"], abs=1e-3)
+
+
+def test_the_report_holds_players_and_says_what_it_is(heard):
+    page = (heard / "report.html").read_text(encoding="utf-8")
+
+    assert page.count("<audio controls") == 2
+    assert "media-src data:" in page
+    assert "upper bound" in page
+    assert "estimate" in page
+    assert (heard / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_stored_study_comes_back(heard):
+    (design,) = load_noise(heard).designs
+
+    assert design.bodies[0].mobility.dtype == np.complex128
+    assert design.sound.pressure.unit == "Pa"
+    assert design.bodies[0].groups == ("outside", "bottom", "plate")
+
+
+@pytest.mark.slow
+def test_a_stored_study_is_reported_again(heard, tmp_path):
+    assert main(["report", str(heard), "--out", str(tmp_path / "again"), "-q"]) == 0
+    again = (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
+    assert again == (heard / "report.html").read_text(encoding="utf-8")
+
+
+def test_two_designs_stand_side_by_side(impact, tmp_path, capsys):
+    other = copytree(impact, tmp_path / "other")
+    words = ["--out", "ab", "--json", "ab.json", "--no-report"]
+    assert main(["noise", str(impact), str(other), *words]) == 0
+
+    found = json.loads(Path("ab.json").read_text())["designs"]
+    assert list(found) == ["out", "other"]
+    # the same valve twice: no difference at all
+    assert found["out"] == found["other"]
+    assert {path.name for path in Path("ab").glob("*.wav")} == {
+        f"{what}-{name}.wav" for what in ("click", "pattern") for name in ("out", "other")
+    }
+    assert "0.5 % of critical damping is assumed" in capsys.readouterr().out
+
+
+def test_levels_of_one_result_are_compared(impact):
+    words = ["--level", "reduced,lumped", "--json", "levels.json", "--no-report", "-q"]
+    assert main(["noise", str(impact), *words]) == 0
+
+    found = json.loads(Path("levels.json").read_text())
+    reduced, lumped = found["designs"].values()
+    # rigid masses on a stiff spring: a shorter and higher blow, known up to no frequency
+    assert lumped["third_octave"][-5]["level_dB"] > 10 + reduced["third_octave"][-5]["level_dB"]
+    assert lumped["valid_up_to_Hz"] is None
+    assert reduced["valid_up_to_Hz"] > 1e5
+
+
+def test_a_rigid_valve_has_spectra_alone():
+    words = ["--variant", "dry", "--json", "rigid.json", "--out", "rigid", "-q", "--no-report"]
+    assert main(["noise", str(RIGID), *words]) == 0
+
+    found = json.loads(Path("rigid.json").read_text())
+    assert set(found["stops"]) == {"seat", "opening"}
+    assert len(found["third_octave"]) == 41
+    assert found["injected_energy_J"] is None
+    assert found["loudness_max_sone"] is None
+    assert not list(Path("rigid").glob("*.wav"))
+    content = noise_content(load_noise(Path("rigid")))
+    assert any("only the spectra of the force are known" in text for text in content.warnings)
+    assert [section.title for section in content.sections] == [
+        "Force of the stops",
+        "Spectrum of the force",
+        "What was assumed",
+        "Computing time",
+    ]
+
+
+def _no_result(impact: Path, heard: Path, folder: Path) -> list[str]:
+    return ["nowhere"]
+
+
+def _its_own(impact: Path, heard: Path, folder: Path) -> list[str]:
+    return [str(heard)]
+
+
+def _no_level(impact: Path, heard: Path, folder: Path) -> list[str]:
+    return [str(impact), "--level", "ful"]
+
+
+def _older(impact: Path, heard: Path, folder: Path) -> list[str]:
+    save_study(replace(load_study(impact), structures=()), folder / "old")
+    return [str(folder / "old")]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (_no_result, ["neither a file nor a shipped case"]),
+        (_its_own, ["klack noise study", "the result of an impact or a stroke"]),
+        (_no_level, ["'ful'", "reduced", "lumped"]),
+        (_older, ["an earlier version of klack", "run the case again"]),
+    ],
+)
+def test_what_cannot_be_used_is_said(impact, heard, tmp_path, capsys, words, told):
+    assert main(["noise", *words(impact, heard, tmp_path), "--no-report"]) == 2
+
+    err = capsys.readouterr().err
+    assert all(text in err for text in told)
+    assert not Path("klack-results").exists()
+
+
+def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):
+    text = (HOW_TO / "noise.md").read_text(encoding="utf-8")
+    energy, exposure, loudness = (
+        float(re.search(rf"\| {name}[^|]*\| ([\d.]+) {unit} \|", text)[1])
+        for name, unit in (
+            ("structure-borne energy injected", "uJ"),
+            ("sound exposure level", "dB"),
+            ("loudness, loudest moment", "sone"),
+        )
+    )
+
+    assert 1e6 * numbers["injected_energy_J"] == pytest.approx(energy, abs=6e-4)
+    assert numbers["sound_exposure_level_dB"] == pytest.approx(exposure, abs=0.06)
+    assert numbers["loudness_max_sone"] == pytest.approx(loudness, abs=0.06)
+    # the excerpt is that of the case, less its comments
+    case = (ROOT / "cases" / "demo-valve-axisymmetric" / "case.yaml").read_text(encoding="utf-8")
+    bare = [line.split("  #")[0].rstrip() for line in case.splitlines()]
+    (block,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert all(line in bare for line in block.splitlines())
