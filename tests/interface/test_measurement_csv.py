@@ -27,6 +27,9 @@ HEADERS = {
     "German": "Zeit [s];Nadelhub [µm];Spulenstrom [A]",
     "metadata above": "Bench 3\nOperator;N. N.\nDate;2024-01-31\n\ntime;lift;current\ns;um;A\n",
     "comments": "# bench 3\n# time [s];lift [um];current [A]",
+    "no blanks": "time/s;lift/um;current/A",
+    "PicoScope": "Time;Lift;Current\n(s);(um);(A)\n",
+    "LabVIEW": "Separator;Tab\n***End***;;\n;;\nX_Value;lift_um;current_A;Comment",
     "quotes": '"time [s]";"lift [um]";"current [A]"',
 }
 
@@ -133,6 +136,12 @@ def test_no_header_at_all(tmp_path):
         time, values = recording.read("column 2")
     np.testing.assert_allclose(time, TIME, rtol=1e-9)
     np.testing.assert_allclose(values, LIFT, rtol=1e-9)
+
+
+def test_sentences_above_numbers_between_blanks_are_no_names(tmp_path):
+    path = written(tmp_path / "a.txt", "# Created by Octave\n# columns: 3", separator=" ")
+    with open_recording(path) as recording:
+        assert [c.name for c in recording.channels] == ["column 2", "column 3"]
 
 
 def test_every_lift_column_may_have_a_time_of_its_own(tmp_path):

@@ -27,13 +27,14 @@ _SEPARATORS = (";", "\t", ",", "|", "")
 _NAMES = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", "": "blanks"}
 _MISSING = {"", "nan", "na", "n/a", "null", "inf", "-inf", "-", "--", "#n/a", "-nan", "+inf"}
 _COMMENTS = "#%!;"
+_NO_COLUMN = {"", "comment"}  # LabVIEW names a column of remarks that is not there
 _FOLLOWING = 3  # rows of numbers that end a header
 _NUMBERS = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?P<open>[\[({])(?P<unit>[^\[\]{}]*)[\])}]")
-_SLASH = re.compile(r"(?P<name>.*\S)(?:\s+/\s*|/\s+|\s+in\s+)(?P<unit>\S+)")
+_SLASH = re.compile(r"(?P<name>.*?\S)(?:\s*/\s*|\s+in\s+)(?P<unit>\S+)")
 _SUFFIX = re.compile(r"(?P<name>.*[^_])_(?P<unit>[A-Za-zµμ][A-Za-zµμ0-9]*)")
 _NO_SUFFIX = re.compile(r"(ch|channel|kanal|phase|probe|sensor|input|trace)", re.IGNORECASE)
 _WORDS = re.compile(r"[^\s\[({]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?|\[[^\]]*\]|\([^)]*\)")
@@ -167,8 +168,15 @@ def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] 
 
     A row of names has a cell for every column.  Below it there may be a row of units; without it
     units are looked for in the names: ``lift [um]``, ``lift (um)``, ``lift / um``, ``lift_um``.
+    Where blanks separate, any sentence looks like a row of names: only the last lines count.
     """
-    rows = [cells for line in header if (cells := _header_cells(line, dialect)) is not None]
+    lines = [line for line in header if line.strip(dialect.comments + "/ \t\r\n")]
+    if not dialect.separator:
+        lines = lines[-2:]
+    found = [_header_cells(line, dialect) for line in lines]
+    if not dialect.separator and found and found[-1] is None:
+        return None
+    rows = [cells for cells in found if cells is not None]
     if not rows:
         return None
     units: list[str] = [""] * dialect.width
@@ -180,20 +188,18 @@ def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] 
 
 def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
     """Cells of a header line if it has one for every column, else None."""
-    text = line.strip().lstrip(dialect.comments + "/").strip()
-    tried = [dialect.separator, *(s for s in _SEPARATORS if s != dialect.separator)]
-    for separator in tried:
-        if separator == "" and dialect.separator != "":
-            continue
-        stripped = text if separator == "" else line.strip("\r\n ")
-        if line.lstrip()[:1] in tuple(dialect.comments) and separator:
-            stripped = text
-        cells = _words(stripped) if separator == "" else _cells(stripped, separator)
-        while len(cells) > dialect.width and not cells[-1]:
+    text = line.strip("\r\n ")
+    if text[:1] in tuple(dialect.comments):
+        text = text.lstrip(dialect.comments + "/ \t")
+    others = [s for s in _SEPARATORS if s not in (dialect.separator, "")]
+    for separator in (dialect.separator, *others):
+        cells = _cells(text, separator) if separator else _words(text)
+        while len(cells) > dialect.width and cells[-1].lower() in _NO_COLUMN:
             cells.pop()
         if len(cells) == dialect.width - 1 and dialect.width > 2 and separator:
             cells.append("")  # the last column has no name
-        if len(cells) == dialect.width and any(cells):
+        numbers = any(_NUMBERS[dialect.decimal].fullmatch(cell) for cell in cells)
+        if len(cells) == dialect.width and any(cells) and not numbers:
             return cells
     return None
 
