@@ -73,9 +73,9 @@ def noise_content(study: NoiseStudy) -> Content:
 
 
 def _forces(study: NoiseStudy) -> tuple[Chart, ...]:
-    charts = [force_chart(study)]
-    strongest = strongest_chart(study)
-    return (*charts, strongest) if strongest.panels else tuple(charts)
+    over_time, strongest = force_chart(study), strongest_chart(study)
+    alone = all(design.kind == "impact" for design in study.designs)
+    return (over_time,) if alone or not strongest.panels else (over_time, strongest)
 
 
 # --------------------------------------------------------------------------- numbers
@@ -460,6 +460,15 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
             "compliance. Sound files end at 20 kHz.",
         ),
     ]
+    if any(design.kind == "impact" for design in study.designs):
+        limits.append(
+            (
+                "Impact alone",
+                "Nothing pushes the needle of an impact back, as springs and magnets of a valve "
+                "do: its impulse stays unbalanced, and the bands below about one over the time of "
+                "flight, some kilohertz in a valve, are too loud. klack stroke knows better.",
+            )
+        )
     if any(body.assumed for _, body in _bodies(study)):
         limits.append(
             (

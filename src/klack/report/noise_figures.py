@@ -383,7 +383,10 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
                 title=f"Force of the {name} on its rigid support, third octaves",
                 x=_FREQUENCY_AXIS,
                 panels=tuple(panels),
-                note=_trusted_words(study),
+                note=(
+                    "A record that ends while the body still rings is cut there: bands below one "
+                    f"over its length are those of the cut. {_trusted_words(study)}"
+                ),
             )
         )
     return tuple(charts)

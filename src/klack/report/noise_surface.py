@@ -18,6 +18,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from klack.acoustics.radiation import PLATE
 from klack.acoustics.third_octave import ThirdOctaves, nominal_label
 from klack.report.printed import STYLE, plain, svg
 from klack.report.wording import listed
@@ -31,7 +32,7 @@ _REFERENCE = 1e-6  # [m/s]
 _RANGE = 50.0  # [dB] of the colours at most
 _MAP = "viridis"
 _HEARING = 20e3  # [Hz]
-_VIEW = (np.radians(35.0), np.radians(25.0))  # turned about z, seen from above
+_TURN, _LIFT = np.radians(35.0), np.radians(25.0)  # of the view, about z and above the ground
 _VECTOR_FACES = 3000
 _MOST = 4  # pictures side by side
 
@@ -45,13 +46,15 @@ class SurfaceFigure:
 
 
 def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
-    """Indices of the bands in which most is radiated: of what can be heard, and of all."""
+    """Indices of the bands in which the bodies radiate most: of what can be heard, and of all."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
         return ()
-    energy = designs[0].radiated_bands
-    middle = designs[0].band_middle
-    audible = np.where(middle <= _HEARING, energy, 0.0)
+    energy = np.zeros(designs[0].band_middle.size)
+    for body in designs[0].bodies:
+        own = [i for i, name in enumerate(body.groups) if name != PLATE]
+        energy += body.radiated[own].sum(axis=0)
+    audible = np.where(designs[0].band_middle <= _HEARING, energy, 0.0)
     return tuple(dict.fromkeys((int(np.argmax(audible)), int(np.argmax(energy)))))
 
 
@@ -78,6 +81,9 @@ def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
             _draw(axes, design.bodies, band, scale)
             axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"), fontsize=8)
         _bar(figure, grid, scale)
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.set(h_pad=0.1)  # room for the titles of pictures without axes
         return SurfaceFigure(svg(figure), _note(designs, octaves, bands))
 
 
@@ -125,7 +131,7 @@ def _draw_sections(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Nor
 
 
 def _draw_solids(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Normalize) -> None:
-    right, up, towards = _axes_of_view()
+    right, up, towards = _best_view(bodies, band)
     flat, depth, level, facing = [], [], [], []
     for body in bodies:
         corners = 1e3 * body.surface.points[body.surface.faces]
@@ -165,11 +171,25 @@ def _normals(corners: Floats) -> Floats:
     return np.asarray(normals / np.maximum(size, 1e-300))
 
 
-def _axes_of_view() -> tuple[Floats, Floats, Floats]:
+def _best_view(bodies: Sequence[BodyNoise], band: int) -> tuple[Floats, Floats, Floats]:
+    """From above or from below, wherever more of the motion is seen."""
+    views = [_axes_of_view(lift) for lift in (_LIFT, -_LIFT)]
+    seen = np.zeros(2)
+    for body in bodies:
+        corners = body.surface.points[body.surface.faces]
+        normals = _normals(corners)
+        size = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        moved = size * body.surface.velocity[band].astype(float) ** 2
+        seen += [float(moved @ np.maximum(normals @ view[2], 0.0)) for view in views]
+    return views[int(np.argmax(seen))]
+
+
+def _axes_of_view(lift: float) -> tuple[Floats, Floats, Floats]:
     """To the right, up, and towards the eye, in the coordinates of the body."""
-    turn, lift = _VIEW
-    towards = np.array([np.cos(lift) * np.sin(turn), -np.cos(lift) * np.cos(turn), np.sin(lift)])
-    right = np.array([np.cos(turn), np.sin(turn), 0.0])
+    towards = np.array([np.cos(lift) * np.sin(_TURN), -np.cos(lift) * np.cos(_TURN), np.sin(lift)])
+    right = np.array([np.cos(_TURN), np.sin(_TURN), 0.0])
     return right, np.cross(towards, right), towards
 
 
@@ -178,7 +198,7 @@ def _width_over_height(surface: Surface) -> float:
         used = surface.points[np.unique(surface.faces)]
         width, height = 2.0 * float(used[:, 0].max()), float(np.ptp(used[:, 1]))
     else:
-        right, up, _ = _axes_of_view()
+        right, up, _ = _axes_of_view(_LIFT)
         width, height = (float(np.ptp(surface.points @ axis)) for axis in (right, up))
     return float(np.clip(width / max(height, 1e-9), 0.5, 3.0))
 
@@ -197,13 +217,13 @@ def _bar(figure: Figure, grid: Any, scale: Normalize) -> None:
 def _note(designs: list[NoiseDesign], octaves: ThirdOctaves, bands: tuple[int, ...]) -> str:
     names = listed([nominal_label(int(octaves.number[band])) for band in bands])
     which = (
-        "the band that radiates most"
+        "the band in which the bodies radiate most"
         if len(bands) == 1
-        else "the audible band that radiates most, and the band that radiates most of all"
+        else "the audible band in which the bodies radiate most, and the one of all bands"
     )
     solid = any(body.surface.points.shape[1] == 3 for design in designs for body in design.bodies)
     seen = (
-        "Solids are seen from the front and above."
+        "Solids are seen from above or from below, where more of the motion is seen."
         if solid
         else "Half sections, mirrored; the lines are the surfaces that meet the air."
     )
