@@ -37,7 +37,8 @@ __all__ = ["FittedStroke", "fit_flights", "measure_stroke", "read_flights"]
 _SETTLED = 4.0  # time constants of the sensor after which it shows nothing of an impact
 _FEWEST = 9  # samples of a flight that is fitted
 _SIGNIFICANT = 3.0  # standard errors of a rebound height that is seen
-_AGREES = 3.5  # standard errors within which nested stretches agree
+_AGREES = 3.0  # standard errors within which nested stretches agree
+_UNDER_WAY = 0.15  # of the fastest speed before a touch: the flight to it has begun
 _OWN_NOISE = 60e-6  # [s] before a touch, from which the noise of an approach is taken
 _ROUNDS = 4  # of finding touch and release, each of which bounds the samples of the other
 _SHORTEST = 30e-6  # [s] stretch before a first touch
@@ -314,6 +315,7 @@ def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | No
     touch = float(t[after.index])
     guard = record.smooth.half * float(t[1] - t[0])
     start = float(t[0]) if before is None else float(t[before.index]) + guard + record.settle
+    start = max(start, _under_way(record, after))
     ends = _longest_stretch(record, after.stop, start, touch - guard)
     for _ in range(_ROUNDS):
         if ends is None or ends.touch is None or abs(ends.touch.time - touch) > 2.0 * guard:
@@ -326,6 +328,16 @@ def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | No
             return ends
         ends = better
     return ends
+
+
+def _under_way(record: _Record, touch: Touch) -> float:
+    """Time from which the needle comes to a stop with 15 % of its fastest speed."""
+    towards = -record.smooth.velocity[: touch.index] * (1.0 if touch.stop == "seat" else -1.0)
+    last = towards[max(0, touch.index - 4 * record.smooth.half) :]
+    slow = np.flatnonzero(towards < _UNDER_WAY * float(np.max(last, initial=0.0)))
+    # the turn itself is slow again
+    slow = slow[slow < touch.index - 2 * record.smooth.half]
+    return float(record.time[slow[-1]]) if slow.size else float(record.time[0])
 
 
 def _longest_stretch(record: _Record, stop: Stop, start: float, end: float) -> _Ends | None:

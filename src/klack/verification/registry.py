@@ -19,6 +19,7 @@ GROUPS = (
     "spectra",
     "vibration",
     "sound",
+    "measurement",
     "mechanics",
     "fluids",
     "hydraulics",

@@ -1,0 +1,176 @@
+"""Lift sensor, velocity and impacts against exact flights."""
+
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.measurement.differentiation import velocity_of
+from klack.measurement.impacts import measure_stroke
+from klack.measurement.lift_sensor import sense
+from klack.measurement.sensor import LiftSensor
+from klack.measurement.set_measures import expected_maximum, measure_set
+from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
+from klack.verification.bouncing_flight import BouncingDrop
+from klack.verification.check import Check, compare
+
+__all__ = ["checks"]
+
+GROUP = "measurement"
+BANDWIDTH = 50e3  # [Hz]
+SENSOR = LiftSensor(bandwidth=BANDWIDTH)
+DROP = BouncingDrop(speed=0.5, acceleration=1250.0, restitution=(0.6, 0.6, 0.6), contact=10e-6)
+FINE, STEP, NOISE, RECORDS = 50e-9, 2e-6, 1e-6, 12  # [s], [s], [m]
+
+
+def checks() -> list[Check]:
+    """Sensor, differentiator, exact flights, noisy flights, maximum over n."""
+    return [*_sensor(), *_velocity(), *_flights(), *_noisy(), *_maximum()]
+
+
+def _grid(step: float, count: int) -> NDArray[np.float64]:
+    return np.asarray(step * np.arange(count), dtype=np.float64)
+
+
+def _sensor() -> list[Check]:
+    t = _grid(1e-6, 1001)
+    late = t - sense(t, t, SENSOR)
+    shown = sense(t, np.sin(2.0 * pi * BANDWIDTH * t), SENSOR)[500:]
+    A = np.column_stack([f(2.0 * pi * BANDWIDTH * t[500:]) for f in (np.sin, np.cos)])
+    a, b = np.linalg.lstsq(A, shown, rcond=None)[0]
+    return [
+        compare(
+            GROUP,
+            "delay of a ramp behind a sensor of 50 kHz [s]",
+            expected=1.0 / (2.0 * pi * BANDWIDTH),
+            computed=float(late[-1]),
+            tolerance=1e-9,
+            source="1 / (2 pi f)",
+        ),
+        compare(
+            GROUP,
+            "amplitude of a sine of 50 kHz behind it, sampled at 1 MHz [-]",
+            expected=sqrt(0.5) * float(np.sinc(BANDWIDTH * 1e-6)) ** 2,
+            computed=float(np.hypot(a, b)),
+            tolerance=1e-4,
+            source="3 dB, and sinc^2(f h) of straight lines between samples",
+        ),
+    ]
+
+
+def _velocity() -> list[Check]:
+    t = _grid(1e-6, 2001)
+    u = t / 1e-4
+    cubic = velocity_of(t, 1e-6 * (u**2 - 0.1 * u**3), bandwidth=20e3).velocity
+    omega = 2.0 * pi * 15e3
+    sine = velocity_of(t, np.sin(omega * t), bandwidth=20e3)
+    inside = slice(sine.window, -sine.window)
+    rate = (omega * np.cos(omega * t))[inside]
+    return [
+        compare(
+            GROUP,
+            "largest error of the velocity of a cubic [m/s]",
+            expected=0.0,
+            computed=float(np.max(np.abs(cubic - 1e-2 * (2.0 * u - 0.3 * u**2)))),
+            tolerance=1e-9,
+            source="d/dt",
+            absolute=True,
+        ),
+        compare(
+            GROUP,
+            "amplitude of the velocity of a sine of 15 kHz over the true one [-]",
+            expected=1.0 + float(sine.amplitude_error(15e3)),
+            computed=float(rate @ sine.velocity[inside] / (rate @ rate)),
+            tolerance=1e-9,
+            source="Savitzky & Golay 1964, frequency response of the weights",
+        ),
+    ]
+
+
+def _record(noise: float, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    fine = _grid(FINE, round(DROP.duration / FINE))
+    every = round(STEP / FINE)
+    shown = sense(fine, DROP.lift(fine), SENSOR)[::every]
+    rng = np.random.default_rng(seed)
+    return fine[::every], shown + noise * rng.normal(size=shown.size)
+
+
+def _flights() -> list[Check]:
+    time, lift = _record(0.0, 0)
+    hit = measure_stroke(time, lift, sensor=SENSOR, opening=float("nan")).impacts[0]
+    source = "parabolas, in closed form, behind a sensor of 50 kHz, 500 kS/s"
+    w = DROP.speeds[1]
+    return [
+        compare(
+            GROUP,
+            name,
+            expected=expected,
+            computed=computed,
+            tolerance=tolerance,
+            source=source,
+            absolute=True,
+        )
+        for name, expected, computed, tolerance in (
+            ("exact drop: first touch [s]", DROP.touches[0], hit.time, 0.1e-6),
+            ("exact drop: approach speed [m/s]", 0.5, hit.approach_speed, 1e-3),
+            ("exact drop: restitution [-]", 0.6, hit.restitution, 1e-3),
+            (
+                "exact drop: rebound height [m]",
+                w**2 / (2.0 * DROP.acceleration),
+                hit.rebound_height,
+                20e-9,
+            ),
+        )
+    ]
+
+
+def _noisy() -> list[Check]:
+    records = [_record(NOISE, seed) for seed in range(RECORDS)]
+    strokes = tuple(
+        MeasuredStroke(name=str(k), values={"lift": lift}) for k, (_, lift) in enumerate(records)
+    )
+    measures = measure_set(
+        StrokeSet(source="exact drops", time=records[0][0], strokes=strokes),
+        opening=float("nan"),
+        sensor=SENSOR,
+    )
+    column = measures.column("seat", "restitution")
+    source = f"{RECORDS} exact drops with 1 um of noise behind 50 kHz, 500 kS/s"
+    return [
+        compare(
+            GROUP,
+            "restitution from noisy records, mean [-]",
+            expected=0.6,
+            computed=float(np.mean(column.values)),
+            tolerance=0.005,
+            source=source,
+            absolute=True,
+        ),
+        compare(
+            GROUP,
+            "restitution from noisy records, median error of one [-]",
+            expected=0.0,
+            computed=float(np.median(np.abs(column.values - 0.6))),
+            tolerance=0.005,
+            source=source,
+            absolute=True,
+        ),
+    ]
+
+
+def _maximum() -> list[Check]:
+    return [
+        compare(
+            GROUP,
+            f"expected largest of {n} normal draws [standard deviations]",
+            expected=exact,
+            computed=expected_maximum(n),
+            tolerance=1e-6,
+            source=source,
+        )
+        for n, exact, source in (
+            (2, 1.0 / sqrt(pi), "1 / sqrt(pi)"),
+            (3, 1.5 / sqrt(pi), "3 / (2 sqrt(pi))"),
+            (10, 1.5387527, "table of normal order statistics"),
+        )
+    ]
