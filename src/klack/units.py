@@ -8,7 +8,7 @@ taken from short tables instead of by dimension, so that one cannot pass for the
 
 import re
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from math import isfinite, pi
 from typing import Annotated, Any
 
@@ -257,15 +257,20 @@ def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
         raise _refuse(where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit))
     import pint
 
-    registry = _registry()
     try:
-        return float(registry.Quantity(1.0, unit).to(kind.unit).magnitude)
+        return _in_si(unit, kind.unit)
     except pint.DimensionalityError:
         hint = f"use one of: {', '.join(kind.common)}."
         raise _refuse(where, value, kind, hint, _came(unit)) from None
     except Exception:  # pint evaluates the text and lets errors of tokenize and others through
         hint = f"use one of: {', '.join(kind.common)} (upper and lower case matter)."
         raise _refuse(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
+
+
+@lru_cache(maxsize=1000)
+def _in_si(unit: str, si: str) -> float:
+    """Size of one unit in another one; a case has few units, and a calibration reads it often."""
+    return float(_registry().Quantity(1.0, unit).to(si).magnitude)
 
 
 def _came(unit: str) -> str:

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from klack.measurement.shot_covariance import seen_by_data
+
 __all__ = ["Fit", "Model", "fit_within_bounds", "sensitivities"]
 
 Vector = NDArray[np.float64]
@@ -24,6 +26,7 @@ Model = Callable[[Sequence[Vector]], list[Vector]]
 
 _FIRST_STEP = 0.01
 _SMALLEST_STEP, _LARGEST_STEP = 1e-3, 0.03
+_INSIDE = 1e-6
 _POLISHING, _SHARES = 2, (1.0, 0.5)
 _MOVED = 0.5
 """Root mean square change of the model that a step aims at, in standard deviations."""
@@ -78,7 +81,8 @@ def fit_within_bounds(
     start : array, shape (p,) [-]
         Scaled parameters, 0 to 1.
     free : bool array, shape (p,), optional
-        Parameters that may move; the others stay at their start.
+        Parameters that may move; the others stay at their start, and so do those that the data do
+        not see.
     most : int
         Most iterations.
     tolerance : float
@@ -93,6 +97,9 @@ def fit_within_bounds(
     root = np.sqrt(weights)
     steps = np.full(start.size, _FIRST_STEP)
     rounds = 0
+    # round-off alone would let what the data do not see drift anywhere
+    first = sensitivities(model, np.clip(start, _INSIDE, 1.0 - _INSIDE), steps, free)
+    free = free & seen_by_data(first, weights)
 
     def whole(part: Vector) -> Vector:
         z = start.copy()
@@ -118,7 +125,7 @@ def fit_within_bounds(
     else:
         found = least_squares(
             residual,
-            np.clip(start[free], 1e-6, 1.0 - 1e-6),  # the method begins inside
+            np.clip(start[free], _INSIDE, 1.0 - _INSIDE),  # the method begins inside
             jac=slopes,
             bounds=(0.0, 1.0),
             method="trf",

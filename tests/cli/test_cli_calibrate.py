@@ -1,0 +1,158 @@
+"""klack calibrate: result folder, calibrated case, JSON, going on after an interruption, errors."""
+
+import json
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.case.valve_reader import load_valve_case
+from klack.cli.main import main
+from klack.workflow.calibration_log import LOG_NAME
+from klack.workflow.calibration_motion import MotionModel
+from klack.workflow.calibration_store import load_calibration
+
+_SPEC = spec_from_file_location(
+    "strokes", Path(__file__).parents[1] / "reference" / "test_calibration_recovers.py"
+)
+STROKES = module_from_spec(_SPEC)
+_SPEC.loader.exec_module(STROKES)
+TEXT = STROKES.TEXT.replace("  profile: [friction]\n", "") + "  # the end\n"
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A case and a file of three strokes, one column each."""
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "valve.yaml").write_text(
+        TEXT.replace("measurement:\n", "measurement:\n  channels: {lift: 'lift_*'}\n")
+    )
+    strokes = STROKES.measured(5, count=3)
+    table = np.column_stack([strokes.time, *strokes.matrix("lift")])
+    head = "time [s]," + ",".join(f"lift_{i} [m]" for i in range(3))
+    np.savetxt(folder / "strokes.csv", table, delimiter=",", header=head, comments="", fmt="%.9e")
+    return folder
+
+
+def command(bench, out, *more):
+    return [
+        "calibrate",
+        str(bench / "valve.yaml"),
+        "--measurement",
+        str(bench / "strokes.csv"),
+        "--out",
+        str(out),
+        "--workers",
+        "1",
+        *more,
+    ]
+
+
+@pytest.fixture(scope="module")
+def done(bench, tmp_path_factory):
+    out = tmp_path_factory.mktemp("done") / "result"
+    assert main(command(bench, out, "--json", str(out.parent / "numbers.json"), "--quiet")) == 0
+    return out
+
+
+def test_all_of_it_lies_in_the_folder(done):
+    names = {path.name for path in done.iterdir()}
+    assert names == {"result.zarr", "case_calibrated.yaml", "report.html", "report.pdf"}
+    page = (done / "report.html").read_text()
+    assert "Calibration to measured strokes" in page
+    assert "preload" in page
+    assert (done / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_json_has_values_errors_and_units_in_si(done):
+    data = json.loads((done.parent / "numbers.json").read_text())
+    assert list(data["parameters"]) == ["preload", "friction", "offset"]
+    preload = data["parameters"]["preload"]
+    assert preload["unit"] == "N"
+    assert preload["start"] == 11.0
+    assert preload["value"] == pytest.approx(12.4, abs=5 * preload["standard_error"])
+    assert preload["lower_95"] < preload["value"] < preload["upper_95"]
+    assert data["residual_rms_um"] < 0.5  # of the mean of three strokes with 0.5 um noise
+    assert data["evaluations"] > 10
+    assert np.array(data["correlation"]).shape == (3, 3)
+
+
+def test_stored_study_is_the_one_of_the_json(done):
+    study = load_calibration(done)
+    data = json.loads((done.parent / "numbers.json").read_text())
+    for item in study.parameters:
+        assert data["parameters"][item.name]["value"] == item.value
+
+
+def test_calibrated_case_holds_the_values_and_runs(done, tmp_path):
+    text = (done / "case_calibrated.yaml").read_text()
+    assert text.startswith("# Calibrated by klack")
+    assert "to 3 strokes of strokes.csv" in text
+    assert text.endswith("  # the end\n")
+    case = load_valve_case(done / "case_calibrated.yaml")
+    found = {item.name: item.value for item in load_calibration(done).parameters}
+    assert case.network.components["spring"].preload == pytest.approx(found["preload"], rel=1e-6)
+    assert case.measurement.sensor.offset == pytest.approx(found["offset"], rel=1e-6)
+    run = ["stroke", str(done / "case_calibrated.yaml"), "--out", str(tmp_path), "--no-report"]
+    assert main([*run, "--quiet"]) == 0
+
+
+def test_an_interrupted_calibration_goes_on_to_the_same_bits(
+    bench, done, tmp_path, monkeypatch, capsys
+):
+    run, calls = MotionModel.run, []
+
+    def interrupted(self, values, duration):
+        calls.append(values)
+        if len(calls) == 9:
+            raise KeyboardInterrupt
+        return run(self, values, duration)
+
+    monkeypatch.setattr(MotionModel, "run", interrupted)
+    assert main(command(bench, tmp_path, "--no-report", "--quiet")) == 130
+    assert "8 computed strokes are kept" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {LOG_NAME}
+    with (tmp_path / LOG_NAME).open("ab") as file:
+        file.write(b'{"trial": [0.001')  # cut off in the middle of a line
+
+    monkeypatch.setattr(MotionModel, "run", run)
+    assert main(command(bench, tmp_path, "--no-report", "--quiet")) == 0
+    again, before = load_calibration(tmp_path), load_calibration(done)
+    assert again.resumed == 8
+    assert again.evaluations == before.evaluations
+    for a, b in zip(again.parameters, before.parameters, strict=True):
+        assert (a.value, a.standard_error) == (b.value, b.standard_error)
+    assert not (tmp_path / LOG_NAME).exists()
+
+
+def test_the_report_is_made_again_from_the_result(done, tmp_path):
+    assert main(["report", str(done), "--out", str(tmp_path), "--quiet"]) == 0
+    assert "Calibration to measured strokes" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("calibration:", None, "got no section 'calibration'"),
+        (", offset: 0 um", "", "write 'offset: 0.0 m' there"),
+        ("  variant: dry\n", "  variant: dry\n  channels: [lift, current]\n", "'current'"),
+    ],
+)
+def test_mistakes_are_one_message(bench, tmp_path, capsys, old, new, words):
+    text = (bench / "valve.yaml").read_text()
+    assert old in text
+    text = text[: text.index(old)] if new is None else text.replace(old, new)
+    (tmp_path / "valve.yaml").write_text(text)
+    args = command(bench, tmp_path / "out", "--quiet")
+    assert main([args[0], str(tmp_path / "valve.yaml"), *args[2:]]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Try:" in error
+
+
+def test_a_missing_file_is_named(bench, tmp_path, capsys):
+    args = command(bench, tmp_path / "out", "--quiet")
+    args[3] = str(tmp_path / "nothing.csv")
+    assert main(args) == 2
+    assert "nothing.csv" in capsys.readouterr().err
