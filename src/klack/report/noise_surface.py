@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from klack.acoustics.radiation import PLATE
@@ -72,7 +73,9 @@ def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
     with rc_context(STYLE | {"axes.grid": False}):
         shape = min(_width_over_height(body.surface) for d in designs for body in d.bodies)
         tall = float(np.clip(6.0 / columns / max(shape, 0.2), 1.8, 4.2))
-        figure = Figure(figsize=(6.7, tall * rows + 0.9), layout="constrained")
+        # room for the titles of pictures without axes
+        layout = ConstrainedLayoutEngine(h_pad=0.1)
+        figure = Figure(figsize=(6.7, tall * rows + 0.9), layout=layout)
         grid = figure.subplots(rows, columns, squeeze=False)
         for axes in grid.ravel()[len(shown) :]:
             axes.set_axis_off()
@@ -81,9 +84,6 @@ def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
             _draw(axes, design.bodies, band, scale)
             axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"), fontsize=8)
         _bar(figure, grid, scale)
-        engine = figure.get_layout_engine()
-        if engine is not None:
-            engine.set(h_pad=0.1)  # room for the titles of pictures without axes
         return SurfaceFigure(svg(figure), _note(designs, octaves, bands))
 
 
