@@ -267,7 +267,8 @@ def _whole(record: _Record, stop: Stop, first: float, last: float) -> _Ends | No
     if plain.acceleration == 0.0:
         return _with_ends(record, stop, plain)
     top = plain.reference - float(plain.coefficients[1]) / plain.acceleration
-    if not first < top < last:
+    times = window[0]
+    if not times[2] < top < times[-3]:  # all samples on one side tell no friction
         return _with_ends(record, stop, plain)
     return _with_ends(record, stop, _fit(record, *window, 2, top))
 
