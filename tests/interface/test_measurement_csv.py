@@ -128,6 +128,19 @@ def test_missing_values_end_a_channel_or_are_nan(tmp_path):
         np.testing.assert_array_equal(recording.read("p")[1], [5, 6])
 
 
+@pytest.mark.parametrize(
+    ("header", "names"),
+    [("lift [um]", ["lift"]), ("lift [um],current [A]", ["lift", "current"])],
+)
+def test_the_header_tells_a_decimal_comma_from_two_columns(tmp_path, header, names):
+    path = tmp_path / "a.csv"
+    path.write_text(header + "\n0,5\n0,75\n1,25\n")
+    with open_recording(path, time_step=1e-6) as recording:
+        assert [c.name for c in recording.channels] == names
+        expected = [0.5, 0.75, 1.25] if len(names) == 1 else [0, 0, 1]
+        np.testing.assert_array_equal(recording.read("lift")[1], expected)
+
+
 def test_no_header_at_all(tmp_path):
     path = written(tmp_path / "a.csv", "")
     with open_recording(path) as recording:

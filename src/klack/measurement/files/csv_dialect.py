@@ -129,7 +129,8 @@ def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
 def _one_or_two(head: Sequence[str], lines: Sequence[str], found: Dialect) -> Dialect:
     """Tell ``0,5`` as one column with a decimal comma from two columns, by the header."""
     alone = Dialect("", ",", 1)
-    if any(_width(line, "", ",") != 1 for line in lines):
+    rows = [line for line in lines if _width(line, found.separator, found.decimal)]
+    if any(_width(line, alone.separator, alone.decimal) != 1 for line in rows):
         return found
     names = [line for line in head[: first_row(head, alone)] if line.strip(" #%!;\t")]
     return alone if names and all("," not in line for line in names) else found
