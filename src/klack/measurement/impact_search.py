@@ -65,7 +65,9 @@ def find_touches(smooth: SmoothLift, levels: Mapping[Stop, float]) -> tuple[Touc
 
 def _turns(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
     """Samples at which a distance from a stop is least, near the stop."""
-    peaks, found = find_peaks(-away, prominence=smooth.least_height, wlen=None)
+    inner = away[smooth.half : away.size - smooth.half]  # its smoothed ends are noisy
+    peaks, found = find_peaks(-inner, prominence=smooth.least_height)
+    peaks = peaks + smooth.half
     near = max(_NEAR * span, 2.0 * smooth.least_height)
     out = []
     for peak, prominence in zip(peaks.tolist(), found["prominences"].tolist(), strict=True):
@@ -98,8 +100,11 @@ def _arrivals(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> lis
     here = max(smooth.least_height, 0.01 * span)
     far = 2.0 * here
     out: list[int] = []
-    coming = bool(away[0] > far)
-    for i in np.flatnonzero((away < here) | (away > far)).tolist():
+    coming = False
+    inside = (away < here) | (away > far)
+    inside[: smooth.half] = False  # the smoothed ends of a record are several times as noisy
+    inside[away.size - smooth.half :] = False
+    for i in np.flatnonzero(inside).tolist():
         if away[i] > far:
             coming = True
         elif coming:
