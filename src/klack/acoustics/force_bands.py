@@ -30,7 +30,8 @@ LOWEST, HIGHEST = 17.0, 224e3
 """Limits [Hz] that hold the bands from 20 Hz to 200 kHz with their edges."""
 _MARGIN = 1.0 + 1e-9  # so that the bands at both ends are within their own edges
 _LEAST_PER_BAND, _MOST_PER_BAND = 8.0, 200.0  # frequencies in the lowest band of a decade
-_RATE = 100.0  # of the sampling over the highest frequency, where a coarser step will do
+_RATE, _TOP_RATE = 100.0, 40.0  # of the sampling over the highest frequency of a decade
+_FADED = 50e3  # [Hz] no impact has much above forty times this, to be folded back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +70,8 @@ def force_densities(
     for first in range(0, numbers.size, 10):
         last = min(first + 10, numbers.size) - 1
         bottom, top = float(lows[first]), float(highs[last])
-        series = averaged(force, 1.0 / (_RATE * top))
+        rate = _RATE if top < _FADED else _TOP_RATE
+        series = averaged(force, 1.0 / (rate * top))
         width = float(highs[first] - lows[first])
         # fine enough for what a record of this length can hold; many points average anyway
         fine = max(1.0 / (20.0 * series.values.size * series.step), width / _MOST_PER_BAND)
