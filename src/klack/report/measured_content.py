@@ -220,7 +220,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "time, approach speed, restitution",
         "From smooth flights fitted to the lift before and after an impact, carried on to the "
-        "level at which the needle rests on the stop; read off the computed lift in the same way. "
+        "level at which the needle rests on the stop; read off the computed lift in the same way, "
+        "with as much noise on it as the measured one has (median of some readings). "
         "They are not those of the centre of mass that a table of klack stroke gives: vibration of "
         "the needle, squeeze films and the level of rest make a difference.",
     ),

@@ -106,7 +106,7 @@ def compare_shots(
         notes=drops.notes,
         sensor=sensor_words(used.sensor),
         approach_speed=compare_numbers(
-            float(np.mean(study.shots.approach_speed)),
+            [float(np.mean(study.shots.approach_speed))],
             [hit.approach_speed for hit in impacts],
             [hit.approach_se for hit in impacts],
         ),

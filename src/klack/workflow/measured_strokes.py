@@ -6,6 +6,7 @@ the same way, so that what a differentiator or a fit takes away is taken from bo
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from math import hypot, isfinite, sqrt
@@ -53,6 +54,8 @@ _BY_DRAWING = (
     "The needle never rests on the opening stop in some strokes; there its level is that of the "
     "seat plus the lift of the drawing."
 )
+_REPLICAS, _SEED = 5, 1
+"""Readings of the computed lift, each with noise of its own."""
 _STOPS: tuple[Stop, ...] = ("opening", "seat")
 
 
@@ -158,11 +161,13 @@ def _compare(
     sensor = section.sensor
     if section.zero == "start":
         sensor = sensor.model_copy(update={"offset": 0.0})
-    model, guessed = _read(time, computed, sensor, study.lift)
-    both = [_read(time, row, sensor, study.lift) for row in lift]
-    readings = [measures for measures, _ in both]
+    model = [
+        _read(time, row, sensor, study.lift)
+        for row in _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
+    ]
+    readings = [_read(time, row, sensor, study.lift) for row in lift]
     notes = _about(strokes.notes, _roles(section))
-    if guessed or any(by_drawing for _, by_drawing in both):
+    if any(reading.by_drawing for reading in (*model, *readings)):
         notes = (*notes, _BY_DRAWING)
     return ComparedVariant(
         variant=variant.name,
@@ -189,23 +194,51 @@ def _compare(
         lift_scatter=_scatter(lift, median),
         velocity_scatter=_scatter(estimate.velocity, middle),
         way=compare_numbers(
-            model.lift, [item.lift for item in readings], [item.level_se for item in readings]
+            [item.measures.lift for item in model],
+            [item.measures.lift for item in readings],
+            [item.measures.level_se for item in readings],
         ),
         impacts=_impacts(model, readings, strokes.step),
     )
 
 
-def _read(
-    time: Floats, lift: Floats, sensor: LiftSensor, way: float
-) -> tuple[StrokeMeasures, bool]:
-    """Read a lift; True where the opening stop had to be put above the seat by the drawing."""
+@dataclass(frozen=True, kw_only=True)
+class _Reading:
+    """Numbers of one stroke; ``by_drawing`` if the opening stop was put where the drawing says."""
+
+    measures: StrokeMeasures
+    moves: float
+    by_drawing: bool
+
+    def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
+        """Impacts on a stop once the needle has moved, without trembling at rest."""
+        hits = [hit for hit in self.measures.on(stop) if hit.time > self.moves]
+        known = (hit.approach_speed for hit in self.measures.impacts)
+        fastest = max((speed for speed in known if isfinite(speed)), default=0.0)
+        real = [i for i, hit in enumerate(hits) if hit.approach_speed > _NOTICED * fastest]
+        return tuple(hits[real[0] : real[-1] + 1]) if real else ()
+
+
+def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float) -> _Reading:
     measures = measure_stroke(time, lift, sensor=sensor)
-    seat = measures.seat_level
-    if isfinite(measures.opening_level) or not isfinite(seat) or not isfinite(way):
-        return measures, False
-    if float(np.max(lift)) < seat + (1.0 - _REACHED) * way:
-        return measures, False  # a short stroke
-    return measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way), True
+    seat, by_drawing = measures.seat_level, False
+    reached = float(np.max(lift)) > sensor.offset + (1.0 - _REACHED) * way
+    if not isfinite(measures.opening_level) and isfinite(seat) and reached:
+        measures = measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way)
+        by_drawing = True
+    half = 0.5 * (float(np.min(lift)) + float(np.max(lift)))
+    moves = float(time[int(np.argmax(lift > half))])
+    return _Reading(measures=measures, moves=moves, by_drawing=by_drawing)
+
+
+def _as_noisy(lift: Floats, noise: float, count: int) -> Floats:
+    """Computed lift with the noise of the measured one, several times.
+
+    A reading adapts to noise: longer stretches are fitted where there is more of it, and what
+    these bend changes the result.  Both sides must have the same.
+    """
+    random = np.random.default_rng(_SEED)
+    return lift + noise * random.standard_normal((count, lift.size))
 
 
 def _computed_lift(
@@ -275,42 +308,36 @@ def _scatter(records: Floats, median: Floats) -> float:
 
 
 def _impacts(
-    model: StrokeMeasures, readings: Sequence[StrokeMeasures], step: float
+    model: Sequence[_Reading], readings: Sequence[_Reading], step: float
 ) -> tuple[ComparedImpact, ...]:
     """Impacts of the model beside those of the same number on the same stop."""
     found = []
     for stop in _STOPS:
-        computed = _counted(model, stop)
-        measured = [_counted(item, stop) for item in readings]
-        for i, hit in enumerate(computed):
-            same = [hits[i] for hits in measured if len(hits) > i]
-            if 2 * len(same) < len(measured) or not same:
+        computed, measured = ([item.on(stop) for item in side] for side in (model, readings))
+        for i in range(max(map(len, computed))):
+            ours, theirs = ([h[i] for h in side if len(h) > i] for side in (computed, measured))
+            if 2 * len(ours) < len(model) or 2 * len(theirs) < len(readings) or not theirs:
                 break
-            found.append(_impact(stop, i + 1, hit, same, step))
+            found.append(_impact(stop, i + 1, ours, theirs, step))
     return tuple(sorted(found, key=lambda item: item.time.computed))
 
 
-def _counted(measures: StrokeMeasures, stop: Stop) -> tuple[MeasuredImpact, ...]:
-    """Impacts on a stop from the first one that is no trembling at rest."""
-    hits = measures.on(stop)
-    known = (hit.approach_speed for hit in measures.impacts if isfinite(hit.approach_speed))
-    fastest = max(known, default=0.0)
-    real = [i for i, hit in enumerate(hits) if hit.approach_speed > _NOTICED * fastest]
-    return hits[real[0] : real[-1] + 1] if real else ()
-
-
 def _impact(
-    stop: Stop, number: int, hit: MeasuredImpact, same: Sequence[MeasuredImpact], step: float
+    stop: Stop,
+    number: int,
+    ours: Sequence[MeasuredImpact],
+    theirs: Sequence[MeasuredImpact],
+    step: float,
 ) -> ComparedImpact:
     """Numbers of one impact; times are not better known than the sampled trigger."""
     sampled = {"time": step / sqrt(12.0)}
     numbers = {
         kind.field: compare_numbers(
-            getattr(hit, kind.field),
-            [getattr(other, kind.field) for other in same],
+            [getattr(hit, kind.field) for hit in ours],
+            [getattr(hit, kind.field) for hit in theirs],
             [
-                hypot(getattr(other, _ERRORS[kind.field]), sampled.get(kind.field, 0.0))
-                for other in same
+                hypot(getattr(hit, _ERRORS[kind.field]), sampled.get(kind.field, 0.0))
+                for hit in theirs
             ],
         )
         for kind in IMPACT_MEASURES
@@ -326,15 +353,19 @@ _ERRORS = {
 }
 
 
-def compare_numbers(computed: float, values: Iterable[float], errors: Iterable[float]) -> Compared:
-    """A computed number beside the same number of several strokes; nan are left out."""
+def compare_numbers(
+    readings: Sequence[float], values: Iterable[float], errors: Iterable[float]
+) -> Compared:
+    """Readings of one computed number beside those of several strokes; nan are left out."""
+    ours = [value for value in readings if isfinite(value)]
+    computed = float(np.median(ours)) if ours else float("nan")
     both = np.array([(v, e) for v, e in zip(values, errors, strict=True) if isfinite(v)])
     if not both.size:
         nan = float("nan")
         return Compared(computed=computed, measured=nan, scatter=nan, error=nan, count=0)
     known, error = both[:, 0], float(np.median(both[:, 1]))
     return Compared(
-        computed=float(computed),
+        computed=computed,
         measured=float(np.median(known)),
         scatter=float(np.std(known, ddof=1)) if known.size > 1 else error,
         error=error,
