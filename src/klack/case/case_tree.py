@@ -9,7 +9,7 @@ from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.valve import ValveCase
 from klack.input.problem import Key
 
-__all__ = ["CaseTree", "read_case_tree"]
+__all__ = ["CaseTree", "exchanged", "read_case_tree"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +39,7 @@ class CaseTree:
         """
         data = self.data
         for key, value in (values or {}).items():
-            data = _exchanged(data, key, value)
+            data = exchanged(data, key, value)
         return validated(ValveCase, self.text, self.path, data, self.lines)
 
 
@@ -50,11 +50,11 @@ def read_case_tree(path: Path) -> CaseTree:
     return CaseTree(path=path, text=text, data=data, lines=lines)
 
 
-def _exchanged(data: Any, key: Key, value: object) -> Any:
+def exchanged(data: Any, key: Key, value: object) -> Any:
     """Copy of the data with another value; all that is not on the way is shared."""
     if not key:
         return value
     head, rest = key[0], key[1:]
     copy: Any = dict(data) if isinstance(data, dict) else list(data)
-    copy[head] = _exchanged(data[head], rest, value)
+    copy[head] = exchanged(data[head], rest, value)
     return copy

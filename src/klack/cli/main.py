@@ -24,6 +24,7 @@ from cyclopts import App, CycloptsError
 
 from klack import __version__
 from klack.cli import (
+    calibrate,
     compare,
     demo,
     export,
@@ -59,6 +60,7 @@ app.command(reduce.reduce)
 app.command(report.report)
 app.command(export.export)
 app.command(compare.compare)
+app.command(calibrate.calibrate)
 app.command(verify.verify)
 app.command(schema.schema)
 

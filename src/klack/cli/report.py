@@ -17,7 +17,7 @@ __all__ = ["report"]
 def report(
     result: Annotated[
         Path,
-        Parameter(name="RESULT", help="Folder that klack impact, stroke, shots or noise wrote."),
+        Parameter(name="RESULT", help="Folder that another command of klack wrote."),
     ],
     /,
     *,
@@ -41,6 +41,7 @@ def report(
 
 def _load(result: Path) -> "Study":
     """Read whichever kind of study the store holds."""
+    from klack.workflow.calibration_store import CALIBRATION_FORMAT, load_calibration
     from klack.workflow.measured_store import (
         MEASURED_SHOTS_FORMAT,
         MEASURED_STROKES_FORMAT,
@@ -62,4 +63,6 @@ def _load(result: Path) -> "Study":
         return load_measured_shots(result)
     if name == NOISE_FORMAT.name:
         return load_noise(result)
+    if name == CALIBRATION_FORMAT.name:
+        return load_calibration(result)
     return load_shots(result) if name == SHOTS_FORMAT.name else load_study(result)
