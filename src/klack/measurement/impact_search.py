@@ -14,6 +14,7 @@ __all__ = ["Touch", "find_touches"]
 
 _NEAR = 0.12  # of the span: an impact turns at most this far from its stop
 _SHARPER = 2.0  # an impact bends the motion at least that much more than its flight does
+_COMES = 3.0  # least heights from which a first approach must come
 _LARGE = 0.2  # of the span: smaller turns are not asked for their sharpness
 
 
@@ -73,6 +74,8 @@ def _turns(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[i
     for peak, prominence in zip(peaks.tolist(), found["prominences"].tolist(), strict=True):
         if away[peak] > near:
             continue
+        if float(np.max(away[smooth.half : peak], initial=0.0)) < _COMES * smooth.least_height:
+            continue  # it has not left this stop yet
         if prominence > _LARGE * span and not _sharp(away, peak, smooth.half):
             continue
         out.append(peak)
