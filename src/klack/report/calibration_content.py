@@ -76,7 +76,7 @@ def _found(item: CalibratedParameter) -> str:
     if not isfinite(item.standard_error):
         return f"{item.name} (not determined)"
     error = _value(item, item.standard_error, 2)
-    return f"{item.name} {_value(item, item.value)} ± {error}"
+    return f"{item.name} {_value(item, item.value, item.digits)} ± {error}"
 
 
 def _value(item: CalibratedParameter, value: float, digits: int = 4) -> str:
@@ -95,13 +95,15 @@ def _parameter_table(study: CalibrationStudy) -> Table:
         known = isfinite(item.standard_error)
         cells = [
             item.name,
-            _value(item, item.value),
+            _value(item, item.value, item.digits),
             _value(item, item.standard_error, 2) if known else "–",
-            _range(item, item.lower_95, item.upper_95) if known else "not determined",
+            _range(item, item.lower_95, item.upper_95, item.digits) if known else "not determined",
         ]
         if profiles:
             profile = profiles.get(item.name)
-            cells.append("–" if profile is None else _range(item, profile.lower, profile.upper))
+            cells.append(
+                "–" if profile is None else _range(item, profile.lower, profile.upper, item.digits)
+            )
         cells += [
             _value(item, item.scatter, 2),
             _value(item, item.start),
@@ -114,7 +116,7 @@ def _parameter_table(study: CalibrationStudy) -> Table:
     return Table(columns=tuple(columns), rows=tuple(rows))
 
 
-def _range(item: CalibratedParameter, low: float, high: float, digits: int = 4) -> str:
+def _range(item: CalibratedParameter, low: float, high: float, digits: int) -> str:
     ends = [_value(item, end, digits) if isfinite(end) else "bound" for end in (low, high)]
     return f"{ends[0]} to {ends[1]}"
 

@@ -61,6 +61,14 @@ class CalibratedParameter:
         """Standard deviation from stroke to stroke; nan for fewer than two strokes."""
         return float(self.strokes.std(ddof=1)) if self.strokes.size > 1 else float("nan")
 
+    @property
+    def digits(self) -> int:
+        """Significant digits of the value that its standard error leaves, and one more; 4 to 8."""
+        if not (0.0 < self.standard_error < float("inf")) or self.value == 0.0:
+            return 4
+        share = abs(self.value) / self.standard_error
+        return int(min(max(np.ceil(np.log10(max(share, 1.0))) + 2, 4), 8))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedChannel:

@@ -63,7 +63,7 @@ def parameter_rows(study: CalibrationStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def _row(item: CalibratedParameter) -> tuple[str, ...]:
-    def text(value: float, digits: int = 4) -> str:
+    def text(value: float, digits: int = item.digits) -> str:
         return format_si(value, item.unit, digits) if isfinite(value) else "–"
 
     known = isfinite(item.standard_error)
@@ -72,7 +72,7 @@ def _row(item: CalibratedParameter) -> tuple[str, ...]:
         text(item.value),
         text(item.standard_error, 2),
         f"{text(item.lower_95)} to {text(item.upper_95)}" if known else "not determined",
-        text(item.start),
+        text(item.start, 4),
         f"{text(item.lower, 3)} to {text(item.upper, 3)}",
     )
 
