@@ -144,6 +144,8 @@ def run_sources(
         stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
         return stroke_sources(stroke, tuple(names))
     levels = case.require_levels(tuple(names) or ("reduced",))
+    # transfer functions are not asked for here, and take longer than all the rest
+    case = case.model_copy(update={"run": case.run.model_copy(update={"transfer": None})})
     impact = run_impact(case, levels=levels, certify=False, progress=progress, threads=threads)
     return impact_sources(impact, tuple(names))
 
