@@ -1,0 +1,110 @@
+"""The shipped synthetic measurement beside the model.
+
+Truth: the values with which the strokes were computed (``cases/measured/truth.yaml``).  With them
+the model agrees within the scatter, and the lift as far as the noise allows: the median of n
+strokes with noise s is off by ``1.25 s / sqrt(n)`` (Laplace).  With the nominal values it does not.
+"""
+
+from io import StringIO
+from math import sqrt
+
+import pytest
+from ruamel.yaml import YAML
+
+from klack.case.key_path import quantity_at, split_path
+from klack.case.shipped import shipped_cases
+from klack.case.valve import ValveCase
+from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.measurement.loading import load_stroke_set
+from klack.workflow.measured_strokes import compare_strokes
+from klack.workflow.measured_study import MeasuredStrokeStudy
+from klack.workflow.measured_summary import agreement
+from klack.workflow.stroke import run_stroke
+
+CASE = shipped_cases()["measured"]
+FOLDER = CASE.parent
+WET, DRY = FOLDER / "strokes_synthetic.csv", FOLDER / "dry_strokes_synthetic.csv"
+TRUTH = YAML(typ="safe").load((FOLDER / "truth.yaml").read_text(encoding="utf-8"))
+STROKES, NOISE = 10, 1e-6  # as the header of the file says
+UNITS = {"preload": "N", "friction": "N", "film_gap": "m", "damping": "", "offset": "m"}
+
+
+def with_truth() -> ValveCase:
+    """The case with the hidden values in the place of its own."""
+    yaml = YAML(typ="safe")
+    case = yaml.load(CASE.read_text(encoding="utf-8"))
+    for name, parameter in case["calibration"]["parameters"].items():
+        *path, last = parameter["key"].split(".")
+        node = case
+        for part in path:
+            node = node[part]
+        node[last] = f"{TRUTH[name]!r} {UNITS[name]}".strip()
+    text = StringIO()
+    yaml.dump(case, text)
+    return read_valve_case(text.getvalue(), FOLDER / "hidden.yaml")
+
+
+def test_the_truth_names_what_is_calibrated_and_differs_from_the_case():
+    case = load_valve_case(CASE)
+    assert case.calibration is not None
+    assert set(TRUTH) == set(case.calibration.parameters)
+    for name, parameter in case.calibration.parameters.items():
+        (key,) = parameter.key
+        nominal = quantity_at(case, split_path(key)).value
+        assert TRUTH[name] != pytest.approx(nominal, rel=0.03)
+
+
+def test_every_file_says_that_it_is_synthetic():
+    assert [path.name for path in FOLDER.glob("strokes_synthetic.*")] == [WET.name]
+    files = sorted(FOLDER.glob("*.csv"))
+    assert len(files) == 3
+    for path in files:
+        assert "synthetic" in path.name
+        with path.open(encoding="utf-8") as lines:
+            assert next(lines).startswith("# SYNTHETIC: ")
+        assert path.stat().st_size < 1.5e6
+
+
+def test_the_record_is_cut_into_its_strokes():
+    section = load_valve_case(CASE).measurement
+    strokes = load_stroke_set([WET], section)
+    assert strokes.count == STROKES
+    assert not strokes.rejected
+    assert set(strokes.roles) == {"lift", "current", "pressure"}
+    rest = strokes.matrix("lift")[:, strokes.time < -20e-6]
+    # the offset of the sensor, with a drift of 0.6 um over the set
+    assert rest.mean() == pytest.approx(TRUTH["offset"], abs=0.2e-6)
+    assert rest.std(axis=1).mean() == pytest.approx(NOISE, rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def hidden() -> MeasuredStrokeStudy:
+    case = with_truth()
+    study = run_stroke(case, variants=("wet", "dry"))
+    return compare_strokes(study, {"wet": [WET], "dry": [DRY]}, case.measurement)
+
+
+@pytest.mark.slow
+def test_hidden_values_agree_with_the_measurement(hidden):
+    wet, dry = hidden.variants["wet"], hidden.variants["dry"]
+    assert (wet.count, dry.count) == (STROKES, 6)
+    assert agreement(hidden, wet) == agreement(hidden, dry) == "excellent"
+    # more by what the scatter of preload and friction bends, in late bounces most of all
+    assert wet.lift_rms == pytest.approx(1.25 * NOISE / sqrt(STROKES), rel=0.15)
+    assert wet.lift_scatter == pytest.approx(NOISE, rel=0.15)
+    for variant in (wet, dry):
+        for stop in ("opening", "seat"):
+            first = variant.first(stop)
+            assert first is not None
+            assert first.restitution.difference == pytest.approx(0.0, abs=0.02)
+            assert first.time.difference == pytest.approx(0.0, abs=2e-6)
+
+
+@pytest.mark.slow
+def test_nominal_values_do_not(hidden):
+    case = load_valve_case(CASE)
+    study = run_stroke(case, variants=("wet",))
+    found = compare_strokes(study, {"wet": [WET]}, case.measurement)
+    wet = found.variants["wet"]
+    assert agreement(found, wet) == "none"
+    assert wet.lift_rms > 10 * hidden.variants["wet"].lift_rms
