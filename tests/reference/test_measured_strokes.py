@@ -5,8 +5,11 @@ the model agrees within the scatter, and the lift as far as the noise allows: th
 strokes with noise s is off by ``1.25 s / sqrt(n)`` (Laplace).  With the nominal values it does not.
 """
 
+import contextlib
+import re
 from io import StringIO
 from math import sqrt
+from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
@@ -16,6 +19,7 @@ from klack.case.shipped import shipped_cases
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.measurement.loading import load_stroke_set
+from klack.workflow.measured_store import save_measured_strokes
 from klack.workflow.measured_strokes import compare_strokes
 from klack.workflow.measured_study import MeasuredStrokeStudy
 from klack.workflow.measured_summary import agreement
@@ -25,6 +29,7 @@ CASE = shipped_cases()["measured"]
 FOLDER = CASE.parent
 WET, DRY = FOLDER / "strokes_synthetic.csv", FOLDER / "dry_strokes_synthetic.csv"
 TRUTH = YAML(typ="safe").load((FOLDER / "truth.yaml").read_text(encoding="utf-8"))
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "measurements.md").read_text()
 STROKES, NOISE = 10, 1e-6  # as the header of the file says
 UNITS = {"preload": "N", "friction": "N", "film_gap": "m", "damping": "", "offset": "m"}
 
@@ -108,3 +113,40 @@ def test_nominal_values_do_not(hidden):
     wet = found.variants["wet"]
     assert agreement(found, wet) == "none"
     assert wet.lift_rms > 10 * hidden.variants["wet"].lift_rms
+    first = wet.first("opening")
+    assert first is not None
+    row = re.search(r"\| rebound height \[um\] \| ([\d.]+) \| ([\d.]+) \|", PAGE)
+    assert row is not None
+    # the last digits may differ with the version of the mesher
+    height = first.rebound_height
+    assert 1e6 * height.computed == pytest.approx(float(row.group(1)), rel=5e-3)
+    assert 1e6 * height.measured == pytest.approx(float(row.group(2)), rel=5e-3)
+
+
+@pytest.mark.slow
+def test_the_python_example_of_the_page_runs(hidden, tmp_path, monkeypatch):
+    save_measured_strokes(hidden, tmp_path / "klack-results" / "measured" / "measured")
+    monkeypatch.chdir(tmp_path)
+    code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert code is not None
+    out = StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(compile(code.group(1), "measurements.md", "exec"), {})
+    rms, scatter, over = map(float, out.getvalue().split())
+    assert rms == hidden.variants["wet"].lift_rms
+    assert rms < scatter
+    assert abs(over) < 2
+
+
+def test_the_section_on_the_page_is_that_of_the_case():
+    block = re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    assert block is not None
+    shown = YAML(typ="safe").load(block.group(1))["measurement"]
+    stated = YAML(typ="safe").load(CASE.read_text(encoding="utf-8"))["measurement"]
+    del stated["channels"]["pressure"]
+    assert shown == stated
+
+
+def test_the_files_of_the_page_are_there():
+    named = re.findall(r"cases/measured/\w+\.csv", PAGE)
+    assert {name.rsplit("/", 1)[-1] for name in named} == {p.name for p in FOLDER.glob("*.csv")}
