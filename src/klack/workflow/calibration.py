@@ -63,6 +63,7 @@ _HOPELESS = 10.0
 """Misfit above which the search begins once more, from the middle of the bounds."""
 _LATER = 0.3e-3  # [s] that a computed stroke may trigger later than at the start
 _FINER, _FINEST = 8.0, 0.1e-6  # records per sample, and their least spacing [s]
+_REST = 0.3e-3  # [s] of rest on the opening stop after which a closing is repeatable
 _FEW = 5  # strokes below which the errors are rough
 _USUAL_ITERATIONS = 8
 _STOPS = {"opening": "opening stop", "seat": "seat"}
@@ -284,6 +285,7 @@ def _calibrate(
         measured = _computed_impacts(whole, at_start, start)
     time, lift = strokes.time, mean
     windows = fit_windows(time, strokes.matrix("lift"), measured, section.impacts)
+    windows, restless = _repeatable(windows, measured, _computed_impacts(whole, at_start, start))
     taper = window_taper(time, windows)
     counted = taper > 0.0
     ends = max(window.last for window in windows) + _begin(whole, at_start, start) + _LATER
@@ -334,9 +336,38 @@ def _calibrate(
         residual_rms_before=_rms(lift - before["lift"], counted),
         misfit=misfit,
         warnings=(
+            *restless,
             *_doubts(fit, misfit, strokes.count, len(names), impacts, windows),
             *identifiability_warnings(names, fit.z, seen, covariance),
         ),
+    )
+
+
+def _repeatable(
+    windows: tuple[FitWindow, ...], measured: Impacts, computed: Impacts
+) -> tuple[tuple[FitWindow, ...], tuple[str, ...]]:
+    """Leave the closing out if the needle still bounces on the opening stop when it begins.
+
+    The last bounces, too low to be measured, then decide when it closes; the sum of squares gets
+    many minima, and a search ends in any of them.
+    """
+    if len(windows) < 2:
+        return windows, ()
+    opening, closing = windows
+    ends = [impacts.get("seat", ()) for impacts in (measured, computed)]
+    bounces = [
+        instant
+        for impacts, seat in zip((measured, computed), ends, strict=True)
+        for instant in impacts.get("opening", ())
+        if not any(opening.last < t < instant for t in seat)
+    ]
+    last = max(bounces, default=-np.inf)
+    if last < closing.first - _REST:
+        return windows, ()
+    return (opening,), (
+        f"The needle still bounces on the opening stop {1e3 * last:.3g} ms after the trigger, "
+        f"shortly before it closes: bounces too low to be measured decide when that is, so only "
+        "the opening was fitted. Try: a longer stroke, or the wet valve.",
     )
 
 
