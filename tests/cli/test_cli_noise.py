@@ -122,6 +122,19 @@ def test_sounds_have_the_stated_level(heard, numbers):
             assert exposure == pytest.approx(numbers["sound_exposure_level_dB"], abs=1e-3)
 
 
+def test_the_click_carries_the_radiated_energy(heard):
+    """Monopole: the exposure on a sphere about it, over the impedance of air, is the energy."""
+    (design,) = load_noise(heard).designs
+    audible = design.radiated_bands[design.band_middle < 20e3].sum()
+    settings = design.settings
+    impedance = settings.air_density * settings.sound_speed
+    exposure = impedance * audible / (4.0 * np.pi * settings.distance**2)
+
+    found = design.sound.statistics.exposure_level
+    # bands are sums over the spectrum, the click is a filtered signal that fades from 20 kHz on
+    assert found == pytest.approx(10.0 * np.log10(exposure / 4e-10), abs=0.1)
+
+
 def test_the_report_holds_players_and_says_what_it_is(heard):
     page = (heard / "report.html").read_text(encoding="utf-8")
 
