@@ -128,6 +128,10 @@ def test_another_lift_is_told_from_the_computed_one(result, tmp_path):
     assert found["agreement"] == "none"
     assert "No agreement" in found["verdict"]
     assert found["lift_difference_m"] == pytest.approx(-5e-6, rel=0.05)
+    for impact in found["impacts"]:
+        width = max(impact["time_scatter_s"], impact["time_reading_error_s"])
+        expected = (impact["time_s"] - impact["time_measured_s"]) / width
+        assert impact["time_difference_in_scatter"] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.slow
