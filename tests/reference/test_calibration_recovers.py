@@ -12,11 +12,12 @@ import pytest
 
 from klack.case.case_tree import CaseTree
 from klack.case.reader import parse
+from klack.measurement.fit_window import FitWindow
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
 from klack.simulation.network_run import simulate_network
-from klack.workflow.calibration import run_calibration
+from klack.workflow.calibration import _repeatable, run_calibration
 
 TEXT = """
 klack: 1
@@ -75,13 +76,13 @@ def lift_of(tree, preload, friction, offset, grid):
     return np.interp(grid, result.time, sense(result.time, true, sensor))
 
 
-def measured(seed, count=STROKES, begin=0.0):
+def measured(seed, count=STROKES, begin=0.0, text=TEXT):
     rng = np.random.default_rng(seed)
     grid = 2e-6 * np.arange(round(begin / 2e-6), 700)
     strokes = []
     for k in range(count):
         values = TRUTH + SCATTER * rng.standard_normal(3)
-        lift = lift_of(tree_of(), *map(float, values), grid)
+        lift = lift_of(tree_of(text), *map(float, values), grid)
         lift += NOISE * rng.standard_normal(grid.size)
         strokes.append(MeasuredStroke(name=f"#{k + 1}", values={"lift": lift}))
     return StrokeSet(source="computed", time=grid, strokes=tuple(strokes))
@@ -174,3 +175,19 @@ def test_a_wrong_model_is_not_passed_over(studies):
     study = calibrate(measured(3), text)
     assert study.misfit > 3.0
     assert any("does not explain the strokes" in note for note in study.warnings)
+
+
+@pytest.mark.parametrize(("last", "kept"), [(1.0e-3, 2), (2.4e-3, 1)])
+def test_a_closing_that_the_last_bounces_decide_is_left_out(last, kept):
+    """The needle leaves the stop at 2.5 ms: it rested since 1 ms, or bounced until 2.4 ms."""
+    windows = (
+        FitWindow(first=0.0, last=0.4e-3, what="opening"),
+        FitWindow(first=2.5e-3, last=3.1e-3, what="closing"),
+    )
+    seen = {"opening": [0.2e-3, 0.4e-3], "seat": [2.8e-3, 3.1e-3]}
+    computed = {"opening": [0.2e-3, 0.4e-3, last, 3.0e-3], "seat": [2.8e-3, 3.1e-3]}
+
+    found, notes = _repeatable(windows, seen, computed)
+
+    assert len(found) == kept
+    assert any("only the opening was fitted" in note for note in notes) == (kept == 1)
