@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from klack.acoustics.force_bands import force_bands
-from klack.acoustics.force_spectrum import averaged, force_spectrum
-from klack.acoustics.spectrum import force_spectrum as spectrum_up_to
+from klack.acoustics.force_bands import averaged, force_bands
+from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import band_edges
 from klack.signals import TimeSeries
 from klack.simulation.network_result import (
@@ -43,7 +42,7 @@ def test_a_short_pulse_keeps_its_impulse_at_any_highest_frequency(high):
     """The record is then averaged over up to 208 us, longer than it is."""
     pulse = half_sine(-STEP, DURATION + 2.0 * STEP)  # one step of rest on both sides
 
-    spectrum = spectrum_up_to(pulse, high=high, resolution=0.05 * high)
+    spectrum = force_spectrum(pulse, high=high, resolution=0.05 * high)
 
     expected = np.array([half_sine_magnitude(f) for f in spectrum.frequency[1:]])
     scale = 2.0 / np.pi * PEAK * DURATION
@@ -52,13 +51,12 @@ def test_a_short_pulse_keeps_its_impulse_at_any_highest_frequency(high):
 
 
 def test_a_pulse_has_its_closed_spectrum():
-    spectrum = force_spectrum(half_sine(-5e-6, 60e-6), resolution=1e3)
-    f = spectrum.frequency
-    seen = f <= 300e3
+    spectrum = force_spectrum(half_sine(-5e-6, 60e-6), high=300e3, resolution=1e3)
 
-    expected = np.array([half_sine_magnitude(value) for value in f[seen]])
-    assert abs(spectrum.values[0]) == pytest.approx(2.0 / np.pi * PEAK * DURATION, rel=1e-9)
-    np.testing.assert_allclose(np.abs(spectrum.values[seen]), expected, atol=1e-6 * expected[0])
+    expected = np.array([half_sine_magnitude(f) for f in spectrum.frequency[1:]])
+    scale = 2.0 / np.pi * PEAK * DURATION
+    # averages over 1/160 of the shortest period fold a little back
+    np.testing.assert_allclose(np.abs(spectrum.values[1:]), expected, atol=2e-4 * scale)
 
 
 def test_the_bands_hold_the_energy_of_a_pulse():

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.force_spectrum import averaged
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
 from klack.signals import Spectrum, TimeSeries
 
 __all__ = [
     "BandDensity",
+    "averaged",
     "density_bands",
     "force_bands",
     "force_densities",
@@ -118,4 +118,30 @@ def _joined(parts: Sequence[ThirdOctaves]) -> ThirdOctaves:
         low=np.concatenate([part.low for part in parts]),
         high=np.concatenate([part.high for part in parts]),
         energy=np.concatenate([part.energy for part in parts]),
+    )
+
+
+def averaged(force: TimeSeries, step: float) -> TimeSeries:
+    """Means over longer intervals, so that the impulse stays.
+
+    The first and the last value are held for one interval each, so that the ends stay as they are.
+
+    Parameters
+    ----------
+    force : TimeSeries
+        Means over intervals.
+    step : float [s]
+        Rounded to a multiple of the step of the force.
+    """
+    size = max(1, round(step / force.step))
+    if size == 1:
+        return force
+    after = size + -force.values.size % size
+    values = np.pad(force.values, (size, after), mode="edge")
+    return TimeSeries(
+        step=size * force.step,
+        values=values.reshape(-1, size).mean(axis=1),
+        unit=force.unit,
+        start=force.start - 0.5 * (size + 1) * force.step,
+        name=force.name,
     )
