@@ -175,3 +175,13 @@ def test_no_stroke_at_all_is_an_error(tmp_path):
     high = {"channel": "current", "level": "50 A"}
     with pytest.raises(InputError, match="no stroke"):
         load_stroke_set([tmp_path / "bench.csv"], section(trigger=high))
+
+
+def test_a_bench_that_records_less_shares_the_description_of_another():
+    section = CaseMeasurement(
+        channels={"lift": "Lift", "current": "I_Coil", "pressure": "P_Inlet"},
+        trigger=Trigger(channel="current", level="1 A"),
+    )
+
+    assert list(section.only("lift").channels) == ["lift", "current"]
+    assert list(section.only("lift", "pressure").channels) == ["lift", "current", "pressure"]

@@ -34,7 +34,7 @@ class NoiseMount(Section):
     mass: Mass | None = Field(
         default=None,
         gt=0,
-        description="Of all that moves on the mount; the mass of the body without.",
+        description="Of all that moves on the mount; the mass of the held bodies without.",
     )
 
 

@@ -69,7 +69,8 @@ def calibrate(
 
     tree = read_case_tree(find_case(case))
     checked = tree.case()
-    calibration_of(checked)
+    section = calibration_of(checked)
+    recorded = checked.measurement and checked.measurement.only("lift", *section.channels)
     folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
     require_folder(folder)
 
@@ -87,7 +88,7 @@ def calibrate(
     try:
         with show_progress(quiet) as progress:
             measured = load_stroke_set(
-                measurement, checked.measurement, lambda share: progress("measurement", share)
+                measurement, recorded, lambda share: progress("measurement", share)
             )
             study = run_calibration(
                 tree,

@@ -94,7 +94,7 @@ def compare_strokes(
         for name, paths in measurements.items():
             variant = _variant(study, name)
             clock(f"read {name}", 0.0)
-            strokes = load_stroke_set(paths, _needed(used), lambda _: None)
+            strokes = load_stroke_set(paths, used.only("lift"), lambda _: None)
             clock(f"compare {name}", 0.0)
             variants[name] = _compare(study, variant, strokes, used)
     return MeasuredStrokeStudy(
@@ -127,13 +127,6 @@ def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
             hint=f"run `klack stroke {study.case} --variant {name}` first, or name another.",
         )
     return study.variants[name]
-
-
-def _needed(section: CaseMeasurement) -> CaseMeasurement:
-    """Only lift and the channel of the trigger: a dry bench records no pressure."""
-    roles = _roles(section)
-    channels = {role: choice for role, choice in section.channels.items() if role in roles}
-    return section.model_copy(update={"channels": channels})
 
 
 def _roles(section: CaseMeasurement) -> set[str]:

@@ -167,7 +167,12 @@ def _surroundings(
     return Surroundings(
         mount=None
         if mount is None
-        else Mount(stiffness=mount.stiffness, loss_factor=mount.loss_factor, mass=mount.mass),
+        else Mount(
+            stiffness=mount.stiffness,
+            loss_factor=mount.loss_factor,
+            # one mount carries all held bodies
+            mass=mount.mass or sum(structure.mass for structure in source.structures),
+        ),
         plate=None
         if plate is None
         else Plate(
