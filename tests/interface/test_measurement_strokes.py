@@ -177,11 +177,13 @@ def test_no_stroke_at_all_is_an_error(tmp_path):
         load_stroke_set([tmp_path / "bench.csv"], section(trigger=high))
 
 
-def test_a_bench_that_records_less_shares_the_description_of_another():
-    section = CaseMeasurement(
-        channels={"lift": "Lift", "current": "I_Coil", "pressure": "P_Inlet"},
-        trigger=Trigger(channel="current", level="1 A"),
-    )
+def test_a_bench_that_records_less_shares_the_description_of_another(tmp_path):
+    write(tmp_path / "bench.csv", [1e-3, 6e-3], 12e-3)
+    rich = section(channels={"lift": "lift", "current": "current", "pressure": "P_Inlet"})
 
-    assert list(section.only("lift").channels) == ["lift", "current"]
-    assert list(section.only("lift", "pressure").channels) == ["lift", "current", "pressure"]
+    found = load_stroke_set([tmp_path / "bench.csv"], rich, roles=("lift",))
+
+    assert found.roles == ("lift", "current")  # the trigger is always read
+    assert found.notes == ()
+    with pytest.raises(InputError, match="no channel 'P_Inlet'"):
+        load_stroke_set([tmp_path / "bench.csv"], rich)

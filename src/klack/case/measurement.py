@@ -1,12 +1,11 @@
 """How a valve was measured: which channels, where a stroke begins, which sensor."""
 
-from typing import Literal, Self
+from typing import Literal
 
 from pydantic import Field
 
 from klack.input.section import Section
 from klack.measurement.channels import Channels
-from klack.measurement.roles import Role
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.trigger import Trigger
 from klack.units import Frequency, Time
@@ -40,12 +39,3 @@ class CaseMeasurement(Section):
         gt=0,
         description="Bandwidth of the velocity made from the lift; chosen by its noise without.",
     )
-
-    def only(self, *roles: Role) -> Self:
-        """Return the same with the channels of some roles, and of the trigger.
-
-        A bench that records less than another can then share its description.
-        """
-        wanted = {*roles} if self.trigger is None else {*roles, self.trigger.channel}
-        kept = {role: choice for role, choice in self.channels.items() if role in wanted}
-        return self.model_copy(update={"channels": kept})

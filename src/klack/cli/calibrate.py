@@ -69,8 +69,7 @@ def calibrate(
 
     tree = read_case_tree(find_case(case))
     checked = tree.case()
-    section = calibration_of(checked)
-    recorded = checked.measurement and checked.measurement.only("lift", *section.channels)
+    fitted = calibration_of(checked).channels
     folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
     require_folder(folder)
 
@@ -88,7 +87,10 @@ def calibrate(
     try:
         with show_progress(quiet) as progress:
             measured = load_stroke_set(
-                measurement, recorded, lambda share: progress("measurement", share)
+                measurement,
+                checked.measurement,
+                lambda share: progress("measurement", share),
+                roles=("lift", *fitted),
             )
             study = run_calibration(
                 tree,

@@ -60,6 +60,7 @@ def find_channels(
     channels: Mapping[Role, ChannelChoice] | None = None,
     *,
     needed: Collection[Role] = (),
+    roles: Collection[Role] = tuple(ROLES),
 ) -> list[dict[Role, FoundChannel]]:
     """Tell what the channels of a recording mean.
 
@@ -70,6 +71,8 @@ def find_channels(
         From the section ``measurement``; patterns may match several channels.
     needed : collection of roles
         What the recording must have.
+    roles : collection of roles
+        What is looked for; others are left alone, even if they are named.
 
     Returns
     -------
@@ -84,12 +87,14 @@ def find_channels(
         series differ in length.
     """
     named: dict[Role, Sequence[ChannelInfo]] = {
-        role: _matching(recording, role, choice) for role, choice in (channels or {}).items()
+        role: _matching(recording, role, choice)
+        for role, choice in (channels or {}).items()
+        if role in roles
     }
     taken = {info.name for infos in named.values() for info in infos}
     free = [info for info in recording.channels if info.name not in taken]
     series: dict[Role, list[FoundChannel]] = {}
-    for role in ROLES:
+    for role in (role for role in ROLES if role in roles):
         if role in named:
             choice = (channels or {})[role]
             series[role] = [_as_named(recording, role, choice, info) for info in named[role]]

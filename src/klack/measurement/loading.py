@@ -1,6 +1,6 @@
 """From files to a set of strokes."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,7 +16,7 @@ from klack.measurement.find_channels import FoundChannel, find_channels
 from klack.measurement.outliers import find_outliers
 from klack.measurement.read_channels import common_time, read_channels, windows
 from klack.measurement.recording import Recording, open_recording
-from klack.measurement.roles import Role
+from klack.measurement.roles import ROLES, Role
 from klack.measurement.stroke_set import MeasuredStroke, Rejection, StrokeSet
 from klack.measurement.trigger import Trigger
 
@@ -56,6 +56,8 @@ def load_stroke_set(
     paths: Sequence[Path],
     measurement: MeasurementSection | None = None,
     progress: Callable[[float], None] = lambda share: None,
+    *,
+    roles: Collection[Role] = tuple(ROLES),
 ) -> StrokeSet:
     """Read recordings, cut them into strokes, align these, and put aside what cannot be used.
 
@@ -70,6 +72,9 @@ def load_stroke_set(
         is one stroke in its own time.
     progress : callable
         Called with the share of the files that is done, 0 to 1.
+    roles : collection of roles
+        Channels that are read beside that of the trigger.  A bench that records less than another
+        can so share its description.
 
     Returns
     -------
@@ -91,7 +96,8 @@ def load_stroke_set(
         with open_recording(Path(path), time_step=step) as recording:
             needed: tuple[Role, ...] = () if trigger is None else (trigger.channel,)
             channels = None if measurement is None else measurement.channels
-            found = find_channels(recording, channels, needed=needed)
+            wanted = {*roles, *needed}
+            found = find_channels(recording, channels, needed=needed, roles=wanted)
             for one in found:
                 notes.extend(common_time(recording, one).notes)
                 cuts.extend(_cuts(recording, one, trigger, several=len(found) > 1))

@@ -5,7 +5,7 @@ from typing import Literal
 
 from klack.units import ACCELERATION, CURRENT, FORCE, LENGTH, PRESSURE, SPEED, VOLTAGE, Kind
 
-__all__ = ["ROLES", "Role"]
+__all__ = ["LIFT_ALONE", "ROLES", "Role"]
 
 Role = Literal["lift", "velocity", "current", "voltage", "pressure", "acceleration", "force"]
 
@@ -19,3 +19,6 @@ ROLES: Mapping[Role, Kind] = {
     "force": FORCE,
 }
 """Kind of quantity of each role; inside klack its values are in the SI unit of that kind."""
+
+LIFT_ALONE: tuple[Role, ...] = ("lift",)
+"""What a comparison needs of a recording, beside its trigger."""

@@ -28,6 +28,7 @@ from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
+from klack.measurement.roles import LIFT_ALONE
 from klack.measurement.stroke_measures import MeasuredImpact
 from klack.measurement.stroke_set import Rejection, StrokeSet
 from klack.workflow.measured_shots_study import MeasuredDistribution, MeasuredShotsStudy
@@ -84,7 +85,7 @@ def compare_shots(
     clock = StageClock(progress)
     with collected_warnings() as notes:
         clock("read drops", 0.0)
-        drops = load_stroke_set(paths, used, lambda _: None)
+        drops = load_stroke_set(paths, used, roles=LIFT_ALONE)
         clock("compare drops", 0.0)
         names, impacts, unread = _first_impacts(drops, used)
         computed = _computed_impacts(study, study.shots, study.shot_traces)

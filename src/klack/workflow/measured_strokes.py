@@ -23,7 +23,7 @@ from klack.measurement.computed_stroke import recorded_stroke, trigger_instant
 from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.roles import ROLES
+from klack.measurement.roles import LIFT_ALONE
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.stroke_set import StrokeSet
@@ -94,7 +94,7 @@ def compare_strokes(
         for name, paths in measurements.items():
             variant = _variant(study, name)
             clock(f"read {name}", 0.0)
-            strokes = load_stroke_set(paths, used.only("lift"), lambda _: None)
+            strokes = load_stroke_set(paths, used, roles=LIFT_ALONE)
             clock(f"compare {name}", 0.0)
             variants[name] = _compare(study, variant, strokes, used)
     return MeasuredStrokeStudy(
@@ -129,16 +129,6 @@ def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
     return study.variants[name]
 
 
-def _roles(section: CaseMeasurement) -> set[str]:
-    return {"lift"} if section.trigger is None else {"lift", section.trigger.channel}
-
-
-def _about(notes: Sequence[str], roles: set[str]) -> tuple[str, ...]:
-    """Notes without those on channels that are found, but not compared."""
-    others = tuple(f"taken as {role}." for role in ROLES if role not in roles)
-    return tuple(note for note in notes if not note.endswith(others))
-
-
 # --------------------------------------------------------------------------- one variant
 
 
@@ -159,7 +149,7 @@ def _compare(
         for row in _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
     ]
     readings = [_read(time, row, sensor, study.lift) for row in lift]
-    notes = _about(strokes.notes, _roles(section))
+    notes = strokes.notes
     if any(reading.by_drawing for reading in (*model, *readings)):
         notes = (*notes, _BY_DRAWING)
     return ComparedVariant(
