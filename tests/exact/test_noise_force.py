@@ -14,10 +14,11 @@ from klack.signals import TimeSeries
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,
+    ImpactEvent,
     InterfaceRecord,
     NetworkResult,
 )
-from klack.workflow.noise_force import stop_force
+from klack.workflow.noise_force import before_impact, interrupted_impact, stop_force
 
 PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
 
@@ -163,3 +164,35 @@ def test_the_force_of_a_stop_keeps_the_impulse_of_every_record():
     np.testing.assert_allclose(force.values[:130], 12.0, rtol=1e-12)
     np.testing.assert_allclose(force.values[1500:], fine[1500:], rtol=1e-12)
     assert np.all(force.values[140:690] == 0.0)
+
+
+def last_impact(separation: float) -> ImpactEvent:
+    return ImpactEvent(
+        stop="seat",
+        time=60e-6,
+        approach_speed=0.3,
+        peak_force=PEAK,
+        peak_time=70e-6,
+        contact_time=20e-6,
+        separation_time=separation,
+        impulse=3e-3,
+        restitution=np.nan,
+        energy_loss=np.nan,
+    )
+
+
+def net_force(end: float) -> TimeSeries:
+    return TimeSeries(step=1e-6, values=np.full(80, end), unit="N", start=0.5e-6)
+
+
+def test_a_run_that_ends_in_an_impact_is_cut_before_it():
+    """Else the force of its last instant would seem to stay for ever."""
+    open_end, closed = last_impact(np.nan), last_impact(75e-6)
+
+    assert interrupted_impact([open_end], net_force(-120.0)) is open_end
+    assert interrupted_impact([closed], net_force(-120.0)) is None
+    assert interrupted_impact([open_end], net_force(0.1)) is None  # rests on its seat
+    assert interrupted_impact([open_end], None) is None
+
+    assert before_impact(net_force(1.0), open_end).time[-1] == pytest.approx(39.5e-6)
+    assert before_impact(net_force(1.0), None).values.size == 80

@@ -8,7 +8,8 @@ that of the run, through flight, impact, and rest on the stop.
 Forces of magnets and fluid on the housing are not among them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,13 @@ from numpy.typing import NDArray
 from klack.acoustics.spectrum import force_series
 from klack.contact.history import ImpactHistory
 from klack.signals import TimeSeries
-from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_result import ImpactEvent, NetworkResult
 
-__all__ = ["impact_force", "stop_force", "stop_forces"]
+__all__ = ["before_impact", "impact_force", "interrupted_impact", "stop_force", "stop_forces"]
 
 Floats = NDArray[np.float64]
+
+_AT_REST = 0.05  # net force over the peak of the last impact
 
 
 def impact_force(history: ImpactHistory) -> TimeSeries:
@@ -33,6 +36,33 @@ def impact_force(history: ImpactHistory) -> TimeSeries:
         start=series.start - series.step,
         name=series.name,
     )
+
+
+def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) -> ImpactEvent | None:
+    """Impact in which a run ends, if it does: its force would seem to stay for ever.
+
+    A needle that rests on its stop does not accelerate.
+
+    Parameters
+    ----------
+    events : sequence of ImpactEvent
+        In order of time.
+    net : TimeSeries or None [N]
+        Mass times acceleration of the needle.
+    """
+    if net is None or not events or np.isfinite(events[-1].separation_time):
+        return None
+    last = events[-1]
+    return last if abs(float(net.values[-1])) > _AT_REST * last.peak_force else None
+
+
+def before_impact(series: TimeSeries, event: ImpactEvent | None) -> TimeSeries:
+    """Series up to a contact time before an impact; all of it without one."""
+    if event is None:
+        return series
+    end = event.time - event.contact_time
+    count = int((end - series.start) / series.step + 0.5)
+    return replace(series, values=series.values[: max(count, 2)])
 
 
 def stop_forces(result: NetworkResult) -> Mapping[str, TimeSeries]:

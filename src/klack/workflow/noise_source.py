@@ -18,7 +18,12 @@ from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.workflow.impact import run_impact
-from klack.workflow.noise_force import impact_force, stop_forces
+from klack.workflow.noise_force import (
+    before_impact,
+    impact_force,
+    interrupted_impact,
+    stop_forces,
+)
 from klack.workflow.progress import Progress, silent
 from klack.workflow.record_store import stored_format
 from klack.workflow.store import IMPACT_FORMAT, load_study
@@ -205,6 +210,8 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
     for name in wanted:
         _require("variant", name, study.variants)
         variant = study.variants[name]
+        net = _net_force(study, variant)
+        last = interrupted_impact(variant.result.events, net)
         found.append(
             NoiseSource(
                 kind="stroke",
@@ -213,29 +220,31 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 case_text=study.case_text,
                 run=name,
                 label=variant.label,
-                stops=_stops(study, variant),
+                stops=_stops(study, variant, last),
                 structures=study.structures,
                 kept_up_to=_kept_up_to(study.bodies) if variant.flexible else float("nan"),
                 noise=noise,
                 given=given,
                 materials=materials,
-                net=_net_force(study, variant),
-                notes=_notes(variant),
+                net=net if net is None else before_impact(net, last),
+                notes=_notes(variant, last),
             )
         )
     return tuple(found)
 
 
-def _stops(study: StrokeStudy, variant: StrokeVariant) -> tuple[SourceStop, ...]:
-    """Stops in the order of a stroke: the opening stop first."""
+def _stops(
+    study: StrokeStudy, variant: StrokeVariant, last: ImpactEvent | None
+) -> tuple[SourceStop, ...]:
+    """Stops in the order of a stroke, the opening stop first; without the interrupted impact."""
     order = dict.fromkeys(
         name for name in (study.channels.opening_stop, study.channels.seat) if name
     )
-    forces = stop_forces(variant.result)
+    forces = {name: before_impact(f, last) for name, f in stop_forces(variant.result).items()}
     result = []
     for name in order | dict.fromkeys(forces):
         if name in forces:
-            events = variant.impacts(name)
+            events = [event for event in variant.impacts(name) if event is not last]
             result.append(
                 SourceStop(
                     name=name,
@@ -291,15 +300,21 @@ def _net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
     )
 
 
-def _notes(variant: StrokeVariant) -> tuple[str, ...]:
+def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
     result: NetworkResult = variant.result
+    found = []
+    if last is not None:
+        found.append(
+            f"The run ends in an impact on '{last.stop}', which is left out; run it longer to have "
+            "the whole of it."
+        )
     incomplete = [stop for stop, record in result.interfaces.items() if not record.complete]
-    if not incomplete:
-        return ()
-    return (
-        f"The fine record of {one_of(incomplete)} is not complete: its latest impacts are known as "
-        "means over the records alone.",
-    )
+    if incomplete:
+        found.append(
+            f"The fine record of {one_of(incomplete)} is not complete: its latest impacts are "
+            "known as means over the records alone."
+        )
+    return tuple(found)
 
 
 # --------------------------------------------------------------------------- what both share
