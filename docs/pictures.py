@@ -5,19 +5,26 @@ Of ``klack demo`` come section.svg and force.svg, of ``klack stroke demo-stroke`
 Of two results of ``klack impact CASE --level interface`` comes pressure.svg; their cases are
 copies of ``demo-valve`` with titles of their own, the second with
 ``placement: {eccentricity: 1 um}`` under ``motion``.
+
+Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
+calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg.
 """
 
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+from klack.report.calibration_figures import stroke_chart as calibration_chart
 from klack.report.chart import Chart
 from klack.report.figures import force_chart
+from klack.report.noise_figures import click_charts
 from klack.report.pressure_figure import draw_pressure
 from klack.report.pressure_view import PressureView, pressure_view
 from klack.report.printed import svg_chart
 from klack.report.section_figure import section_figure
 from klack.report.stroke_figures import actuation_chart
+from klack.workflow.calibration_store import CALIBRATION_FORMAT, load_calibration
+from klack.workflow.noise_store import NOISE_FORMAT, load_noise
 from klack.workflow.record_store import stored_format
 from klack.workflow.store import load_study
 from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
@@ -31,14 +38,24 @@ def main(results: list[Path]) -> None:
     """Write the pictures that belong to each result."""
     rings: list[PressureView] = []
     for result in results:
-        if stored_format(result) == STROKE_FORMAT.name:
+        form = stored_format(result)
+        if form == STROKE_FORMAT.name:
             (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(load_stroke(result))))
             continue
-        study = load_study(result)
-        if study.sections:
-            _write_impact(study)
+        if form == CALIBRATION_FORMAT.name:
+            study = load_calibration(result)
+            chart = calibration_chart(study, study.channels[0])
+            (IMAGES / "calibration.svg").write_bytes(svg_chart(chart))
+            continue
+        if form == NOISE_FORMAT.name:
+            chart = click_charts(load_noise(result))[0]
+            (IMAGES / "click.svg").write_bytes(svg_chart(chart))
+            continue
+        impact = load_study(result)
+        if impact.sections:
+            _write_impact(impact)
         else:
-            rings += _ring(study)
+            rings += _ring(impact)
     if len(rings) > 1:
         (IMAGES / "pressure.svg").write_bytes(draw_pressure(rings))
 
