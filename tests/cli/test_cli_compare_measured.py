@@ -160,7 +160,7 @@ def test_both_variants_and_the_report(result, tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "neither --measurement nor --calculix"),
+        ((), "neither of them"),
         (("--measurement", "a.csv", "--calculix", "b.dat"), "both of them"),
         (("--measurement", "nowhere.csv"), "no such file"),
         (("--measurement", "dry=nowhere.csv"), "VARIANT=FILE"),

@@ -81,8 +81,8 @@ def compare(
     require_json_target(json)
     if (calculix is None) == (not measurement):
         raise InputError(
-            "klack compare",
-            got="neither --measurement nor --calculix" if calculix is None else "both of them",
+            "--measurement and --calculix",
+            got="neither of them" if calculix is None else "both of them",
             expected="one: a measurement, or a run of CalculiX",
             hint="klack compare RESULT --measurement strokes.csv.",
         )

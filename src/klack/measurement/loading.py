@@ -145,19 +145,15 @@ def _aligned(
     axis = common_axis([cut.piece for cut in cuts], first, last)
     if trigger is not None:
         notes.extend(_shortened(axis, trigger))
-    rejected = [
-        Rejection(name=cut.name, reason=_incomplete(cut.piece, axis))
-        for cut in cuts
-        if not covers(cut.piece, axis)
-    ]
-    strokes = [
-        MeasuredStroke(
-            name=cut.name, values=_zeroed(axis, onto_axis(cut.piece, axis), zero), start=instant
-        )
-        for cut in cuts
-        if covers(cut.piece, axis)
-        for instant in (cut.piece.instant,)
-    ]
+    rejected, strokes = [], []
+    cuts.reverse()
+    while cuts:  # each piece goes when its stroke has come: a long set is not held twice
+        cut = cuts.pop()
+        if covers(cut.piece, axis):
+            values = _zeroed(axis, onto_axis(cut.piece, axis), zero)
+            strokes.append(MeasuredStroke(name=cut.name, values=values, start=cut.piece.instant))
+        else:
+            rejected.append(Rejection(name=cut.name, reason=_incomplete(cut.piece, axis)))
     if strokes and all("lift" in stroke.values for stroke in strokes):
         reasons = find_outliers(axis, np.array([stroke.values["lift"] for stroke in strokes]))
         rejected.extend(
