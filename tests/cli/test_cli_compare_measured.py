@@ -83,6 +83,16 @@ def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
         assert abs(impact["restitution_difference_in_scatter"]) < 2
         assert impact["restitution"] == pytest.approx(impact["restitution_measured"], abs=0.01)
 
+    seat = next(shot for shot in found["highest_rebound"] if shot["stop"] == "seat")
+    assert seat["stroke"].startswith("strokes.csv")
+    assert seat["strokes"] == STROKES
+    # the same stroke three times: what is above the others is reading error
+    assert seat["rebound_height_m"] >= first["seat"]["rebound_height_measured_m"]
+    assert seat["restitution"] == pytest.approx(0.5, abs=0.03)
+    assert 0.0 <= seat["too_high_by_reading_m"] < 3.0 * seat["rebound_height_error_m"]
+    assert abs(seat["above_median_m"]) < 3.0 * seat["rebound_height_error_m"]
+
+    assert "highest rebound" in out
     assert "over scatter" in out
     assert "opening stop #1" in out
     assert f"Excellent agreement of 'wet' with {STROKES} measured strokes" in out

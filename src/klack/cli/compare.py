@@ -225,8 +225,10 @@ def _section(
 def _print_strokes(study: "MeasuredStrokeStudy", *, to_stderr: bool) -> None:
     from klack.workflow.measured_summary import (
         CURVE_COLUMNS,
+        HIGHEST_COLUMNS,
         IMPACT_COLUMNS,
         curve_rows,
+        highest_rows,
         impact_rows,
         rule,
         verdict,
@@ -239,6 +241,9 @@ def _print_strokes(study: "MeasuredStrokeStudy", *, to_stderr: bool) -> None:
         print_table(title, CURVE_COLUMNS, curve_rows(variant), to_stderr=to_stderr)
         rows = impact_rows(variant)
         print_table("Impacts", IMPACT_COLUMNS, rows, left=2, to_stderr=to_stderr)
+        if variant.highest:
+            highest = highest_rows(variant)
+            print_table("Measured", HIGHEST_COLUMNS, highest, left=2, to_stderr=to_stderr)
         for item in variant.rejected:
             print(f"Put aside: {item.name}: {item.reason}", file=stream)
         for note in variant.notes:

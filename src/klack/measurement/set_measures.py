@@ -35,6 +35,7 @@ __all__ = [
     "HighestRebound",
     "SetMeasures",
     "expected_maximum",
+    "first_impact_column",
     "highest_rebound",
     "measure_set",
 ]
@@ -173,14 +174,7 @@ class SetMeasures:
                 expected=f"one of: {', '.join(QUANTITIES)}",
                 hint="speeds, restitution, height, time and period of the first impact.",
             )
-        firsts = [stroke.first(stop) for stroke in self.strokes]
-        return Column(
-            stop=stop,
-            quantity=quantity,
-            unit=QUANTITIES[quantity],
-            values=np.array([_value(first, quantity) for first in firsts]),
-            errors=np.array([_value(first, _SE[quantity]) for first in firsts]),
-        )
+        return first_impact_column(stop, quantity, [stroke.first(stop) for stroke in self.strokes])
 
     def bounces(self, stop: Stop) -> NDArray[np.int64]:
         """Bounces on a stop, per stroke."""
@@ -192,6 +186,27 @@ class SetMeasures:
         if quantile is not None:
             return column.quantile(quantile)
         return float(column.values[highest_rebound(self.column(stop, "rebound_height")).index])
+
+
+def first_impact_column(
+    stop: Stop, quantity: str, firsts: Sequence[MeasuredImpact | None]
+) -> Column:
+    """One quantity of the first impacts of several strokes; nan where there is none.
+
+    Parameters
+    ----------
+    stop : "opening" or "seat"
+    quantity : str
+        Among :data:`QUANTITIES`.
+    firsts : sequence of MeasuredImpact or None
+    """
+    return Column(
+        stop=stop,
+        quantity=quantity,
+        unit=QUANTITIES[quantity],
+        values=np.array([_value(first, quantity) for first in firsts]),
+        errors=np.array([_value(first, _SE[quantity]) for first in firsts]),
+    )
 
 
 def measure_set(

@@ -22,8 +22,10 @@ from klack.workflow.measured_shots_summary import (
 from klack.workflow.measured_study import ComparedVariant, MeasuredStrokeStudy
 from klack.workflow.measured_summary import (
     CURVE_COLUMNS,
+    HIGHEST_COLUMNS,
     IMPACT_COLUMNS,
     curve_rows,
+    highest_rows,
     impact_rows,
     rule,
     verdict,
@@ -31,6 +33,11 @@ from klack.workflow.measured_summary import (
 
 __all__ = ["measured_shots_content", "measured_strokes_content"]
 
+_HIGHEST = (
+    "The stroke that rebounds highest is usually taken for the centred one. The highest of many "
+    "readings is too high by their errors, and the highest of many strokes lies above the median "
+    "by chance alone; both are estimated here from the scatter."
+)
 _MOST_IMPACTS = 6
 
 
@@ -133,6 +140,8 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
     touches = (first_touch_chart(variant, stop) for stop in ("opening", "seat"))
     rows = tuple(tuple(map(_typeset, row)) for row in _one_column(variant, most=_MOST_IMPACTS))
     curves = tuple(tuple(map(_typeset, row)) for row in curve_rows(variant))
+    highest = tuple(tuple(map(_typeset, row)) for row in highest_rows(variant))
+    columns = tuple(map(_typeset, HIGHEST_COLUMNS))
     return [
         Section(
             title=f"The whole stroke: {variant.variant}",
@@ -147,6 +156,11 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
             title=f"Impacts in numbers: {variant.variant}",
             paragraphs=(f"The first {_MOST_IMPACTS} impacts on each stop.",),
             tables=(Table(columns=("impact", *IMPACT_COLUMNS[2:]), rows=rows),),
+        ),
+        Section(
+            title=f"The highest measured rebound: {variant.variant}",
+            paragraphs=(_HIGHEST,),
+            tables=(Table(columns=columns, rows=highest),),
         ),
     ]
 

@@ -25,6 +25,7 @@ from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.roles import LIFT_ALONE
 from klack.measurement.sensor import LiftSensor
+from klack.measurement.set_measures import first_impact_column, highest_rebound
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.stroke_set import StrokeSet
 from klack.measurement.trigger import Trigger
@@ -34,6 +35,7 @@ from klack.workflow.measured_study import (
     Compared,
     ComparedImpact,
     ComparedVariant,
+    HighestShot,
     MeasuredStrokeStudy,
 )
 from klack.workflow.progress import Progress, silent
@@ -56,6 +58,7 @@ _BY_DRAWING = (
 )
 _REPLICAS, _SEED = 5, 1
 """Readings of the computed lift, each with noise of its own."""
+_FEWEST_SHOTS = 3
 _STOPS: tuple[Stop, ...] = ("opening", "seat")
 
 
@@ -182,6 +185,7 @@ def _compare(
             [item.measures.level_se for item in readings],
         ),
         impacts=_impacts(model, readings, strokes.step),
+        highest=_highest([stroke.name for stroke in strokes.strokes], readings),
     )
 
 
@@ -303,6 +307,36 @@ def _impacts(
                 break
             found.append(_impact(stop, i + 1, ours, theirs, step))
     return tuple(sorted(found, key=lambda item: item.time.computed))
+
+
+def _highest(names: Sequence[str], readings: Sequence[_Reading]) -> tuple[HighestShot, ...]:
+    """Measured stroke with the highest first rebound from each stop; of three strokes or more."""
+    found = []
+    for stop in _STOPS:
+        hits = [reading.on(stop) for reading in readings]
+        firsts = [hit[0] if hit else None for hit in hits]
+        column = first_impact_column(stop, "rebound_height", firsts)
+        if column.known.size < _FEWEST_SHOTS:
+            continue
+        best = highest_rebound(column)
+        bounces = [sum(hit.rebound_height > 0.0 for hit in of_stroke) for of_stroke in hits]
+        shot = firsts[best.index]
+        assert shot is not None  # its rebound is the highest
+        found.append(
+            HighestShot(
+                stop=stop,
+                stroke=names[best.index],
+                count=best.count,
+                rebound_height=best.value,
+                rebound_height_error=best.error,
+                restitution=shot.restitution,
+                restitution_error=shot.restitution_se,
+                by_reading=best.normal_excess,
+                above_median=best.above_median,
+                bounces=float(np.median(bounces)),
+            )
+        )
+    return tuple(found)
 
 
 def _impact(

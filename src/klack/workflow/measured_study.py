@@ -18,6 +18,7 @@ __all__ = [
     "Compared",
     "ComparedImpact",
     "ComparedVariant",
+    "HighestShot",
     "ImpactMeasure",
     "MeasuredStrokeStudy",
     "stop_words",
@@ -131,6 +132,41 @@ class ComparedImpact:
         return value
 
 
+@dataclass(frozen=True, kw_only=True)
+class HighestShot:
+    """Stroke that rebounds highest from a stop: the usual stand-in for a centred impact.
+
+    Parameters
+    ----------
+    stop : str
+        ``"opening"`` or ``"seat"``.
+    stroke : str
+    count : int
+        Strokes of which it is the highest.
+    rebound_height, rebound_height_error : float [m]
+        With standard error.
+    restitution, restitution_error : float [-]
+        Of the same stroke.
+    by_reading : float [m]
+        How much too high the highest of so many readings is by their errors alone.
+    above_median : float [m]
+        How far the highest of so many strokes lies above the median, without reading errors.
+    bounces : float
+        Bounces from this stop, median of the strokes.
+    """
+
+    stop: str
+    stroke: str
+    count: int
+    rebound_height: float
+    rebound_height_error: float
+    restitution: float
+    restitution_error: float
+    by_reading: float
+    above_median: float
+    bounces: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComparedVariant:
     """One variant of the model beside its measured set.
@@ -167,6 +203,8 @@ class ComparedVariant:
     way : Compared [m]
         Lift between both stops.
     impacts : tuple of ComparedImpact
+    highest : tuple of HighestShot
+        Of the measured strokes, per stop.
     """
 
     variant: str
@@ -194,6 +232,7 @@ class ComparedVariant:
     velocity_scatter: float
     way: Compared
     impacts: tuple[ComparedImpact, ...]
+    highest: tuple[HighestShot, ...] = ()
 
     def first(self, stop: str) -> ComparedImpact | None:
         """First impact on a stop; None if it was not compared."""

@@ -8,6 +8,7 @@ from klack.workflow.measured_study import (
     Compared,
     ComparedImpact,
     ComparedVariant,
+    HighestShot,
     ImpactMeasure,
     MeasuredStrokeStudy,
     stop_words,
@@ -15,10 +16,12 @@ from klack.workflow.measured_study import (
 
 __all__ = [
     "CURVE_COLUMNS",
+    "HIGHEST_COLUMNS",
     "IMPACT_COLUMNS",
     "RULE",
     "agreement",
     "curve_rows",
+    "highest_rows",
     "impact_rows",
     "measured_to_json",
     "rule",
@@ -43,6 +46,16 @@ RULE = (
     "{excellent:g} standard deviations of single strokes from the measured median, and the root "
     "mean square differences of lift and velocity are at most {excellent:g} times those of single "
     "strokes; fair up to {fair:g}."
+)
+HIGHEST_COLUMNS = (
+    "highest rebound",
+    "stroke",
+    "height [um]",
+    "restitution",
+    "of strokes",
+    "too high by reading [um]",
+    "above the median [um]",
+    "bounces",
 )
 _KEYS = {
     "time": "time{}_s",
@@ -111,6 +124,23 @@ def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...
     return tuple(rows)
 
 
+def highest_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`HIGHEST_COLUMNS`: the measured stroke that rebounds highest, per stop."""
+    return tuple(
+        (
+            stop_words(shot.stop),
+            shot.stroke,
+            f"{1e6 * shot.rebound_height:.2f} ± {1e6 * shot.rebound_height_error:.2f}",
+            f"{shot.restitution:.3f} ± {shot.restitution_error:.3f}",
+            str(shot.count),
+            f"{1e6 * shot.by_reading:.2f}",
+            f"{1e6 * shot.above_median:.2f}",
+            f"{shot.bounces:g}",
+        )
+        for shot in variant.highest
+    )
+
+
 def _cells(impact: ComparedImpact, kind: ImpactMeasure) -> tuple[str, ...]:
     return _numbers(impact.measure(kind), kind.factor, kind.decimals)
 
@@ -143,8 +173,10 @@ def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
     dict
         ``case``, ``variant`` (the first one) and its numbers: ``lift_rms_m`` and
         ``velocity_rms_m_s``, with ``..._rms_scatter_...`` of single strokes; ``lift_m`` between
-        the stops; ``impacts``: per impact each number computed, ``_measured``, ``_scatter``,
-        ``_reading_error``, ``_difference`` and ``_difference_in_scatter``;
+        the stops; ``highest_rebound``: the measured stroke that rebounds highest from each stop,
+        and how much a maximum of so many adds; ``impacts``: per impact each number computed,
+        ``_measured``, ``_scatter``, ``_reading_error``, ``_difference`` and
+        ``_difference_in_scatter``;
         ``variants``: the same of all.  Numbers that do not exist (nan) are None.
     """
     variants = {name: _variant(study, variant) for name, variant in study.variants.items()}
@@ -172,6 +204,22 @@ def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> dict[str, 
         "velocity_bandwidth_Hz": _number(variant.velocity_bandwidth),
         **_compared(variant.way, "lift{}_m"),
         "impacts": [_impact(impact) for impact in variant.impacts],
+        "highest_rebound": [_highest(shot) for shot in variant.highest],
+    }
+
+
+def _highest(shot: HighestShot) -> dict[str, Any]:
+    return {
+        "stop": shot.stop,
+        "stroke": shot.stroke,
+        "strokes": shot.count,
+        "rebound_height_m": _number(shot.rebound_height),
+        "rebound_height_error_m": _number(shot.rebound_height_error),
+        "restitution": _number(shot.restitution),
+        "restitution_error": _number(shot.restitution_error),
+        "too_high_by_reading_m": _number(shot.by_reading),
+        "above_median_m": _number(shot.above_median),
+        "bounces": _number(shot.bounces),
     }
 
 
