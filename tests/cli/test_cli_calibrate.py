@@ -9,7 +9,7 @@ import pytest
 
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
-from klack.workflow.calibration_log import LOG_NAME
+from klack.workflow.calibration_log import TRIAL_LOG
 from klack.workflow.calibration_motion import MotionModel
 from klack.workflow.calibration_store import load_calibration
 
@@ -112,8 +112,8 @@ def test_an_interrupted_calibration_goes_on_to_the_same_bits(
     monkeypatch.setattr(MotionModel, "run", interrupted)
     assert main(command(bench, tmp_path, "--no-report", "--quiet")) == 130
     assert "8 computed strokes are kept" in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir()} == {LOG_NAME}
-    with (tmp_path / LOG_NAME).open("ab") as file:
+    assert {path.name for path in tmp_path.iterdir()} == {TRIAL_LOG.file}
+    with (tmp_path / TRIAL_LOG.file).open("ab") as file:
         file.write(b'{"trial": [0.001')  # cut off in the middle of a line
 
     monkeypatch.setattr(MotionModel, "run", run)
@@ -123,7 +123,7 @@ def test_an_interrupted_calibration_goes_on_to_the_same_bits(
     assert again.evaluations == before.evaluations
     for a, b in zip(again.parameters, before.parameters, strict=True):
         assert (a.value, a.standard_error) == (b.value, b.standard_error)
-    assert not (tmp_path / LOG_NAME).exists()
+    assert not (tmp_path / TRIAL_LOG.file).exists()
 
 
 def test_the_report_is_made_again_from_the_result(done, tmp_path):

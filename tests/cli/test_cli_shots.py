@@ -13,7 +13,7 @@ import pytest
 
 import klack.workflow.shots as workflow
 from klack.cli.main import main
-from klack.workflow.shots_log import LOG_NAME
+from klack.workflow.shots_log import SHOT_LOG
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = HOW_TO / "guided_needle.yaml"
@@ -74,7 +74,7 @@ def test_the_terminal_shows_distributions_and_the_answer(run):
         assert words in text
     assert numbers["rule"]["sentence"] in text
     assert (folder / "out" / "result.zarr").is_dir()
-    assert not (folder / "out" / LOG_NAME).exists()
+    assert not (folder / "out" / SHOT_LOG.file).exists()
 
 
 def test_the_page_of_the_how_to_prints_what_comes_out(run):
@@ -109,14 +109,14 @@ def test_the_python_of_the_page_runs(run, monkeypatch, capsys):
 def test_ctrl_c_keeps_the_finished_shots(monkeypatch, capsys):
     def stop(*args, folder, **kwargs):
         folder.mkdir(parents=True)
-        (folder / LOG_NAME).write_text("header\none\ntwo\n")
+        (folder / SHOT_LOG.file).write_text("header\none\ntwo\n")
         raise KeyboardInterrupt
 
     monkeypatch.setattr(workflow, "run_shots", stop)
 
     assert main(["shots", str(CASE), "-q"]) == 130
     error = capsys.readouterr().err
-    assert f"2 of 6 shots are kept in klack-results/guided_needle/{LOG_NAME}" in error
+    assert f"2 of 6 shots are kept in klack-results/guided_needle/{SHOT_LOG.file}" in error
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from klack.workflow.shot_draw import centric_draw, draw_shot
 from klack.workflow.shot_model import build_shots
 from klack.workflow.shot_run import columns_of, run_shot, simulate_shot
 from klack.workflow.shots import judge_rule, run_shots
-from klack.workflow.shots_log import LOG_NAME, ShotLog, fingerprint, finish_log, logged_shots
+from klack.workflow.shots_log import SHOT_LOG, shot_log, shots_mark
 from klack.workflow.shots_pool import run_shots_on
 from klack.workflow.shots_store import SHOTS_FORMAT, load_shots, save_shots
 from klack.workflow.shots_study import MEASURES, ShotColumns
@@ -59,10 +59,10 @@ def study(tmp_path_factory):
 
     with pytest.raises(KeyboardInterrupt):
         run_shots(CASE, count=4, workers=1, folder=folder, progress=stop, threads=1)
-    assert logged_shots(folder) == 2
+    assert SHOT_LOG.count(folder) == 2
     done = run_shots(CASE, count=4, workers=1, folder=folder, threads=1)
-    finish_log(folder)
-    assert not (folder / LOG_NAME).exists()
+    SHOT_LOG.remove(folder)
+    assert not (folder / SHOT_LOG.file).exists()
     return done
 
 
@@ -122,7 +122,7 @@ def test_friction_in_the_guide_brakes(model, draws):
 
 @pytest.mark.slow
 def test_two_processes_give_the_same_numbers(model, draws, alone):
-    log = ShotLog(None, "")
+    log = shot_log(None, "")
     run_shots_on(2, model.setup, draws, log, silent)
 
     same(columns_of([log.done[draw.index] for draw in draws]), columns_of(alone))
@@ -136,28 +136,28 @@ def test_an_interrupted_study_goes_on_with_the_same_numbers(study, alone):
 
 
 def test_a_log_of_another_study_is_not_used(tmp_path: Path, alone):
-    mark = fingerprint(CASE, 1, None)
-    log = ShotLog(tmp_path, mark)
+    mark = shots_mark(CASE, 1, None)
+    log = shot_log(tmp_path, mark)
     for outcome in alone:
-        log.add(outcome)
+        log.add(outcome.index, outcome)
 
-    assert set(ShotLog(tmp_path, mark).done) == {0, 1, 2, 3}
-    assert fingerprint(CASE, 2, None) != mark
-    assert ShotLog(tmp_path, fingerprint(CASE, 2, None)).done == {}
-    assert logged_shots(tmp_path) == 0
+    assert set(shot_log(tmp_path, mark).done) == {0, 1, 2, 3}
+    assert shots_mark(CASE, 2, None) != mark
+    assert shot_log(tmp_path, shots_mark(CASE, 2, None)).done == {}
+    assert SHOT_LOG.count(tmp_path) == 0
 
 
 def test_a_line_cut_off_costs_one_shot(tmp_path: Path, alone):
-    log = ShotLog(tmp_path, "mark")
+    log = shot_log(tmp_path, "mark")
     for outcome in alone:
-        log.add(outcome)
-    path = tmp_path / LOG_NAME
+        log.add(outcome.index, outcome)
+    path = tmp_path / SHOT_LOG.file
     path.write_bytes(path.read_bytes()[:-40])
 
-    again = ShotLog(tmp_path, "mark")
+    again = shot_log(tmp_path, "mark")
     assert set(again.done) == {0, 1, 2}
-    again.add(alone[3])
-    whole = ShotLog(tmp_path, "mark")
+    again.add(3, alone[3])
+    whole = shot_log(tmp_path, "mark")
     assert set(whole.done) == {0, 1, 2, 3}
     same(columns_of(list(whole.done.values())), columns_of(alone))
 
@@ -169,7 +169,7 @@ def test_a_failing_shot_is_named(model, draws):
         beyond=np.zeros(model.setup.model.count),
     )
     with pytest.raises(InputError, match=r"(?s)shot 2.*contact\.reach"):
-        run_shots_on(1, replace(model.setup, model=rim), draws[2:3], ShotLog(None, ""), silent)
+        run_shots_on(1, replace(model.setup, model=rim), draws[2:3], shot_log(None, ""), silent)
 
 
 def test_a_study_comes_back_from_disk(study, tmp_path: Path):

@@ -75,7 +75,7 @@ def calibrate(
 
     from klack.measurement.loading import load_stroke_set
     from klack.workflow.calibrated_case import CALIBRATED_NAME, calibrated_text
-    from klack.workflow.calibration_log import LOG_NAME, finish_log, logged_trials
+    from klack.workflow.calibration_log import TRIAL_LOG
     from klack.workflow.calibration_store import save_calibration
     from klack.workflow.calibration_summary import calibration_to_json
 
@@ -104,10 +104,10 @@ def calibrate(
             )
             failure = write_result(study, folder, save, report=report, progress=progress)
     except KeyboardInterrupt:
-        kept = f"{logged_trials(folder)} computed strokes are kept in {folder / LOG_NAME}"
+        kept = f"{TRIAL_LOG.count(folder)} computed strokes are kept in {folder / TRIAL_LOG.file}"
         print(f"klack calibrate: stopped; {kept}, the same command goes on.", file=sys.stderr)
         return _STOPPED
-    finish_log(folder)
+    TRIAL_LOG.remove(folder)
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")

@@ -74,7 +74,7 @@ def shots(
     require_folder(folder)
 
     from klack.workflow.shots import run_shots
-    from klack.workflow.shots_log import LOG_NAME, finish_log, logged_shots
+    from klack.workflow.shots_log import SHOT_LOG
     from klack.workflow.shots_store import save_shots
     from klack.workflow.shots_summary import shots_to_json
 
@@ -91,10 +91,10 @@ def shots(
             )
             failure = write_result(study, folder, save_shots, report=report, progress=progress)
     except KeyboardInterrupt:
-        kept = f"{logged_shots(folder)} of {total} shots are kept in {folder / LOG_NAME}"
+        kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
         print(f"klack shots: stopped; {kept}, the same command goes on.", file=sys.stderr)
         return _STOPPED
-    finish_log(folder)
+    SHOT_LOG.remove(folder)
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")

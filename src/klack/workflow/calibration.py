@@ -37,7 +37,7 @@ from klack.measurement.sensor import LiftSensor
 from klack.measurement.shot_covariance import ShotCovariance, noise_covariance, shot_covariance
 from klack.measurement.stroke_set import StrokeSet
 from klack.workflow.calibration_fit import StrokeModel
-from klack.workflow.calibration_log import TrialLog, fingerprint
+from klack.workflow.calibration_log import calibration_mark, trial_log
 from klack.workflow.calibration_motion import Motion, MotionModel, channel_names
 from klack.workflow.calibration_pool import TrialPool
 from klack.workflow.calibration_study import (
@@ -132,7 +132,7 @@ def run_calibration(
     _require_channels(strokes, section)
     measurement = case.measurement or CaseMeasurement()
     clock = StageClock(progress)
-    log = TrialLog(folder, fingerprint(case, strokes))
+    log = trial_log(folder, calibration_mark(case, strokes))
     resumed = len(log.done)
     workers = available_cores() if workers is None else workers
     with collected_warnings() as notes:

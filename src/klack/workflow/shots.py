@@ -24,7 +24,7 @@ from klack.workflow.shot_draw import (
 )
 from klack.workflow.shot_model import ShotModel, build_shots
 from klack.workflow.shot_run import ShotSetup, columns_of, run_shot, simulate_shot, traces_of
-from klack.workflow.shots_log import ShotLog, fingerprint
+from klack.workflow.shots_log import shot_log, shots_mark
 from klack.workflow.shots_pool import available_cores, run_shots_on
 from klack.workflow.shots_study import RuleVerdict, ShotColumns, ShotsStudy
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
@@ -58,7 +58,7 @@ def run_shots(
         Processes; as many as there are cores without.
     folder : Path, optional
         Where finished shots are kept until all are there: an interrupted run goes on from them.
-        See :class:`klack.workflow.shots_log.ShotLog`.
+        See :class:`klack.workflow.unfinished.UnfinishedLog`.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -80,7 +80,7 @@ def run_shots(
     count = stated.count if count is None else count
     seed = stated.seed if seed is None else seed
     workers = available_cores() if workers is None else workers
-    log = ShotLog(folder, fingerprint(case, seed, threads))
+    log = shot_log(folder, shots_mark(case, seed, threads))
     clock = StageClock(progress)
     with collected_warnings() as notes:
         model = build_shots(case, clock, threads=threads)

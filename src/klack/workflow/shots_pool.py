@@ -49,7 +49,7 @@ def run_shots_on(
     workers = min(workers, len(left))
     if workers <= 1 or len(left) < _FEWEST:
         for draw in left:
-            log.add(_unwrapped(draw.index, _answer(setup, draw)))
+            log.add(draw.index, _unwrapped(draw.index, _answer(setup, draw)))
             progress("shots", len(log.done) / total)
         return
     # a fork would inherit the threads and locks of the libraries
@@ -60,7 +60,7 @@ def run_shots_on(
     try:
         jobs = {pool.submit(_run, draw): draw.index for draw in left}
         for job in as_completed(jobs):
-            log.add(_unwrapped(jobs[job], job.result()))
+            log.add(jobs[job], _unwrapped(jobs[job], job.result()))
             progress("shots", len(log.done) / total)
     except BrokenProcessPool:
         raise ConvergenceError(

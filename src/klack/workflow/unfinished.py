@@ -1,0 +1,136 @@
+"""Finished parts of long work on disk while others still run, so that interrupted work goes on.
+
+A text file: the first line says what is computed, each further one holds one part as JSON.  It is
+only read by the same klack for the same work; otherwise it starts anew.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import klack
+from klack.case.bodies import CaseBody
+from klack.errors import InputError
+
+__all__ = ["LogForm", "UnfinishedLog", "fingerprint"]
+
+Key = TypeVar("Key")
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogForm(Generic[Key, Part]):
+    """How the parts of one kind of work are kept.
+
+    Parameters
+    ----------
+    file : str
+        Name in the folder of the results.
+    format : str
+        With its version; a file of another one is written over.
+    parts : str
+        In words, for messages.
+    line : callable
+        Key and part as one line of JSON, without its end.
+    read : callable
+        The same back; None for a line that is damaged.
+    """
+
+    file: str
+    format: str
+    parts: str
+    line: Callable[[Key, Part], str] = field(repr=False)
+    read: Callable[[bytes], tuple[Key, Part] | None] = field(repr=False)
+
+    def count(self, folder: Path) -> int:
+        """How many finished parts the file in a folder holds."""
+        path = folder / self.file
+        return max(path.read_bytes().count(b"\n") - 1, 0) if path.is_file() else 0
+
+    def remove(self, folder: Path) -> None:
+        """Remove the file: the work is complete and stored elsewhere."""
+        (folder / self.file).unlink(missing_ok=True)
+
+
+class UnfinishedLog(Generic[Key, Part]):
+    """Finished parts in a file; those of an earlier, interrupted run are there.
+
+    Parameters
+    ----------
+    form : LogForm
+    folder : Path or None
+        Made if it does not exist; None keeps the parts in memory only.
+    mark : str
+        What :func:`fingerprint` says.  A file with another one is written over.
+    """
+
+    def __init__(self, form: LogForm[Key, Part], folder: Path | None, mark: str) -> None:
+        self.form = form
+        self.done: dict[Key, Part] = {}
+        self.path = folder / form.file if folder is not None else None
+        if self.path is None:
+            return
+        header = json.dumps({"format": form.format, "fingerprint": mark}) + "\n"
+        try:
+            lines = self.path.read_bytes().split(b"\n") if self.path.is_file() else []
+            if lines and lines[0] + b"\n" == header.encode():
+                self._take_over(self.path, lines)
+                return
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.write_text(header, encoding="utf-8")
+        except OSError as error:
+            raise InputError(
+                str(self.path),
+                got=f"a file that cannot be written ({error.strerror})",
+                expected=f"a place for {form.parts}",
+                hint="check the folder given to --out and the space that is left.",
+            ) from error
+
+    def _take_over(self, path: Path, lines: list[bytes]) -> None:
+        """Read what an earlier run left, up to the first damaged line, and cut off the rest."""
+        whole = len(lines[0]) + 1
+        for line in lines[1:-1]:  # what follows the last end of line was cut off
+            found = self.form.read(line)
+            if found is None:
+                break
+            self.done[found[0]] = found[1]
+            whole += len(line) + 1
+        with path.open("r+b") as file:
+            file.truncate(whole)
+
+    def add(self, key: Key, part: Part) -> None:
+        """Keep a finished part."""
+        self.done[key] = part
+        if self.path is None:
+            return
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(self.form.line(key, part) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def fingerprint(bodies: Iterable[CaseBody], parts: Iterable[bytes]) -> str:
+    """Digest of all that decides the numbers of a work.
+
+    Parameters
+    ----------
+    bodies : iterable of CaseBody
+        Their meshes and drawings are read.
+    parts : iterable of bytes
+        Text of the case, seeds, versions of libraries, measured values, ...
+    """
+    digest = sha256()
+    for part in parts:
+        digest.update(part + b"\0")
+    for body in bodies:
+        for source in (body.geometry.mesh, body.geometry.step):
+            if source is not None:
+                digest.update(source.file.read_bytes() + b"\0")
+    # klack itself, as it is on this machine
+    for file in sorted(Path(klack.__file__).parent.rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
