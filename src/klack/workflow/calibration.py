@@ -48,9 +48,9 @@ from klack.workflow.calibration_study import (
     ProfileCurve,
 )
 from klack.workflow.progress import Progress, silent
-from klack.workflow.shots_pool import available_cores
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.valve import build_valve
+from klack.workflow.workers import available_cores
 
 __all__ = ["calibration_of", "run_calibration"]
 

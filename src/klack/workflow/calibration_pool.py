@@ -1,23 +1,17 @@
 """Trials of a calibration on all cores, each computed once."""
 
-import multiprocessing
-import signal
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from types import TracebackType
 from typing import Self
 
-from threadpoolctl import threadpool_limits
-
-from klack.errors import ConvergenceError, InputError, KlackError
+from klack.errors import ConvergenceError
 from klack.workflow.calibration_log import TrialKey, TrialLog
 from klack.workflow.calibration_motion import Motion, MotionModel
+from klack.workflow.workers import Failure, answer, shared, unwrapped, worker_pool
 
 __all__ = ["TrialPool"]
-
-_Answer = Motion | tuple[str, ...]
-"""A motion, or kind and parts of the error that it ended with."""
 
 
 class TrialPool:
@@ -70,13 +64,7 @@ class TrialPool:
 
     def _compute(self, keys: Sequence[TrialKey]) -> None:
         if self._pool is None:
-            # a fork would inherit the threads and locks of the libraries
-            self._pool = ProcessPoolExecutor(
-                max_workers=self.workers,
-                mp_context=multiprocessing.get_context("spawn"),
-                initializer=_start,
-                initargs=(self.model,),
-            )
+            self._pool = worker_pool(self.workers, self.model)
         try:
             jobs = {self._pool.submit(_run, key): key for key in keys}
             for job in as_completed(jobs):
@@ -87,39 +75,17 @@ class TrialPool:
                 "Try: fewer --workers if the memory was full; the same command goes on from here."
             ) from None
 
-    def _keep(self, key: TrialKey, answer: _Answer) -> None:
-        if isinstance(answer, Motion):
-            self.log.add(key, answer)
-            return
+    def _keep(self, key: TrialKey, found: Motion | Failure) -> None:
         values = ", ".join(
             f"{parameter.name} = {value:.6g} {parameter.unit}".rstrip()
             for parameter, value in zip(self.model.parameters, key[1:], strict=True)
         )
-        if answer[0] == "input":
-            where, got, expected, hint = answer[1:]
-            raise InputError(f"trial with {values}: {where}", got=got, expected=expected, hint=hint)
-        raise ConvergenceError(f"trial with {values}: {answer[1]}")
+        self.log.add(key, unwrapped(f"trial with {values}", found))
 
 
-_shared: list[MotionModel] = []
+def _run(key: TrialKey) -> Motion | Failure:
+    return _answer(shared(), key)
 
 
-def _start(model: MotionModel) -> None:
-    """Prepare a worker process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
-    threadpool_limits(limits=1)
-    _shared[:] = [model]
-
-
-def _run(key: TrialKey) -> _Answer:
-    return _answer(_shared[0], key)
-
-
-def _answer(model: MotionModel, key: TrialKey) -> _Answer:
-    """Motion or error, in a form that travels between processes."""
-    try:
-        return model.run(key[1:], key[0])
-    except InputError as error:
-        return ("input", error.where, error.got, error.expected, error.hint)
-    except KlackError as error:
-        return ("other", str(error))
+def _answer(model: MotionModel, key: TrialKey) -> Motion | Failure:
+    return answer(lambda: model.run(key[1:], key[0]))

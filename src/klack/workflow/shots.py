@@ -25,10 +25,11 @@ from klack.workflow.shot_draw import (
 from klack.workflow.shot_model import ShotModel, build_shots
 from klack.workflow.shot_run import ShotSetup, columns_of, run_shot, simulate_shot, traces_of
 from klack.workflow.shots_log import shot_log, shots_mark
-from klack.workflow.shots_pool import available_cores, run_shots_on
+from klack.workflow.shots_pool import run_shots_on
 from klack.workflow.shots_study import RuleVerdict, ShotColumns, ShotsStudy
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.study import PressureRecord
+from klack.workflow.workers import available_cores
 
 __all__ = ["judge_rule", "run_shots"]
 

@@ -1,0 +1,76 @@
+"""Processes that share one thing and answer with results or with errors."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from klack.errors import ConvergenceError, InputError, KlackError
+
+__all__ = ["Failure", "answer", "available_cores", "shared", "unwrapped", "worker_pool"]
+
+Result = TypeVar("Result")
+
+_shared: list[Any] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Error in a form that travels between processes: where, got, expected, hint; or its words."""
+
+    kind: str
+    parts: tuple[str, ...]
+
+
+def available_cores() -> int:
+    """Processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def worker_pool(workers: int, given: object) -> ProcessPoolExecutor:
+    """Processes of one thread each, to which ``given`` is sent once; see :func:`shared`."""
+    return ProcessPoolExecutor(
+        max_workers=workers,
+        # a fork would inherit the threads and locks of the libraries
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_start,
+        initargs=(given,),
+    )
+
+
+def shared() -> Any:
+    """What :func:`worker_pool` was given, inside of a worker."""
+    return _shared[0]
+
+
+def answer(compute: Callable[[], Result]) -> Result | Failure:
+    """Result, or the error that it ended with."""
+    try:
+        return compute()
+    except InputError as error:
+        return Failure("input", (error.where, error.got, error.expected, error.hint))
+    except KlackError as error:
+        return Failure("other", (str(error),))
+
+
+def unwrapped(name: str, found: Result | Failure) -> Result:
+    """Result of an answer; its error, under the name of the work, is raised."""
+    if not isinstance(found, Failure):
+        return found
+    if found.kind == "input":
+        where, got, expected, hint = found.parts
+        raise InputError(f"{name}: {where}", got=got, expected=expected, hint=hint)
+    raise ConvergenceError(f"{name}: {found.parts[0]}")
+
+
+def _start(given: object) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    threadpool_limits(limits=1)
+    _shared[:] = [given]
