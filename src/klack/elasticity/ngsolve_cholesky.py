@@ -1,5 +1,6 @@
 """Sparse Cholesky of NGSolve: free of MKL, about as fast as PARDISO on one thread."""
 
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,10 @@ from numpy.typing import NDArray
 from klack.elasticity.closing import Closing
 
 __all__ = ["NgsolveFactorization"]
+
+# NGSolve starts its own workers for a factorisation and knows one set of them: two factorisations
+# from two threads at once wait for each other for ever (seen once in some twenty runs)
+_factorising = Lock()
 
 
 class NgsolveFactorization(Closing):
@@ -28,7 +33,8 @@ class NgsolveFactorization(Closing):
             self.size,
             self.size,
         )
-        self._inverse: Any = matrix.Inverse(inverse="sparsecholesky")
+        with _factorising:
+            self._inverse: Any = matrix.Inverse(inverse="sparsecholesky")
         self._right = matrix.CreateColVector()
         self._solution = matrix.CreateColVector()
         self.nonzeros: int | None = None
