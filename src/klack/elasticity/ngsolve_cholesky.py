@@ -10,8 +10,8 @@ from klack.elasticity.closing import Closing
 
 __all__ = ["NgsolveFactorization"]
 
-# NGSolve starts its own workers for a factorisation and knows one set of them: two factorisations
-# from two threads at once wait for each other for ever (seen once in some twenty runs)
+# NGSolve starts workers of its own for a factorisation; of two that two threads began side by side
+# one was once seen never to end
 _factorising = Lock()
 
 
