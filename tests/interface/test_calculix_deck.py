@@ -25,8 +25,9 @@ from klack.exchange.calculix_deck import (
     write_deck,
 )
 from klack.materials import Material
-from klack.mesh.abaqus import AbaqusModel, read_abaqus_model
+from klack.mesh.abaqus import read_abaqus_model
 from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh_model import MeshModel
 from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
 from klack.workflow.progress import silent
@@ -58,7 +59,7 @@ def impact(family: str = "tet10", *, distance: float = 3e-6, **more: float) -> C
     )
 
 
-def read_back(deck: Path, impact: CalculixImpact, settings: CalculixSettings) -> AbaqusModel:
+def read_back(deck: Path, impact: CalculixImpact, settings: CalculixSettings) -> MeshModel:
     write_deck(impact, settings, deck)
     return read_abaqus_model(deck, 1e-3)
 

@@ -13,6 +13,7 @@ from pydantic import (
     model_validator,
 )
 
+from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
@@ -95,9 +96,18 @@ class BodyDamping(Section):
 class CaseBody(Section):
     """An elastic body."""
 
-    geometry: Geometry = Field(description="Shape: profile, step or mesh.")
-    material: Name | dict[Name, Name] = Field(
-        description="Name of a material, or solid: material for a body of several."
+    geometry: Geometry = Field(
+        default=Geometry.absent(), description="Shape: profile, step, mesh or nodes."
+    )
+    material: Name | dict[Name, Name] | None = Field(
+        default=None, description="Name of a material, or solid: material for a body of several."
+    )
+    matrices: Matrices | None = Field(
+        default=None,
+        description="Stiffness and mass from another program, for a mesh or for nodes.",
+    )
+    reduced: ReducedModel | None = Field(
+        default=None, description="Reduced model from another program, instead of a geometry."
     )
     mesh: MeshSettings | None = Field(
         default=None, description="Element sizes; needed unless the geometry is a finished mesh."
@@ -112,6 +122,8 @@ class CaseBody(Section):
     @field_validator("material", mode="before")
     @classmethod
     def _material_names(cls, value: Any) -> Any:
+        if value is None:
+            return None
         pairs = value.items() if isinstance(value, Mapping) else [((), value)]
         for key, name in pairs:
             if not isinstance(name, str):
@@ -125,7 +137,43 @@ class CaseBody(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if self.geometry.mesh is not None:
+        if self.reduced is not None:
+            self._refuse_with(
+                ("material", "mesh", "matrices", "fixed"),
+                "a reduced model",
+                "it holds mass, stiffness and supports already",
+            )
+            if not self.geometry.is_absent:
+                self._refuse_with(("geometry",), "a reduced model", "it has no shape")
+            return self
+        if self.geometry.is_absent:
+            raise CaseProblem(
+                (),
+                got="no key 'geometry'",
+                expected="geometry: Shape: profile, step, mesh or nodes",
+                hint="add 'geometry' here, or 'reduced' for a model that is reduced already.",
+            )
+        if self.matrices is not None:
+            self._refuse_with(("material",), "matrices", "they hold the material already")
+            if self.geometry.mesh is None and self.geometry.nodes is None:
+                raise CaseProblem(
+                    ("matrices",),
+                    got="matrices for a shape that klack meshes",
+                    expected="geometry.mesh or geometry.nodes of the program that made them",
+                    hint="give the mesh file that the matrices belong to.",
+                )
+        elif self.geometry.nodes is not None:
+            hint = "add matrices: {stiffness: ..., mass: ..., units: ...}."
+            raise CaseProblem((), got="nodes without matrices", expected="matrices", hint=hint)
+        elif self.material is None:
+            hint = "name a material of the section 'materials'."
+            raise CaseProblem(
+                (),
+                got="no key 'material'",
+                expected="material: Name of a material, or solid: material for a body of several",
+                hint=hint,
+            )
+        if self.geometry.mesh is not None or self.geometry.nodes is not None:
             self._refuse_with(("mesh",), "a finished mesh", "its elements are there already")
         elif self.mesh is None:
             hint = "start with a tenth of the body's length for 'size'."
@@ -211,7 +259,9 @@ class CaseFile(Section):
     description: Text = Field(
         default="", description="What it shows and where the numbers come from."
     )
-    materials: Mapping[Name, CaseMaterial] = Field(min_length=1, description="name: properties.")
+    materials: Mapping[Name, CaseMaterial] = Field(
+        default_factory=dict, description="name: properties."
+    )
     bodies: Mapping[Name, CaseBody] = Field(description="name: body.")
 
     _path: Path | None = PrivateAttr(None)
@@ -262,6 +312,13 @@ class CaseFile(Section):
         Raises :class:`InputError` for a solid that the case gives no material.
         """
         chosen = self.bodies[body].material
+        if chosen is None:
+            raise InputError(
+                f"{self._path or 'case'}: bodies.{body}",
+                got="a body that is given by its matrices or as a reduced model",
+                expected="a body with a material",
+                hint="take a law that needs no material, e.g. {kind: linear, stiffness: 1e9 N/m}.",
+            )
         result = {}
         for solid in solids:
             if not isinstance(chosen, str) and solid not in chosen:

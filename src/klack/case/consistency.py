@@ -113,6 +113,8 @@ def _check_materials(case: "CaseFile", name: str) -> None:
     if isinstance(body.material, str):
         require_known(key, body.material, case.materials, "material")
         return
+    if body.material is None:
+        return  # given by matrices or reduced already
     for solid, material in body.material.items():
         require_known((*key, solid), material, case.materials, "material")
     if body.geometry.profile is not None:

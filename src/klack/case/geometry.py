@@ -20,6 +20,7 @@ __all__ = [
     "InputPath",
     "MeshFile",
     "MeshSettings",
+    "NodeTable",
     "Outline",
     "ProfileGeometry",
     "Sectors",
@@ -164,21 +165,44 @@ class StepFile(Section):
 class MeshFile(Section):
     """A finished finite-element mesh."""
 
-    file: InputPath = Field(description="Abaqus or CalculiX input (.inp), relative to the case.")
+    file: InputPath = Field(
+        description="Abaqus or CalculiX (.inp), ANSYS (.cdb), Nastran (.bdf, .dat, .nas), Gmsh "
+        "(.msh), VTK (.vtk, .vtu); relative to the case."
+    )
+    unit: LengthUnit | None = Field(
+        default=None,
+        description="Unit of its coordinates, e.g. mm; needed unless the file names it.",
+    )
+
+
+class NodeTable(Section):
+    """Nodes of a body without elements: a table of numbers and coordinates, and sets of them."""
+
+    file: InputPath = Field(
+        description="Table (CSV or text: node, x, y, z), or a mesh file whose nodes are taken."
+    )
     unit: LengthUnit = Field(description="Unit of its coordinates, e.g. mm.")
+    sets: Mapping[Name, tuple[Count, ...] | InputPath] = Field(
+        default_factory=dict,
+        description="name: node numbers, or a text file of node numbers; a set is what a contact "
+        "or a support calls a surface.",
+    )
 
 
 Model = Literal["axisymmetric", "swept", "solid"]
 
 
 class Geometry(Section):
-    """Shape of a body: exactly one of profile, step and mesh."""
+    """Shape of a body: exactly one of profile, step, mesh and nodes."""
 
     profile: ProfileGeometry | None = Field(
         default=None, description="Half section of a turned part."
     )
     step: StepFile | None = Field(default=None, description="CAD file.")
     mesh: MeshFile | None = Field(default=None, description="Finished mesh.")
+    nodes: NodeTable | None = Field(
+        default=None, description="Nodes alone, of a body that is given by its matrices."
+    )
     model: Model | None = Field(
         default=None,
         description="axisymmetric: the half section alone (fastest); swept: three-dimensional, the "
@@ -191,7 +215,7 @@ class Geometry(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        kind = self._exactly_one(("profile", "step", "mesh"), "where the shape comes from")
+        kind = self._exactly_one(("profile", "step", "mesh", "nodes"), "where the shape comes from")
         if kind == "profile" and self.model is None:
             raise CaseProblem(
                 (),
@@ -203,6 +227,7 @@ class Geometry(Section):
             "profile": ("axisymmetric", "swept", "solid"),
             "step": ("solid",),
             "mesh": ("solid", "axisymmetric"),
+            "nodes": ("solid", "axisymmetric"),
         }[kind]
         if self.model is not None and self.model not in allowed:
             raise CaseProblem(
@@ -217,6 +242,16 @@ class Geometry(Section):
         if self.model != "swept":
             return self._refuse_with(("layers",), f"model {self.model}", "only swept has layers")
         return self
+
+    @classmethod
+    def absent(cls) -> Self:
+        """Return the geometry of a body that has none: a reduced model."""
+        return cls.model_construct()
+
+    @property
+    def is_absent(self) -> bool:
+        """True where nothing is known of the shape."""
+        return all(part is None for part in (self.profile, self.step, self.mesh, self.nodes))
 
     @property
     def dimension(self) -> int:

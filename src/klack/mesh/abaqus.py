@@ -6,46 +6,23 @@ of surface elements (membranes, shells, plane elements: what gmsh and most prepr
 a named surface) becomes a surface, provided that every one of them lies on a solid element.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError, require_positive
-from klack.mesh.abaqus_deck import AbaqusMaterial, Deck, read_deck
+from klack.mesh.abaqus_deck import Deck, read_deck
 from klack.mesh.abaqus_elements import ElementGroup
 from klack.mesh.abaqus_keywords import DataLine
 from klack.mesh.abaqus_surfaces import FaceFinder, require_on_solids
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
+from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import require_positive_jacobians
 
-__all__ = ["AbaqusMaterial", "AbaqusModel", "read_abaqus", "read_abaqus_model"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AbaqusModel:
-    """Mesh with what else the file says.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    node_numbers : int array, shape (n_nodes,)
-        Number in the file of every node of the mesh.
-    element_numbers : tuple of int arrays
-        The same for the elements, one array per block.
-    materials : mapping of name to AbaqusMaterial
-    sections : mapping of solid name to material name
-        From *SOLID SECTION.
-    """
-
-    mesh: Mesh
-    node_numbers: NDArray[np.int64]
-    element_numbers: tuple[NDArray[np.int64], ...]
-    materials: Mapping[str, AbaqusMaterial]
-    sections: Mapping[str, str]
+__all__ = ["read_abaqus", "read_abaqus_model"]
 
 
 def read_abaqus(
@@ -79,7 +56,7 @@ def read_abaqus(
 
 def read_abaqus_model(
     path: str | Path, unit_length: float, *, solids: Sequence[str] | None = None
-) -> AbaqusModel:
+) -> MeshModel:
     """Read mesh, materials and sections; see :func:`read_abaqus`."""
     require_positive("read_abaqus: unit_length", unit_length, "m")
     path = Path(path)
@@ -87,7 +64,7 @@ def read_abaqus_model(
     return _build(path, deck, unit_length, solids)
 
 
-def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | None) -> AbaqusModel:
+def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | None) -> MeshModel:
     solid_groups = [group for group in deck.groups if group.solid and len(group.numbers)]
     _require_solids(path, deck, solid_groups)
     labels = np.array(sorted(deck.nodes), dtype=np.int64)
@@ -112,12 +89,13 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
     )
     _require_right_of_axis(path, mesh, labels[used])
     require_positive_jacobians(str(path), mesh, numbers=numbers)
-    return AbaqusModel(
+    return MeshModel(
         mesh=mesh,
         node_numbers=labels[used],
         element_numbers=numbers,
         materials=deck.materials,
         sections={name: sections[name] for name in mesh.solids if name in sections},
+        unit_length=unit_length,
     )
 
 

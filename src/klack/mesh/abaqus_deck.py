@@ -7,51 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.materials import Material
 from klack.mesh.abaqus_elements import ElementGroup, read_elements
 from klack.mesh.abaqus_keywords import DataLine, Keyword, read_keywords
 from klack.mesh.abaqus_sets import NamedSets, integer, number, records
+from klack.mesh.mesh_model import FileMaterial
 
-__all__ = ["AbaqusMaterial", "Deck", "read_deck"]
+__all__ = ["Deck", "read_deck"]
 
 _GENERATING = {"NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AbaqusMaterial:
-    """Elastic material as the file has it, in the units of the file.
-
-    Parameters
-    ----------
-    name : str
-    young : float [stress unit of the file]
-    poisson : float [-]
-    density : float [density unit of the file], or None
-    """
-
-    name: str
-    young: float
-    poisson: float
-    density: float | None
-
-    def in_si(self, *, stress: float, density: float) -> Material:
-        """Convert to SI: ``stress`` [Pa] and ``density`` [kg/m^3] are the units of the file.
-
-        For a model in tonne, mm, s, N these are 1e6 Pa and 1e12 kg/m^3.
-        """
-        if self.density is None:
-            raise InputError(
-                f"material '{self.name}'",
-                got="no *DENSITY",
-                expected="Young's modulus, Poisson's ratio and density",
-                hint="add *DENSITY to the file, or name a material in the case.",
-            )
-        return Material(
-            name=self.name,
-            young=self.young * stress,
-            poisson=self.poisson,
-            density=self.density * density,
-        )
 
 
 @dataclass
@@ -66,7 +29,7 @@ class Deck:
     listed: list[str] = field(default_factory=list)  # names of *ELSET keywords
     surfaces: list[Keyword] = field(default_factory=list)
     sections: list[Keyword] = field(default_factory=list)
-    materials: dict[str, AbaqusMaterial] = field(default_factory=dict)
+    materials: dict[str, FileMaterial] = field(default_factory=dict)
     parts: list[Keyword] = field(default_factory=list)
     instances: list[Keyword] = field(default_factory=list)
 
@@ -212,6 +175,6 @@ def _take_material(deck: Deck, keyword: Keyword, rest: list[Keyword]) -> None:
             line, fields = next(records(part, (1, 2), "a density"))
             density = number(line, fields[0])
     if elastic is not None:
-        deck.materials[name] = AbaqusMaterial(
+        deck.materials[name] = FileMaterial(
             name=name, young=elastic[0], poisson=elastic[1], density=density
         )

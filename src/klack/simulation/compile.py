@@ -57,9 +57,11 @@ class BodyBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FlatSystem:
-    """Arguments of :func:`klack.simulation.kernel.run_steps`, see there."""
+    """Modes in the coordinates of the kernel, and arguments of its ``run_steps``, see there."""
 
     blocks: tuple[BodyBlock, ...]
+    omega: NDArray[np.float64]
+    damping: NDArray[np.float64]
     v: NDArray[np.float64]
     A: NDArray[np.float64]
     B: NDArray[np.float64]
@@ -128,6 +130,8 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
     loss = damping_loss(w, np.where(damped_modes, z, 0.0), step)
     return FlatSystem(
         blocks=tuple(blocks),
+        omega=w,
+        damping=z,
         v=np.concatenate(speeds),
         A=A,
         B=B,

@@ -14,9 +14,9 @@ from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
-from klack.mesh.abaqus import read_abaqus
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh_file import read_mesh_file
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_revolved, mesh_step
@@ -136,7 +136,7 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
     geometry = body.geometry
     if geometry.mesh is not None:
         solids = tuple(body.material) if isinstance(body.material, dict) else None
-        mesh = read_abaqus(geometry.mesh.file, geometry.mesh.unit, solids=solids)
+        mesh = read_mesh_file(geometry.mesh.file, geometry.mesh.unit, solids=solids).mesh
         _require_dimension(geometry.mesh.file, mesh, geometry.dimension)
         return mesh
     if body.mesh is None:  # refused by the schema already

@@ -54,6 +54,7 @@ __all__ = [
     "damping_of",
     "elastic_count",
     "first_stiffness",
+    "impact_system",
     "level_result",
     "mode_pool",
     "mode_pools",
@@ -319,9 +320,10 @@ def _simulate(case: Case, pair: ReducedPair) -> ImpactHistory:
     return _simulate_bodies(case, pair.upper, pair.lower, pair.law)
 
 
-def _simulate_bodies(
+def impact_system(
     case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
-) -> ImpactHistory:
+) -> ReducedSystem:
+    """Both bodies of a case, their contact, and the force and spring that act on the upper one."""
     contact = ContactPair(
         body_a=upper.name,
         port_a=PORT,
@@ -340,11 +342,17 @@ def _simulate_bodies(
     forces: tuple[AxialForce, ...] = ()
     if closing != 0:
         forces = (AxialForce(body=upper.name, force=-closing),)
-    system = ReducedSystem(
-        bodies=(upper, lower), contacts=(contact,), forces=forces, springs=springs
-    )
+    return ReducedSystem(bodies=(upper, lower), contacts=(contact,), forces=forces, springs=springs)
+
+
+def _simulate_bodies(
+    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
+) -> ImpactHistory:
     return simulate_impact(
-        system, speed=case.motion.speed, duration=case.run.duration, step=case.run.reduced_step
+        impact_system(case, upper, lower, law),
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.reduced_step,
     )
 
 

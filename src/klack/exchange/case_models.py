@@ -1,0 +1,179 @@
+"""The models of a case that can leave klack: its reduced bodies, and the pair with its contacts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from klack import __version__
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import find_meetings, find_roles
+from klack.errors import InputError
+from klack.exchange.modal_model import ModalModel, Provenance, body_model, choose_body, pair_model
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mesh.mesh import Mesh
+from klack.network.rows import FilmRow
+from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.system import ContactPair, ReducedSystem
+from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
+from klack.workflow.problem import build_problem
+from klack.workflow.progress import Progress, silent
+from klack.workflow.valve import build_valve
+
+__all__ = ["CaseModels", "case_models"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseModels:
+    """What a case gives to other programs.
+
+    Parameters
+    ----------
+    bodies : tuple of ReducedBody
+    pair : ModalModel
+        All bodies, their contacts and films; what else drives the needle stays outside.
+    provenance : Provenance
+    step : float [s]
+    """
+
+    bodies: tuple[ReducedBody, ...]
+    pair: ModalModel
+    provenance: Provenance
+    step: float
+
+    def body_models(self, name: str | None = None) -> tuple[ModalModel, ...]:
+        """Linear models of one body or of all."""
+        return tuple(
+            body_model(body, provenance=self.provenance, step=self.step)
+            for body in choose_body(self.bodies, name)
+        )
+
+
+def case_models(
+    case: Case | ValveCase, progress: Progress = silent, *, threads: int | None = None
+) -> CaseModels:
+    """Reduce the bodies of a case as its runs do, and join them.
+
+    The pair of an impact keeps the constant force and the spring of the case.  That of a whole
+    valve has its end stops with their films; springs, fluid and solenoid stay with the user, who
+    gives their forces.
+
+    Raises
+    ------
+    InputError
+        For bodies that cannot be built, or a valve without end stops.
+    """
+    if isinstance(case, ValveCase):
+        return _of_valve(case, progress, threads)
+    problem = build_problem(case, progress, threads=threads)
+    pools = mode_pools(problem, at_least=1, progress=progress)
+    progress("reduced", 0.0)
+    reduced = own_pair(problem, pools, stiffness=first_stiffness(problem))
+    problem.close()
+    progress("reduced", 1.0)
+    provenance = _provenance(
+        case, {body.name: body.mesh for body in (problem.pair.upper, problem.pair.lower)}
+    )
+    pair = pair_model(
+        f"{case.name}_pair",
+        impact_system(case, reduced.upper, reduced.lower, reduced.law),
+        moving=reduced.upper.name,
+        contact_names=("contact",),
+        speed=-case.motion.speed,
+        step=case.run.reduced_step,
+        duration=case.run.duration,
+        provenance=provenance,
+    )
+    return CaseModels(
+        bodies=(reduced.upper, reduced.lower),
+        pair=pair,
+        provenance=provenance,
+        step=case.run.reduced_step,
+    )
+
+
+def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseModels:
+    valve = build_valve(case, progress, threads=threads)
+    provenance = _provenance(case, {name: body.mesh for name, body in valve.bodies.items()})
+    rows = valve.network.rows()
+    parts = valve.network.components
+    meetings = find_meetings(valve.network)
+    contacts: list[ContactPair] = []
+    films: list[FilmRow | None] = []
+    names: list[str] = []
+    for row in rows.interfaces:
+        met = meetings[row.component]
+        if met.upper is None or met.lower is None or row.law is None:
+            raise InputError(
+                f"{case.path or 'case'}: network.components.{row.component}",
+                got="an end stop on the ground, or without a law",
+                expected="a contact law between two bodies",
+                hint="give the stop a body of its own, held by a support.",
+            )
+        (upper, a), (lower, b) = met.upper, met.lower
+        contacts.append(
+            ContactPair(
+                body_a=_body_of(parts[upper]),
+                port_a=a,
+                body_b=_body_of(parts[lower]),
+                port_b=b,
+                law=row.law,
+                gap=row.gap,
+                series_compliance=row.series_compliance,
+            )
+        )
+        films.append(row.film)
+        names.append(row.component)
+    if not contacts:
+        raise InputError(
+            f"{case.path or 'case'}: network.components",
+            got="no end stop",
+            expected="at least one component of type end-stop",
+            hint="export the bodies alone: --part body.",
+        )
+    used = [body for body in valve.reduced.values() if _is_used(body.name, contacts)]
+    pair = pair_model(
+        f"{case.name}_pair",
+        ReducedSystem(bodies=tuple(used), contacts=tuple(contacts)),
+        moving=_body_of(parts[find_roles(case).needle]),
+        contact_names=names,
+        films=films,
+        speed=0.0,
+        step=case.run.step,
+        duration=case.run.duration,
+        provenance=provenance,
+    )
+    return CaseModels(
+        bodies=tuple(valve.reduced.values()),
+        pair=pair,
+        provenance=provenance,
+        step=case.run.step,
+    )
+
+
+def _body_of(part: object) -> str:
+    if not isinstance(part, FlexibleBody):
+        raise InputError(
+            "export of the pair",
+            got=f"a {getattr(part, 'type', type(part).__name__)} at an end stop",
+            expected="flexible bodies only",
+            hint="describe it as a body of the case and a flexible-body of the network.",
+        )
+    return part.body
+
+
+def _is_used(name: str, contacts: list[ContactPair]) -> bool:
+    return any(name in (contact.body_a, contact.body_b) for contact in contacts)
+
+
+def _provenance(case: Case | ValveCase, meshes: Mapping[str, Mesh]) -> Provenance:
+    return Provenance(
+        case=case.name,
+        title=case.title,
+        version=__version__,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        meshes={
+            name: f"{mesh.element_count} elements, {mesh.dof_count} degrees of freedom"
+            for name, mesh in meshes.items()
+        },
+    )

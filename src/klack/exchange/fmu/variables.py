@@ -1,0 +1,186 @@
+"""Variables of an FMU and their value references, for the C sources and both model descriptions.
+
+Value references count from 0 in the order of :func:`fmu_variables`: inputs, outputs, parameters,
+states (displacements of all modes, then velocities), their derivatives.  Version 3 of the standard
+adds the time after the last of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from klack.exchange.modal_model import ModalModel
+
+__all__ = ["UNITS", "FmuVariable", "contact_suffix", "fmu_variables"]
+
+UNITS: Mapping[str, Mapping[str, int]] = {
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "m": {"m": 1},
+    "m/s": {"m": 1, "s": -1},
+    "s": {"s": 1},
+    "m.kg1/2": {},
+    "m.kg1/2/s": {},
+    "m.kg1/2/s2": {},
+}
+"""Units of the variables and their SI exponents; modal units have half powers, so none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuVariable:
+    """One real variable.
+
+    Parameters
+    ----------
+    name, description, unit : str
+    causality : "input", "output", "parameter" or "local"
+    variability : "continuous" or "fixed"
+    start : float or None
+        For inputs, parameters and states.
+    minimum, maximum, nominal : float or None
+    derivative_of : int or None
+        Value reference of the state.
+    """
+
+    name: str
+    description: str
+    unit: str
+    causality: Literal["input", "output", "parameter", "local"]
+    variability: Literal["continuous", "fixed"] = "continuous"
+    start: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    derivative_of: int | None = None
+
+
+def contact_suffix(model: ModalModel, index: int) -> str:
+    """Ending of the names of a contact's variables; none where there is only one contact."""
+    return "" if len(model.contacts) == 1 else f"_{model.contacts[index].name}"
+
+
+def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
+    """All variables in the order of their value references.
+
+    Outputs: those of the model, then for each contact ``gap`` (between the bodies) [m],
+    ``contact_force`` (at this instant; in co-simulation the mean over the last internal step),
+    ``mean_contact_force`` and ``peak_contact_force`` (over the last communication step; in model
+    exchange equal to ``contact_force``) [N], and ``film_force`` [N] where it has a film.
+    Parameters: ``internal_step`` [s] and, of a pair, ``start_velocity`` [m/s] and ``start_rise``
+    [m] of the moving body.
+    """
+    variables = [
+        FmuVariable(
+            name=item.name,
+            description=item.description,
+            unit="N",
+            causality="input",
+            start=0.0,
+            nominal=100.0,
+        )
+        for item in model.inputs
+    ]
+    for output in model.outputs:
+        moved = output.quantity == "displacement"
+        variables.append(
+            FmuVariable(
+                name=output.name,
+                description=output.description,
+                unit="m" if moved else "m/s",
+                causality="output",
+                nominal=1e-6 if moved else 1.0,
+            )
+        )
+    for i, contact in enumerate(model.contacts):
+        end, where = contact_suffix(model, i), f"at {contact.name}"
+        rows = [("gap", f"Gap between the bodies {where}, below zero where they are pressed", "m")]
+        rows += [
+            ("contact_force", f"Contact force {where}", "N"),
+            ("mean_contact_force", f"Mean contact force {where} over a communication step", "N"),
+            ("peak_contact_force", f"Largest contact force {where} in a communication step", "N"),
+        ]
+        if contact.film is not None:
+            rows.append(("film_force", f"Force of the squeeze film {where}, + apart", "N"))
+        for name, words, unit in rows:
+            force = unit == "N"
+            variables.append(
+                FmuVariable(
+                    name=f"{name}{end}",
+                    description=words,
+                    unit=unit,
+                    causality="output",
+                    minimum=0.0 if force and "contact" in name else None,
+                    nominal=100.0 if force else 1e-6,
+                )
+            )
+    variables.append(
+        FmuVariable(
+            name="internal_step",
+            description="Largest internal time step of co-simulation",
+            unit="s",
+            causality="parameter",
+            variability="fixed",
+            start=model.step,
+            minimum=1e-10,
+            maximum=1e-3,
+            nominal=model.step,
+        )
+    )
+    if model.kind == "pair":
+        speed = float(model.rise @ model.start_velocity) / float(model.rise @ model.rise)
+        variables += [
+            FmuVariable(
+                name="start_velocity",
+                description="Velocity of the moving body at the start, + opening",
+                unit="m/s",
+                causality="parameter",
+                variability="fixed",
+                start=speed,
+                minimum=-100.0,
+                maximum=100.0,
+                nominal=1.0,
+            ),
+            FmuVariable(
+                name="start_rise",
+                description="Way of the moving body along +z before the start, from where the case "
+                "puts it",
+                unit="m",
+                causality="parameter",
+                variability="fixed",
+                start=0.0,
+                minimum=-1e-2,
+                maximum=1e-2,
+                nominal=1e-6,
+            ),
+        ]
+    first = len(variables)
+    m = model.mode_count
+    scale = np.sqrt(max(float(model.rise @ model.rise), 1e-6))
+    for kind, unit, start, nominal in (
+        ("q", "m.kg1/2", model.start, 1e-6 * scale),
+        ("v", "m.kg1/2/s", model.start_velocity, scale),
+    ):
+        variables += [
+            FmuVariable(
+                name=f"{kind}_{model.mode_names[i]}",
+                description=f"Modal {'displacement' if kind == 'q' else 'velocity'}, "
+                f"{model.frequencies[i]:.6g} Hz",
+                unit=unit,
+                causality="local",
+                start=float(start[i]),
+                nominal=nominal,
+            )
+            for i in range(m)
+        ]
+    variables += [
+        FmuVariable(
+            name=f"der({state.name})",
+            description=f"Rate of {state.name}",
+            unit="m.kg1/2/s" if state.name.startswith("q_") else "m.kg1/2/s2",
+            causality="local",
+            derivative_of=first + i,
+        )
+        for i, state in enumerate(variables[first:])
+    ]
+    return tuple(variables)

@@ -1,0 +1,417 @@
+r"""What leaves klack as a model: modes, inputs, outputs and contacts, as plain numbers.
+
+Every writer of models (FMU, Modelica, MATLAB, text) starts from a :class:`ModalModel`, so all of
+them hold the same equations,
+
+.. math::
+    \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i
+    = c_i + \sum_u \beta_{ui} u_u + \sum_c \gamma_{ci} F_c ,
+    \qquad g_c = g_{c0} + \gamma_c \cdot q ,
+
+with the constant modal forces ``c`` and the contact forces ``F_c`` (above zero when they press the
+bodies apart) that :mod:`klack.simulation.interface_step` defines from the gaps ``g_c``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.laws import ContactLaw
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+from klack.network.rows import FilmRow
+from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.compile import flatten
+from klack.simulation.system import ReducedSystem
+
+__all__ = [
+    "ModalModel",
+    "ModelContact",
+    "ModelInput",
+    "ModelOutput",
+    "Provenance",
+    "body_model",
+    "choose_body",
+    "identifier",
+    "pair_model",
+]
+
+Quantity = Literal["displacement", "velocity", "gap", "force"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where a model comes from; every file that leaves klack says it.
+
+    Parameters
+    ----------
+    case, title : str
+    version : str
+        Of klack.
+    created : str
+        Date and time, ISO 8601.
+    meshes : mapping of body name to str
+        Elements and degrees of freedom in words.
+    """
+
+    case: str
+    title: str
+    version: str
+    created: str
+    meshes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelInput:
+    """A force from outside, positive along +z.
+
+    Parameters
+    ----------
+    name : str
+        Made of letters, digits and underscores, as all names of a model.
+    description : str
+    shape : array, shape (m,) [1/sqrt(kg)]
+        Modal forces of 1 N.
+    """
+
+    name: str
+    description: str
+    shape: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelOutput:
+    """A displacement or a velocity along +z.
+
+    Parameters
+    ----------
+    name, description : str
+    quantity : "displacement" [m] or "velocity" [m/s]
+    shape : array, shape (m,) [1/sqrt(kg)]
+        Times the modal displacements or velocities.
+    offset : float [m] or [m/s]
+        Value at ``q = 0``.
+    """
+
+    name: str
+    description: str
+    quantity: Literal["displacement", "velocity"]
+    shape: NDArray[np.float64]
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelContact:
+    """A contact, with a squeeze film or not, in series with a compliance or not.
+
+    Parameters
+    ----------
+    name : str
+    shape : array, shape (m,) [1/sqrt(kg)]
+        ``gamma`` of the gap.
+    gap : float [m]
+        At ``q = 0``.
+    law : contact law or None
+        None: only a film.
+    series_compliance : float [m/N]
+    film : FilmRow or None
+    """
+
+    name: str
+    shape: NDArray[np.float64]
+    gap: float
+    law: ContactLaw | None
+    series_compliance: float = 0.0
+    film: FilmRow | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalModel:
+    """One linear body, or bodies with their contacts, ready to be written for another program.
+
+    Parameters
+    ----------
+    name : str
+        An identifier: letters, digits and underscores.
+    kind : "body" or "pair"
+    omega, damping : array, shape (m,) [rad/s], [-]
+        Of all modes of all bodies; rigid modes have 0.
+    mode_names : tuple of str
+        ``needle_1``, ``needle_2``, ..., body by body.
+    start, start_velocity : array, shape (m,) [m sqrt(kg)], [m/s sqrt(kg)]
+        Modal state at the start.
+    rise : array, shape (m,) [sqrt(kg)]
+        Modal displacements of a rigid motion of the moving body of a pair by 1 m along +z.
+    constant : array, shape (m,) [N/sqrt(kg)]
+        Modal forces that always act (weight, preload).
+    inputs : tuple of ModelInput
+    outputs : tuple of ModelOutput
+    contacts : tuple of ModelContact
+        Of a pair; gap and force of each are outputs of the model as well.
+    residual_compliance : array, shape (n_inputs, n_inputs) [m/N]
+        Of a body: what its modes miss of the static compliance between its ports.  Not part of the
+        equations; a contact stiffness of the user belongs in series with it.
+    step : float [s]
+        Step of the time integration that gives klack's own accuracy.
+    duration : float [s]
+        A sensible end of a first simulation.
+    provenance : Provenance
+    """
+
+    name: str
+    kind: Literal["body", "pair"]
+    omega: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    mode_names: tuple[str, ...]
+    start: NDArray[np.float64]
+    start_velocity: NDArray[np.float64]
+    rise: NDArray[np.float64]
+    constant: NDArray[np.float64]
+    inputs: tuple[ModelInput, ...]
+    outputs: tuple[ModelOutput, ...]
+    contacts: tuple[ModelContact, ...]
+    residual_compliance: NDArray[np.float64]
+    step: float
+    duration: float
+    provenance: Provenance
+
+    @property
+    def mode_count(self) -> int:
+        """Number of modes; the model has twice as many states."""
+        return len(self.omega)
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Eigenfrequencies [Hz] of the bodies, shape (m,); rigid ones are 0."""
+        return self.omega / (2.0 * np.pi)
+
+    def input_matrix(self) -> NDArray[np.float64]:
+        """Modal forces of unit inputs, shape (m, n_inputs)."""
+        columns = [np.asarray(item.shape) for item in self.inputs]
+        return np.column_stack([np.empty((self.mode_count, 0)), *columns])
+
+    def output_matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Factors of modal displacements and of modal velocities, shape (n_outputs, m) each."""
+        shapes = np.array([item.shape for item in self.outputs]).reshape(-1, self.mode_count)
+        moved = np.array([item.quantity == "displacement" for item in self.outputs], dtype=bool)
+        return shapes * moved[:, None], shapes * ~moved[:, None]
+
+
+def body_model(body: ReducedBody, *, provenance: Provenance, step: float) -> ModalModel:
+    """Linear body: force at every port in, displacement and velocity at every port out.
+
+    Parameters
+    ----------
+    body : ReducedBody
+        Its observers are further outputs.
+    provenance : Provenance
+    step : float [s]
+        Recommended step.
+    """
+    m = body.mode_count
+    names = {port: identifier(port) for port in (*body.port_names, *body.observer_names)}
+    inputs = tuple(
+        ModelInput(
+            name=f"force_{names[port]}",
+            description=f"Force on {port}, positive along +z",
+            shape=body.port_shapes[:, i],
+        )
+        for i, port in enumerate(body.port_names)
+    )
+    shapes = np.hstack([body.port_shapes, body.observer_shapes])
+    outputs = []
+    for quantity, word in (("displacement", "Displacement"), ("velocity", "Velocity")):
+        for i, port in enumerate((*body.port_names, *body.observer_names)):
+            outputs.append(
+                ModelOutput(
+                    name=f"{quantity}_{names[port]}",
+                    description=f"{word} of {port} along +z",
+                    quantity=quantity,  # type: ignore[arg-type]
+                    shape=shapes[:, i],
+                )
+            )
+    lowest = body.omega[body.rigid_count :].min() if m > body.rigid_count else 2e3 * np.pi
+    rise = np.zeros(m)
+    rise[: body.rigid_count] = body.rigid_axial
+    return ModalModel(
+        name=identifier(body.name),
+        kind="body",
+        omega=np.asarray(body.omega, dtype=float),
+        damping=np.asarray(body.damping, dtype=float),
+        mode_names=_mode_names(body),
+        start=np.zeros(m),
+        start_velocity=np.zeros(m),
+        rise=rise,
+        constant=np.zeros(m),
+        inputs=inputs,
+        outputs=tuple(outputs),
+        contacts=(),
+        residual_compliance=body.residual_compliance,
+        step=step,
+        duration=float(20.0 * 2.0 * np.pi / lowest),
+        provenance=provenance,
+    )
+
+
+def pair_model(
+    name: str,
+    system: ReducedSystem,
+    *,
+    moving: str,
+    contact_names: Sequence[str],
+    films: Sequence[FilmRow | None] = (),
+    speed: float,
+    step: float,
+    duration: float,
+    provenance: Provenance,
+) -> ModalModel:
+    """Bodies and their contacts: outside forces on the moving body in, lift and forces out.
+
+    Parameters
+    ----------
+    name : str
+    system : ReducedSystem
+        Its constant forces and springs stay inside the model.
+    moving : str
+        The needle: a free body.
+    contact_names : sequence of str
+        One per contact of the system.
+    films : sequence of FilmRow or None
+        One per contact; none without.
+    speed : float [m/s]
+        Of the moving body at the start, along +z (negative: closing).
+    step, duration : float [s]
+    provenance : Provenance
+
+    Raises
+    ------
+    InputError
+        If the moving body is held.
+    """
+    body = system.body(moving)
+    if body.rigid_count == 0:
+        raise InputError(
+            f"model '{name}': moving body",
+            got=f"'{moving}', which is held",
+            expected="a free body",
+            hint=nearest(moving, [b.name for b in system.bodies], "name the needle."),
+        )
+    flat = flatten(system, {moving: speed}, step)
+    rest = np.concatenate([block.rest for block in flat.blocks])
+    constant = np.concatenate(
+        [
+            block.basis.T @ sum((-p * phi for phi, _, p in block.springs), block.constant)
+            for block in flat.blocks
+        ]
+    )
+    needle = next(block for block in flat.blocks if block.body.name == moving)
+
+    def of_needle(own: NDArray[np.float64]) -> NDArray[np.float64]:
+        every = np.zeros(flat.omega.size)
+        every[needle.first : needle.last] = needle.basis.T @ own
+        return every
+
+    axial = np.zeros(body.mode_count)
+    axial[: body.rigid_count] = body.rigid_axial
+    rise = of_needle(axial)
+    spread = rise / body.mass
+    height = next((c.gap for c in system.contacts if c.body_a == moving), 0.0)
+    used = {contact.port_a for contact in system.contacts if contact.body_a == moving}
+    used |= {contact.port_b for contact in system.contacts if contact.body_b == moving}
+    inputs = [
+        ModelInput(
+            name="force",
+            description=f"Outside force on {moving}, spread over its mass, positive along +z "
+            "(opening)",
+            shape=spread,
+        )
+    ]
+    for port in body.port_names:
+        if port in used:
+            continue
+        inputs.append(
+            ModelInput(
+                name=f"force_{identifier(port)}",
+                description=f"Outside force on {moving}.{port}, positive along +z (opening)",
+                shape=of_needle(system.shape(moving, port)),
+            )
+        )
+    outputs = (
+        ModelOutput(
+            name="lift",
+            description=f"Height of {moving} (centre of mass) above first touch",
+            quantity="displacement",
+            shape=spread,
+            offset=height - float(spread @ rest),
+        ),
+        ModelOutput(
+            name="velocity",
+            description=f"Velocity of {moving} (centre of mass), + opening",
+            quantity="velocity",
+            shape=spread,
+        ),
+    )
+    names = [identifier(text) for text in contact_names]
+    contacts = tuple(
+        ModelContact(
+            name=names[c],
+            shape=flat.rows[c],
+            gap=contact.gap - float(flat.rows[c] @ rest),
+            law=contact.law,
+            series_compliance=contact.series_compliance,
+            film=films[c] if films else None,
+        )
+        for c, contact in enumerate(system.contacts)
+    )
+    return ModalModel(
+        name=identifier(name),
+        kind="pair",
+        omega=flat.omega,
+        damping=flat.damping,
+        mode_names=tuple(text for member in system.bodies for text in _mode_names(member)),
+        start=rest,
+        start_velocity=np.asarray(flat.v, dtype=float),
+        rise=rise,
+        constant=constant,
+        inputs=tuple(inputs),
+        outputs=outputs,
+        contacts=contacts,
+        residual_compliance=np.zeros((len(inputs), len(inputs))),
+        step=step,
+        duration=duration,
+        provenance=provenance,
+    )
+
+
+def identifier(text: str) -> str:
+    """Name that C, MATLAB and Modelica accept: letters, digits, underscores, no digit first."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in text)
+    return plain if plain[:1].isalpha() else f"m_{plain}"
+
+
+def choose_body(bodies: Sequence[ReducedBody], name: str | None) -> tuple[ReducedBody, ...]:
+    """Bodies of that name, or all of them.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name is None:
+        return tuple(bodies)
+    names = [body.name for body in bodies]
+    if name not in names:
+        raise InputError(
+            "--body",
+            got=f"'{name}'",
+            expected=f"one of: {one_of(names)}",
+            hint=nearest(name, names, "leave it out for all bodies."),
+        )
+    return (bodies[names.index(name)],)
+
+
+def _mode_names(body: ReducedBody) -> tuple[str, ...]:
+    return tuple(f"{identifier(body.name)}_{i + 1}" for i in range(body.mode_count))

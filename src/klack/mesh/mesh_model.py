@@ -1,0 +1,76 @@
+"""A mesh as a file holds it: with the numbers of the file, its materials and its unit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.materials import Material
+from klack.mesh.mesh import Mesh
+
+__all__ = ["FileMaterial", "MeshModel"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileMaterial:
+    """Elastic material as the file has it, in the units of the file.
+
+    Parameters
+    ----------
+    name : str
+    young : float [stress unit of the file]
+    poisson : float [-]
+    density : float [density unit of the file], or None
+    """
+
+    name: str
+    young: float
+    poisson: float
+    density: float | None
+
+    def in_si(self, *, stress: float, density: float) -> Material:
+        """Convert to SI: ``stress`` [Pa] and ``density`` [kg/m^3] are the units of the file.
+
+        For a model in tonne, mm, s, N these are 1e6 Pa and 1e12 kg/m^3.
+        """
+        if self.density is None:
+            raise InputError(
+                f"material '{self.name}'",
+                got="no *DENSITY",
+                expected="Young's modulus, Poisson's ratio and density",
+                hint="add *DENSITY to the file, or name a material in the case.",
+            )
+        return Material(
+            name=self.name,
+            young=self.young * stress,
+            poisson=self.poisson,
+            density=self.density * density,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshModel:
+    """Mesh with what else the file says.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    node_numbers : int array, shape (n_nodes,)
+        Number in the file of every node of the mesh.
+    element_numbers : tuple of int arrays
+        The same for the elements, one array per block.
+    materials : mapping of name to FileMaterial
+    sections : mapping of solid name to material name
+        Where the file says it.
+    unit_length : float [m]
+        Length of one unit of the file.
+    """
+
+    mesh: Mesh
+    node_numbers: NDArray[np.int64]
+    element_numbers: tuple[NDArray[np.int64], ...]
+    materials: Mapping[str, FileMaterial]
+    sections: Mapping[str, str]
+    unit_length: float
