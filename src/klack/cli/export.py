@@ -1,51 +1,113 @@
-"""``klack export``: a case as the input of another program."""
+"""``klack export``: models, decks and results for other programs, through one door."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.options import CaseArgument, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_folder, staged_folder
-from klack.cli.progress import show_progress
-
-if TYPE_CHECKING:
-    from klack.case.schema import Case
-    from klack.exchange.calculix_deck import CalculixSettings
+from klack.cli.options import Out, Quiet, Threads, require_threads
+from klack.cli.output import require_folder
+from klack.errors import InputError
 
 __all__ = ["export"]
 
+_Source = Annotated[
+    Path,
+    Parameter(
+        name="CASE",
+        help="Case file (YAML) or name of a shipped case; or the folder of a stored result.",
+    ),
+]
 _Target = Annotated[
-    Literal["calculix"], Parameter(name="--to", help="Program that the case is written for.")
+    Literal["mat", "csv", "fmu", "modelica", "calculix", "netcdf", "mdf", "vtk"],
+    Parameter(
+        name="--to",
+        help="mat, csv: models of a case, or a result; fmu, modelica: models; netcdf, mdf: results "
+        "(a case is run first); vtk: fields over time; calculix: a deck of the impact.",
+    ),
+]
+_Part = Annotated[
+    Literal["body", "pair"] | None,
+    Parameter(
+        name="--part",
+        help="body: each linear body alone; pair: all bodies with contacts and films. "
+        "[default: both]",
+    ),
+]
+_Body = Annotated[str | None, Parameter(name="--body", help="One body alone. [default: all]")]
+_Fmi = Annotated[
+    Literal["2", "3"] | None, Parameter(name="--fmi", help="Version of the standard. [default: 2]")
+]
+_Platform = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--platform",
+        consume_multiple=True,
+        negative="",
+        help="linux64, win64; several binaries fit into one FMU. [default: this computer's]",
+    ),
+]
+_Level = Annotated[
+    Literal["reduced", "full"] | None,
+    Parameter(name="--level", help="Whose fields vtk shows. [default: reduced]"),
+]
+_Frames = Annotated[
+    int | None, Parameter(name="--frames", help="Number of frames for vtk. [default: 50]")
 ]
 _Step = Annotated[
     str | None,
-    Parameter(name="--step", help='Time increment, "50 ns". [default: full_step of the case]'),
+    Parameter(
+        name="--step",
+        help='Time increment of the calculix deck, "50 ns". [default: full_step of the case]',
+    ),
 ]
 _Duration = Annotated[
     str | None,
-    Parameter(name="--duration", help='Time to compute, "10 us". [default: as in the case]'),
+    Parameter(name="--duration", help='Time that it computes, "10 us". [default: as in the case]'),
 ]
 _Penalty = Annotated[
     str | None,
     Parameter(
         name="--penalty",
-        help='Contact pressure per overclosure, "1e9 MPa/mm". [default: 300 E* / element size]',
+        help='Its contact pressure per overclosure, "1e9 MPa/mm". [default: 300 E* / element size]',
     ),
 ]
 _Run = Annotated[
-    bool, Parameter(name="--run", negative="", help="Run the program too (it must be installed).")
+    bool, Parameter(name="--run", negative="", help="Run CalculiX too (it must be installed).")
 ]
 _TimeLimit = Annotated[
     str | None, Parameter(name="--time-limit", help='Stop that run after this long, "20 min".')
 ]
 
+_MODELS = ("mat", "csv", "fmu", "modelica")
+_RESULTS = ("mat", "csv", "netcdf", "mdf")
+_USED_BY: Mapping[str, tuple[str, ...]] = {
+    "--part": _MODELS,
+    "--body": _MODELS,
+    "--fmi": ("fmu",),
+    "--platform": ("fmu",),
+    "--level": ("vtk",),
+    "--frames": ("vtk",),
+    "--step": ("calculix",),
+    "--duration": ("calculix",),
+    "--penalty": ("calculix",),
+    "--run": ("calculix",),
+    "--time-limit": ("calculix",),
+}
+
 
 def export(
-    case: CaseArgument,
+    source: _Source,
     /,
     *,
     to: _Target,
+    part: _Part = None,
+    body: _Body = None,
+    fmi: _Fmi = None,
+    platform: _Platform = None,
+    level: _Level = None,
+    frames: _Frames = None,
     step: _Step = None,
     duration: _Duration = None,
     penalty: _Penalty = None,
@@ -55,72 +117,110 @@ def export(
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> int:
-    """Write a case for another program: mesh, materials, contact, motion, time steps."""
-    from klack.case import find_case, load_case
-
+    """Write models, results or decks of a case for another program."""
     require_threads(threads)
-    checked = load_case(find_case(case))
-    numbers = _Numbers(step, duration, penalty, time_limit)
-    folder = out if out is not None else Path("klack-results") / checked.name
+    _require_used(
+        to,
+        {
+            "--part": part,
+            "--body": body,
+            "--fmi": fmi,
+            "--platform": platform,
+            "--level": level,
+            "--frames": frames,
+            "--step": step,
+            "--duration": duration,
+            "--penalty": penalty,
+            "--run": run or None,
+            "--time-limit": time_limit,
+        },
+    )
+    if _is_result(source):
+        _export_stored(source, to, out, quiet=quiet)
+        return 0
+
+    from klack.case.shipped import find_case
+    from klack.case.valve_reader import load_any_case
+
+    case = load_any_case(find_case(source))
+    folder = out if out is not None else Path("klack-results") / case.name
     require_folder(folder)
-    targets = {"calculix": _to_calculix}
-    targets[to](checked, folder, numbers, run=run, threads=threads or 1, quiet=quiet)
+    if to == "calculix":
+        from klack.cli.export_calculix import DeckNumbers, export_calculix
+
+        numbers = DeckNumbers(step, duration, penalty, time_limit)
+        export_calculix(
+            _impact_only(case, to), folder, numbers, run=run, threads=threads or 1, quiet=quiet
+        )
+    elif to in _MODELS:
+        from klack.cli.export_models import ModelChoice, export_models
+
+        choice = ModelChoice(to, part, body, 3 if fmi == "3" else 2, _platforms(platform))
+        export_models(case, folder, choice, threads=threads, quiet=quiet)
+    elif to == "vtk":
+        from klack.cli.export_results import export_fields
+
+        export_fields(
+            _impact_only(case, to),
+            folder,
+            level=level or "reduced",
+            frames=50 if frames is None else frames,
+            threads=threads,
+            quiet=quiet,
+        )
+    else:
+        from klack.cli.export_results import run_and_export
+
+        run_and_export(case, to, folder, threads=threads, quiet=quiet)
     return 0
 
 
-class _Numbers:
-    """The quantities of the command line in SI; None where not given."""
-
-    def __init__(
-        self, step: str | None, duration: str | None, penalty: str | None, time_limit: str | None
-    ) -> None:
-        from klack.units import TIME, Kind, parse_quantity
-
-        def si(text: str | None, kind: Kind, option: str) -> float | None:
-            return None if text is None else parse_quantity(text, kind, option)
-
-        bed = Kind("a pressure per length", "Pa/m", "1e9 MPa/mm", ("MPa/mm", "N/mm^3", "Pa/m"))
-        self.step = si(step, TIME, "--step")
-        self.duration = si(duration, TIME, "--duration")
-        self.penalty = si(penalty, bed, "--penalty")
-        self.time_limit = si(time_limit, TIME, "--time-limit")
+def _require_used(to: str, options: Mapping[str, object]) -> None:
+    for name, value in options.items():
+        if value is not None and to not in _USED_BY[name]:
+            raise InputError(
+                f"klack export {name}",
+                got=f"it with --to {to}",
+                expected=f"it with --to {' or '.join(_USED_BY[name])} only",
+                hint=f"leave {name} out.",
+            )
 
 
-def _to_calculix(
-    case: "Case", folder: Path, numbers: _Numbers, *, run: bool, threads: int, quiet: bool
-) -> None:
-    from klack.exchange.calculix_case import calculix_impact, calculix_settings
-    from klack.exchange.calculix_deck import write_deck
-    from klack.exchange.calculix_run import require_calculix, run_calculix
+def _is_result(path: Path) -> bool:
+    return any((place / "zarr.json").is_file() for place in (path, path / "result.zarr"))
 
-    if run:
-        require_calculix()
-    deck = folder / f"{case.name}.inp"
-    with show_progress(quiet) as progress:
-        impact = calculix_impact(case, progress)
-        settings = calculix_settings(
-            case, impact, step=numbers.step, duration=numbers.duration, penalty=numbers.penalty
+
+def _export_stored(source: Path, to: str, out: Path | None, *, quiet: bool) -> None:
+    if to not in _RESULTS:
+        raise InputError(
+            f"klack export {source}",
+            got=f"a stored result with --to {to}",
+            expected=f"--to {', '.join(_RESULTS)} for a result",
+            hint="models, decks and fields come from the case: give the case file or its name.",
         )
-        progress("deck", 0.0)
-        with staged_folder(folder) as stage:
-            write_deck(impact, settings, stage / deck.name)
-        if not run:
-            if not quiet:
-                print(f"{_described(deck, settings)}\nRun it in its folder: ccx -i {deck.stem}")
-            return
-        done = run_calculix(
-            deck,
-            duration=settings.duration,
-            threads=threads,
-            time_limit=numbers.time_limit,
-            progress=lambda fraction: progress("CalculiX", fraction),
+    from klack.cli.export_results import export_result
+    from klack.cli.stored import load_stored
+
+    folder = out if out is not None else source
+    require_folder(folder)
+    export_result(load_stored(source), to, folder, quiet=quiet)
+
+
+def _impact_only(case: Any, to: str) -> Any:
+    from klack.case.schema import Case
+
+    if not isinstance(case, Case):
+        raise InputError(
+            f"{case.path}: klack export --to {to}",
+            got="the case of a whole valve",
+            expected="the case of one impact of two bodies",
+            hint="describe the impact on one stop as a case of its own; see demo-valve.",
         )
-    if not quiet:
-        print(f"{_described(deck, settings)}\nCalculiX took {done.wall_time:.0f} s: {done.data}")
+    return case
 
 
-def _described(deck: Path, settings: "CalculixSettings") -> str:
-    return (
-        f"Deck {deck}: {settings.duration / settings.step:.0f} steps of "
-        f"{settings.step * 1e9:.4g} ns, penalty {settings.penalty * 1e-9:.4g} MPa/mm"
-    )
+def _platforms(names: list[str] | None) -> tuple[str, ...] | None:
+    """Both "--platform a,b" and "--platform a --platform b"."""
+    if names is None:
+        return None
+    return tuple(dict.fromkeys(name for item in names for name in item.split(",") if name))

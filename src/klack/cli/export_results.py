@@ -1,0 +1,90 @@
+"""``klack export --to netcdf|mdf|mat|csv|vtk``: results for programs that show and compare them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from klack.cli.output import staged_folder
+from klack.cli.progress import show_progress
+from klack.errors import InputError
+
+if TYPE_CHECKING:
+    from klack.case.schema import Case
+    from klack.case.valve import ValveCase
+
+__all__ = ["export_fields", "export_result", "run_and_export"]
+
+
+def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
+    """Write the histories of a stored study."""
+    from klack.exchange.results.table import result_table
+    from klack.workflow.stroke_study import StrokeStudy
+    from klack.workflow.study import ImpactStudy
+
+    if not isinstance(study, ImpactStudy | StrokeStudy):
+        raise InputError(
+            "klack export",
+            got=f"a stored {type(study).__name__}",
+            expected="the result of klack impact or klack stroke",
+            hint="its numbers are in --json of the command that made it.",
+        )
+    table = result_table(study)
+    name = f"{study.case}_result"
+    with staged_folder(folder) as stage:
+        if to == "netcdf":
+            from klack.exchange.results.netcdf import write_netcdf
+
+            write_netcdf(table, stage / f"{name}.nc")
+        elif to == "mdf":
+            from klack.exchange.results.mdf import write_mdf
+
+            write_mdf(table, stage / f"{name}.mf4")
+        elif to == "mat":
+            from klack.exchange.results.mat import write_mat
+
+            write_mat(table, stage / f"{name}.mat")
+        else:
+            from klack.exchange.results.csv_files import write_csv
+
+            write_csv(table, stage)
+        made = sorted(path.name for path in stage.iterdir())
+    if not quiet:
+        print(f"Written to {folder}: {', '.join(made)}")
+
+
+def run_and_export(
+    case: "Case | ValveCase", to: str, folder: Path, *, threads: int | None, quiet: bool
+) -> None:
+    """Run a case as it asks for, and write what came out."""
+    from klack.case.schema import Case
+    from klack.workflow.impact import run_impact
+    from klack.workflow.stroke import run_stroke
+
+    study: Any
+    with show_progress(quiet) as progress:
+        if isinstance(case, Case):
+            study = run_impact(
+                case, levels=case.run.levels, certify=False, progress=progress, threads=threads
+            )
+        else:
+            study = run_stroke(case, progress=progress, threads=threads)
+    export_result(study, to, folder, quiet=quiet)
+
+
+def export_fields(
+    case: "Case",
+    folder: Path,
+    *,
+    level: Literal["reduced", "full"],
+    frames: int,
+    threads: int | None,
+    quiet: bool,
+) -> None:
+    """Write displacement, velocity and stress of an impact over time, for ParaView."""
+    from klack.exchange.results.vtk_series import write_impact_series
+
+    with show_progress(quiet) as progress, staged_folder(folder) as stage:
+        made = write_impact_series(
+            case, stage, level=level, frames=frames, progress=progress, threads=threads
+        )
+    if not quiet:
+        print(f"Written: {folder / made.relative_to(stage)}; open it in ParaView")
