@@ -29,6 +29,7 @@ from klack.cli import (
     demo,
     export,
     impact,
+    inspect,
     noise,
     reduce,
     report,
@@ -57,6 +58,7 @@ app.command(stroke.stroke)
 app.command(shots.shots)
 app.command(noise.noise)
 app.command(reduce.reduce)
+app.command(inspect.inspect)
 app.command(report.report)
 app.command(export.export)
 app.command(compare.compare)
