@@ -1,0 +1,1 @@
+"""Matrices and reduced models in the files of other programs."""
