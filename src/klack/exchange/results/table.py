@@ -1,0 +1,140 @@
+"""The numbers of a study as one plain table: what every writer of results starts from."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["ResultAxis", "ResultChannel", "ResultRun", "ResultScalar", "ResultTable"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResultAxis:
+    """What the values of some channels are drawn over.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"time"``; its own within a run.
+    quantity : ``"time"`` or ``"frequency"``
+    unit : str
+        SI.
+    values : array, shape (n,) [unit]
+        Rising strictly.
+    meaning : str
+        In words.
+    """
+
+    name: str
+    quantity: Literal["time", "frequency"]
+    unit: str
+    values: NDArray[np.float64]
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResultChannel:
+    """One quantity over an axis.
+
+    Parameters
+    ----------
+    name : str
+        In the words of klack, for example ``"needle.tip displacement"``.
+    axis : str
+        Name of a :class:`ResultAxis` of the same run.
+    unit : str
+        SI; ``"1"`` for a pure number.
+    values : array, shape (n,) [unit]
+    meaning : str
+        Sign and where between two instants the value holds.
+    """
+
+    name: str
+    axis: str
+    unit: str
+    values: NDArray[np.float64]
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResultScalar:
+    """One number of a run; nan where it does not exist."""
+
+    name: str
+    unit: str
+    value: float
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResultRun:
+    """One level of an impact, one variant of a stroke, or one comparison of transfer functions.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"reduced"`` or ``"wet"``.
+    label : str
+        What a legend says.
+    solver : str
+        What computed it, in words.
+    axes : tuple of ResultAxis
+    channels : tuple of ResultChannel
+    scalars : tuple of ResultScalar
+    """
+
+    name: str
+    label: str
+    solver: str
+    axes: tuple[ResultAxis, ...]
+    channels: tuple[ResultChannel, ...]
+    scalars: tuple[ResultScalar, ...]
+
+    def __post_init__(self) -> None:
+        sizes = {axis.name: axis.values.size for axis in self.axes}
+        for channel in self.channels:
+            if channel.values.shape != (sizes.get(channel.axis, -1),):
+                raise InputError(
+                    f"result '{self.name}': channel '{channel.name}'",
+                    got=f"values of shape {channel.values.shape} over '{channel.axis}'",
+                    expected=f"one value for each of the {sizes.get(channel.axis, 0)} of its axis",
+                    hint="the stored result is damaged; run the case again.",
+                )
+
+    def along(self) -> Iterator[tuple[ResultAxis, tuple[ResultChannel, ...]]]:
+        """Every axis with its channels."""
+        for axis in self.axes:
+            yield axis, tuple(item for item in self.channels if item.axis == axis.name)
+
+    def channel(self, name: str) -> ResultChannel:
+        """Channel of that name; :class:`KeyError` if there is none."""
+        return {item.name: item for item in self.channels}[name]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResultTable:
+    """A whole study.
+
+    Parameters
+    ----------
+    kind : ``"impact"`` or ``"stroke"``
+    about : mapping of str to str
+        Case, title, version of klack, date, mesh, ...: what made the numbers.
+    case_text : str
+        The case file as it was read.
+    runs : tuple of ResultRun
+        The reference first.
+    """
+
+    kind: Literal["impact", "stroke"]
+    about: Mapping[str, str]
+    case_text: str
+    runs: tuple[ResultRun, ...]
+
+    def run(self, name: str) -> ResultRun:
+        """Run of that name; :class:`KeyError` if there is none."""
+        return {item.name: item for item in self.runs}[name]
