@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.schema import (
-    BodyDamping,
     Case,
     HertzLocalLaw,
     LinearLocalLaw,
@@ -31,7 +30,6 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
-from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from klack.reduction.ports import Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -41,6 +39,7 @@ from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
+from klack.workflow.damping_choice import damping_of
 from klack.workflow.pressure import pressure_record
 from klack.workflow.problem import ContactProblem
 from klack.workflow.progress import Progress
@@ -154,15 +153,6 @@ def mode_pool(
     if isinstance(choice, ByFrequency) and pool.frequency[-1] < choice.maximum:
         return eigenmodes(body, max_frequency=choice.maximum, flexibility=flexibility)
     return pool
-
-
-def damping_of(damping: BodyDamping) -> Damping:
-    """Damping model that a case asks for."""
-    if damping.modal is not None:
-        return ModalDamping(ratio=damping.modal)
-    if damping.rayleigh is not None:
-        return RayleighDamping(alpha=damping.rayleigh.alpha, beta=damping.rayleigh.beta)
-    return LossFactor(eta=damping.loss_factor or 0.0)
 
 
 def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
