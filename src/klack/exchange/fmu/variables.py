@@ -5,8 +5,8 @@ states (displacements of all modes, then velocities), their derivatives.  Versio
 adds the time after the last of them.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -68,7 +68,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
     ``mean_contact_force`` and ``peak_contact_force`` (over the last communication step; in model
     exchange equal to ``contact_force``) [N], and ``film_force`` [N] where it has a film.
     Parameters: ``internal_step`` [s] and, of a pair, ``start_velocity`` [m/s] and ``start_rise``
-    [m] of the moving body.
+    [m] of the moving body.  A name that comes again gets ``_2``, ``_3`` and so on.
     """
     variables = [
         FmuVariable(
@@ -173,6 +173,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
             )
             for i in range(m)
         ]
+    variables = _distinct(variables)
     variables += [
         FmuVariable(
             name=f"der({state.name})",
@@ -184,3 +185,18 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
         for i, state in enumerate(variables[first:])
     ]
     return tuple(variables)
+
+
+def _distinct(variables: Sequence[FmuVariable]) -> list[FmuVariable]:
+    """Variables with a number behind each name that was there before."""
+    taken = {variable.name for variable in variables}
+    seen: set[str] = set()
+    found = []
+    for variable in variables:
+        name, count = variable.name, 1
+        while name in seen or (count > 1 and name in taken):
+            count += 1
+            name = f"{variable.name}_{count}"
+        seen.add(name)
+        found.append(variable if name == variable.name else replace(variable, name=name))
+    return found

@@ -1,0 +1,307 @@
+"""``modelDescription.xml`` of an FMU: what an importing program reads before it loads anything.
+
+FMI 2.0 counts variables from 1 in its model structure, FMI 3.0 names them by value reference; both
+have the same variables with the same value references (:mod:`klack.exchange.fmu.variables`).
+Version 2 leaves the time out, as some importers of that version stumble over it; version 3 needs it
+and, for each contact, a variable that is the event indicator.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
+from xml.etree import ElementTree as ET
+
+from klack.exchange.fmu.dependencies import Dependencies, dependencies_of
+from klack.exchange.fmu.model_exchange import supports_model_exchange
+from klack.exchange.fmu.variables import UNITS, FmuVariable, contact_suffix, fmu_variables
+from klack.exchange.modal_model import ModalModel
+
+__all__ = ["SOURCE_FILES", "communication_step", "model_description"]
+
+_Known = Mapping[int, tuple[int, ...]]
+
+SOURCE_FILES = {2: ("klack_model.c", "klack_fmi2.c"), 3: ("klack_model.c", "klack_fmi3.c")}
+"""C sources of both versions of the standard."""
+
+_DISPLAY_UNITS = {"m": ("um", 1e6), "s": ("us", 1e6)}
+_TOLERANCE = 1e-8
+_LONGEST, _FEWEST = 50, 500
+_LICENSE = "BSD-3-Clause for the C sources; the numbers belong to who made the model"
+_COPYRIGHT = "C sources: (c) 2026, the klack founders"
+
+
+def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> str:
+    """XML text of the model description.
+
+    Parameters
+    ----------
+    model : ModalModel
+    fmi : 2 or 3
+        Version of the standard.
+    guid : str
+        What the binary compares at its instantiation.
+    """
+    variables = fmu_variables(model)
+    exchange = supports_model_exchange(model)
+    root = ET.Element("fmiModelDescription", _head(model, fmi, guid))
+    _interfaces(root, model, fmi, exchange)
+    _units(root, variables)
+    categories = ET.SubElement(root, "LogCategories")
+    ET.SubElement(
+        categories, "Category", name="logStatusError", description="Why a function failed"
+    )
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=_number(model.duration),
+        tolerance=_number(_TOLERANCE),
+        stepSize=_number(communication_step(model)),
+    )
+    found = dependencies_of(model)
+    if fmi == 2:
+        if exchange:
+            root.set("numberOfEventIndicators", str(len(model.contacts)))
+        _variables_2(root, model, variables, exchange)
+        _structure_2(root, variables, found, exchange)
+    else:
+        _variables_3(root, model, variables, exchange)
+        _structure_3(root, model, variables, found, exchange)
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "unicode") + "\n"
+
+
+def communication_step(model: ModalModel) -> float:
+    """Recommended communication step [s]: 50 internal steps, but 500 in a first simulation.
+
+    Rounded down to 1, 2 or 5 times a power of ten.
+
+    Notes
+    -----
+    Inputs are held over a step, so the error of a coupled simulation falls with its first power.
+    The contact itself is integrated with the internal step, whatever the communication step is.
+    """
+    longest = min(_LONGEST * model.step, model.duration / _FEWEST)
+    mantissa, exponent = f"{longest * (1 + 1e-9):.15e}".split("e")
+    return float(f"{max(d for d in (1, 2, 5) if d <= float(mantissa))}e{exponent}")
+
+
+def _head(model: ModalModel, fmi: int, guid: str) -> dict[str, str]:
+    made = model.provenance
+    words = {"body": "linear body", "pair": "bodies and their contacts"}[model.kind]
+    return {
+        "fmiVersion": {2: "2.0", 3: "3.0"}[fmi],
+        "modelName": model.name,
+        {2: "guid", 3: "instantiationToken"}[fmi]: guid,
+        "description": _text(f"{made.title or made.case}: {words}, {model.mode_count} modes"),
+        "author": f"klack {made.version}",
+        "version": _text(made.version),
+        "copyright": _COPYRIGHT,
+        "license": _LICENSE,
+        "generationTool": _text(f"klack {made.version}"),
+        "generationDateAndTime": _text(made.created),
+        "variableNamingConvention": "structured",
+    }
+
+
+def _interfaces(root: ET.Element, model: ModalModel, fmi: int, exchange: bool) -> None:
+    common = {"modelIdentifier": model.name}
+    if fmi == 2:
+        common |= {
+            "canNotUseMemoryManagementFunctions": "true",
+            "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true",
+        }
+        derivative = "providesDirectionalDerivative"
+    else:
+        common |= {"canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
+        derivative = "providesDirectionalDerivatives"
+    elements = []
+    if exchange:
+        # in co-simulation no output depends directly on an input
+        elements.append(ET.SubElement(root, "ModelExchange", common | {derivative: "true"}))
+    stepping = {"canHandleVariableCommunicationStepSize": "true"}
+    elements.append(ET.SubElement(root, "CoSimulation", common | stepping))
+    if fmi == 2:
+        for element in elements:
+            files = ET.SubElement(element, "SourceFiles")
+            for name in SOURCE_FILES[2]:
+                ET.SubElement(files, "File", name=name)
+
+
+def _units(root: ET.Element, variables: Sequence[FmuVariable]) -> None:
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    used = {variable.unit for variable in variables} | {"s"}
+    for name, exponents in UNITS.items():
+        if name not in used:
+            continue
+        unit = ET.SubElement(definitions, "Unit", name=name)
+        if exponents:
+            ET.SubElement(unit, "BaseUnit", {base: str(n) for base, n in exponents.items()})
+        if name in _DISPLAY_UNITS:
+            shown, factor = _DISPLAY_UNITS[name]
+            ET.SubElement(unit, "DisplayUnit", name=shown, factor=_number(factor))
+
+
+# --------------------------------------------------------------------------- variables
+
+
+def _initial(model: ModalModel, variable: FmuVariable) -> str | None:
+    """How the value at the start comes about; None where the standard allows no word."""
+    if variable.causality == "input":
+        return None
+    known = variable.start is not None and (variable.causality == "parameter" or _free(model))
+    return "exact" if known else "calculated"
+
+
+def _free(model: ModalModel) -> bool:
+    """Whether the states may be set before the start; those of a pair follow its parameters."""
+    return model.kind == "body"
+
+
+def _attributes(model: ModalModel, variable: FmuVariable) -> dict[str, str]:
+    """Attributes of the number itself, in the same words in both versions."""
+    found = {"unit": variable.unit}
+    for word, value in (
+        ("min", variable.minimum),
+        ("max", variable.maximum),
+        ("nominal", variable.nominal),
+    ):
+        if value is not None:
+            found[word] = _number(value)
+    if variable.start is not None and _initial(model, variable) != "calculated":
+        found["start"] = _number(variable.start)
+    return found
+
+
+def _words(model: ModalModel, variable: FmuVariable, reference: int) -> dict[str, str]:
+    found = {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "description": _text(variable.description),
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    initial = _initial(model, variable)
+    return found if initial is None else found | {"initial": initial}
+
+
+def _variables_2(
+    root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], exchange: bool
+) -> None:
+    listed = ET.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(variables):
+        scalar = ET.SubElement(listed, "ScalarVariable", _words(model, variable, reference))
+        real = ET.SubElement(scalar, "Real", _attributes(model, variable))
+        if variable.derivative_of is not None and exchange:
+            real.set("derivative", str(variable.derivative_of + 1))
+
+
+def _variables_3(
+    root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], exchange: bool
+) -> None:
+    listed = ET.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(variables):
+        words = _words(model, variable, reference) | _attributes(model, variable)
+        if variable.derivative_of is not None and exchange:
+            words["derivative"] = str(variable.derivative_of)
+        ET.SubElement(listed, "Float64", words)
+    ET.SubElement(
+        listed,
+        "Float64",
+        name="time",
+        valueReference=str(len(variables)),
+        description="Time",
+        causality="independent",
+        variability="continuous",
+        unit="s",
+    )
+    if exchange:
+        for i, contact in enumerate(model.contacts):
+            ET.SubElement(
+                listed,
+                "Float64",
+                name=f"opening{contact_suffix(model, i)}",
+                valueReference=str(len(variables) + 1 + i),
+                description=_text(f"Event indicator, above zero where {contact.name} is open"),
+                causality="local",
+                variability="continuous",
+                initial="calculated",
+            )
+
+
+# --------------------------------------------------------------------------- structure
+
+
+def _initial_unknowns(
+    variables: Sequence[FmuVariable], found: Dependencies, exchange: bool
+) -> list[int]:
+    """References of the outputs, states and derivatives that the initialization computes."""
+    return [r for r in sorted(found.at_start) if variables[r].causality == "output" or exchange]
+
+
+def _structure_2(
+    root: ET.Element, variables: Sequence[FmuVariable], found: Dependencies, exchange: bool
+) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+
+    def unknowns(
+        title: str, references: Iterable[int], known: Mapping[int, tuple[int, ...]]
+    ) -> None:
+        rows = list(references)
+        if not rows:
+            return
+        group = ET.SubElement(structure, title)
+        for r in rows:
+            ET.SubElement(
+                group,
+                "Unknown",
+                index=str(r + 1),
+                dependencies=" ".join(str(k + 1) for k in known[r]),
+            )
+
+    unknowns("Outputs", found.outputs, found.running)
+    if exchange:
+        unknowns("Derivatives", found.derivatives, found.running)
+    unknowns("InitialUnknowns", _initial_unknowns(variables, found, exchange), found.at_start)
+
+
+def _structure_3(
+    root: ET.Element,
+    model: ModalModel,
+    variables: Sequence[FmuVariable],
+    found: Dependencies,
+    exchange: bool,
+) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+
+    def unknown(title: str, reference: int, known: Sequence[int]) -> None:
+        ET.SubElement(
+            structure,
+            title,
+            valueReference=str(reference),
+            dependencies=" ".join(str(k) for k in known),
+        )
+
+    for r in found.outputs:
+        unknown("Output", r, found.running[r])
+    if exchange:
+        for r in found.derivatives:
+            unknown("ContinuousStateDerivative", r, found.running[r])
+    for r in _initial_unknowns(variables, found, exchange):
+        unknown("InitialUnknown", r, found.at_start[r])
+    if exchange:
+        for i in range(len(model.contacts)):
+            unknown("EventIndicator", len(variables) + 1 + i, found.contacts[i])
+
+
+# --------------------------------------------------------------------------- text
+
+
+def _number(value: float) -> str:
+    """Shortest text that reads back as the same number."""
+    return repr(float(value))
+
+
+def _text(text: str) -> str:
+    """One line without characters that XML cannot hold."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
