@@ -190,6 +190,11 @@ class CaseBody(Section):
                     )
         return self
 
+    @property
+    def has_surfaces(self) -> bool:
+        """False for a reduced model and for nodes alone: contact is then at a port only."""
+        return self.reduced is None and self.geometry.nodes is None
+
 
 class ModeChoice(Section):
     """Which elastic modes a body keeps: exactly one of count, frequency and participation."""

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from klack.case.given_consistency import check_given, check_port
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
@@ -21,6 +22,8 @@ def check_consistency(case: "Case") -> None:
     for i, surface in enumerate(case.contact.between):
         check_surface(case, ("contact", "between", i), surface)
     _check_roles(case)
+    if not case.has_surfaces:
+        check_given(case)
     for name in case.bodies:
         check_body(case, name)
     for name in case.reduction.modes:
@@ -68,7 +71,10 @@ def _check_bodies(case: "Case") -> None:
 def check_surface(case: "CaseFile", key: Key, surface: "SurfaceName") -> None:
     """Check that a body has the surface that ``key`` names, as far as a drawing tells."""
     require_known(key, surface.body, case.bodies, "body")
-    profile = case.bodies[surface.body].geometry.profile
+    body = case.bodies[surface.body]
+    if not body.has_surfaces:
+        check_port(key, surface, body)
+    profile = body.geometry.profile
     if profile is not None:
         require_known(key, surface.surface, profile.surfaces, f"surface of {surface.body}")
 
@@ -91,7 +97,7 @@ def _check_roles(case: "Case") -> None:
             on_key=True,
         )
     models = [case.bodies[s.body].geometry.dimension for s in case.contact.between]
-    if models[0] != models[1]:
+    if models[0] != models[1] and case.has_surfaces:
         flat, solid = (moving, stop) if models[0] == 2 else (stop, moving)
         raise CaseProblem(
             ("bodies", flat.body, "geometry", "model"),
@@ -146,6 +152,8 @@ def _check_surfaces(case: "CaseFile", name: str) -> None:
 
 def _check_local_law(case: "Case") -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
+    if not case.has_surfaces:
+        return  # in given_consistency
     if correction == "consistent" and law != "consistent":
         raise CaseProblem(
             ("contact", "local_law", "kind"),

@@ -31,7 +31,17 @@ from klack.case.shots import Shots
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Count, Name, Section
-from klack.units import Force, Frequency, Length, Ratio, Speed, Stiffness, Time, format_si
+from klack.units import (
+    Force,
+    Frequency,
+    Length,
+    Pressure,
+    Ratio,
+    Speed,
+    Stiffness,
+    Time,
+    format_si,
+)
 
 __all__ = [
     "LEVELS",
@@ -101,6 +111,12 @@ class HertzLocalLaw(Section):
 
     kind: Literal["hertz"] = Field(description="Which law: hertz.")
     radius: Length = Field(gt=0, description="Effective radius R: 1/R = 1/R1 + 1/R2.")
+    modulus: Pressure | None = Field(
+        default=None,
+        gt=0,
+        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; that of the "
+        "materials without.",
+    )
 
 
 class SubmodelLocalLaw(Section):
@@ -287,6 +303,11 @@ class Case(CaseFile):
     def dimension(self) -> int:
         """2 if both bodies are axisymmetric, else 3."""
         return self.moving_body.geometry.dimension
+
+    @property
+    def has_surfaces(self) -> bool:
+        """False where a body is a reduced model or nodes alone; see :class:`CaseBody`."""
+        return all(body.has_surfaces for body in self.bodies.values())
 
     def require_levels(self, levels: Iterable[str]) -> tuple[Level, ...]:
         """Check that this case can run the levels; return them without repetition."""

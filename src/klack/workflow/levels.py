@@ -53,8 +53,10 @@ __all__ = [
     "damping_of",
     "elastic_count",
     "first_stiffness",
+    "hertz_coefficient",
     "impact_system",
     "level_result",
+    "lumped_level",
     "mode_pool",
     "mode_pools",
     "own_pair",
@@ -264,7 +266,7 @@ def _law(
     if isinstance(asked, LinearLocalLaw):
         return LinearLaw(asked.stiffness), None
     if isinstance(asked, HertzLocalLaw):
-        return HertzLaw(_hertz_coefficient(problem.case, asked.radius)), None
+        return HertzLaw(hertz_coefficient(problem.case, asked)), None
     if isinstance(asked, SubmodelLocalLaw) or correction != "consistent":
         return LinearLaw(stiffness), None
     modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
@@ -272,8 +274,10 @@ def _law(
     return local.law, local
 
 
-def _hertz_coefficient(case: Case, radius: float) -> float:
-    """4/3 E* sqrt(R) [N/m^1.5] with the materials at the two contact surfaces."""
+def hertz_coefficient(case: Case, law: HertzLocalLaw) -> float:
+    """4/3 E* sqrt(R) [N/m^1.5] with the given modulus, or the materials of the two bodies."""
+    if law.modulus is not None:
+        return 4.0 / 3.0 * law.modulus * float(np.sqrt(law.radius))
     inverse = 0.0
     for name, body in case.bodies.items():
         if not isinstance(body.material, str):
@@ -284,7 +288,7 @@ def _hertz_coefficient(case: Case, radius: float) -> float:
                 hint="take the consistent law, which needs no such choice.",
             )
         inverse += 1.0 / case.materials_of(name, [name])[name].plane_strain_modulus
-    return 4.0 / 3.0 / inverse * float(np.sqrt(radius))
+    return 4.0 / 3.0 / inverse * float(np.sqrt(law.radius))
 
 
 def run_reduced(
@@ -311,16 +315,34 @@ def _simulate(case: Case, pair: ReducedPair) -> ImpactHistory:
 
 
 def impact_system(
-    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
+    case: Case,
+    upper: ReducedBody,
+    lower: ReducedBody,
+    law: ContactLaw,
+    *,
+    ports: tuple[str, str] = (PORT, PORT),
+    series_compliance: float = 0.0,
 ) -> ReducedSystem:
-    """Both bodies of a case, their contact, and the force and spring that act on the upper one."""
+    """Both bodies of a case, their contact, and the force and spring that act on the upper one.
+
+    Parameters
+    ----------
+    case : Case
+    upper, lower : ReducedBody
+    law : contact law
+    ports : pair of str
+        Where they meet, on the upper and on the lower body.
+    series_compliance : float [m/N]
+        In series with the law.
+    """
     contact = ContactPair(
         body_a=upper.name,
-        port_a=PORT,
+        port_a=ports[0],
         body_b=lower.name,
-        port_b=PORT,
+        port_b=ports[1],
         law=law,
         gap=_gap(case),
+        series_compliance=series_compliance,
     )
     spring = case.motion.spring
     closing = case.motion.force
@@ -328,7 +350,7 @@ def impact_system(
     if spring is not None:
         # the preload is the force at first touch; a gap above it the spring pushes harder
         closing += spring.preload + spring.stiffness * _gap(case)
-        springs = (ReturnSpring(body=upper.name, port=PORT, stiffness=spring.stiffness),)
+        springs = (ReturnSpring(body=upper.name, port=ports[0], stiffness=spring.stiffness),)
     forces: tuple[AxialForce, ...] = ()
     if closing != 0:
         forces = (AxialForce(body=upper.name, force=-closing),)
@@ -352,16 +374,20 @@ def _gap(case: Case) -> float:
 
 def run_lumped(problem: ContactProblem) -> LevelResult:
     """Impact of rigid masses on one spring, with or without loss: the baseline."""
-    case = problem.case
+    bodies = (problem.pair.upper, problem.pair.lower)
+    masses = {body.name: None if body.is_fixed else body.mass for body in bodies}
+    return lumped_level(problem.case, masses)
+
+
+def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
+    """Impact of rigid masses: upper body, then lower body; None for one that is held."""
     if case.lumped is None:  # refused by require_levels already
         raise InputError(
             "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it to the case."
         )
     bodies = [
-        fixed_body(body.name, port=PORT)
-        if body.is_fixed
-        else rigid_mass_body(body.name, body.mass, port=PORT)
-        for body in (problem.pair.upper, problem.pair.lower)
+        fixed_body(name, port=PORT) if mass is None else rigid_mass_body(name, mass, port=PORT)
+        for name, mass in masses.items()
     ]
     law: ContactLaw = LinearLaw(case.lumped.stiffness)
     if case.lumped.restitution is not None:
