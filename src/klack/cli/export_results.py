@@ -16,7 +16,7 @@ __all__ = ["export_fields", "export_result", "run_and_export"]
 
 def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
     """Write the histories of a stored study."""
-    from klack.exchange.results.table import result_table
+    from klack.exchange.results.study_table import result_table
     from klack.workflow.stroke_study import StrokeStudy
     from klack.workflow.study import ImpactStudy
 
