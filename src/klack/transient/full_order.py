@@ -47,7 +47,14 @@ from klack.elasticity.factorization import Backend, Factorization, Precision, fa
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.transient.inertia import InverseMass, massless_nodes
 from klack.transient.interface_solve import interface_solve
-from klack.transient.result import EnergyRecord, FieldsOfBody, FullOrderResult, SolverStatistics
+from klack.transient.result import (
+    EnergyRecord,
+    FieldsOfBody,
+    FullOrderResult,
+    MotionOfBody,
+    Snapshots,
+    SolverStatistics,
+)
 
 __all__ = ["Scheme", "recommended_step", "simulate_full_order"]
 
@@ -99,6 +106,7 @@ def simulate_full_order(
     precision: Precision = "double",
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
+    snapshots: Snapshots | None = None,
 ) -> FullOrderResult:
     """Let body a fly in -z onto body b and follow both until ``duration``.
 
@@ -136,6 +144,8 @@ def simulate_full_order(
         Threads of the factorisation; with two or more the two bodies also advance side by side.
     progress : callable, optional
         Called now and then with the fraction done, 0 to 1.
+    snapshots : Snapshots, optional
+        Who wants to see the fields on the way.
 
     Raises
     ------
@@ -188,7 +198,8 @@ def simulate_full_order(
         steps = ceil(duration / step * (1.0 - 1e-9))
         # products of contact size: more threads only wait for each other, at twice the time
         with threadpool_limits(limits=1, user_api="blas"):
-            record = _march(run, steps, stop_after_separation, energy_interval, progress)
+            show = None if snapshots is None else partial(_show, run, start, snapshots)
+            record = _march(run, steps, stop_after_separation, energy_interval, progress, show)
         loop_time = perf_counter() - begin - set_up_time
         return _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
 
@@ -556,9 +567,12 @@ def _march(
     stop_after_separation: float | None,
     energy_interval: int,
     progress: Callable[[float], None] | None,
+    show: Callable[[], None] | None,
 ) -> _Record:
     """All steps, with the record."""
     record = _Record(run)
+    if show is not None:
+        show()
     patience = inf if stop_after_separation is None else stop_after_separation / run.step
     for number in range(1, steps + 1):
         try:
@@ -569,6 +583,8 @@ def _march(
                 f"start of the record: {error}"
             ) from error
         record.keep_step(run, force, gap)
+        if show is not None:
+            show()
         _check_rim(run)
         if number % energy_interval == 0:
             record.keep_energy(run)
@@ -581,6 +597,21 @@ def _march(
     if progress is not None:
         progress(1.0)
     return record
+
+
+def _show(run: _Run, start: float, snapshots: Snapshots) -> None:
+    """Hand out the fields, if it is time."""
+    if run.steps % snapshots.interval:
+        return
+    motion = tuple(
+        MotionOfBody(
+            name=body.name,
+            displacement=body.whole(body.u),
+            velocity=body.whole(body.velocity(run.y)),
+        )
+        for body in run.bodies
+    )
+    snapshots.receive(start + run.steps * run.step, motion)
 
 
 def _check_rim(run: _Run) -> None:

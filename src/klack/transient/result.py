@@ -1,5 +1,6 @@
 """What a full-order impact leaves behind."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,14 @@ from numpy.typing import NDArray
 
 from klack.contact.history import ImpactHistory
 
-__all__ = ["EnergyRecord", "FieldsOfBody", "FullOrderResult", "SolverStatistics"]
+__all__ = [
+    "EnergyRecord",
+    "FieldsOfBody",
+    "FullOrderResult",
+    "MotionOfBody",
+    "Snapshots",
+    "SolverStatistics",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,6 +73,39 @@ class FieldsOfBody:
     peak_displacement: NDArray[np.float64]
     end_displacement: NDArray[np.float64]
     end_velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionOfBody:
+    """Where one body is at one instant, all degrees of freedom (zero where fixed).
+
+    Parameters
+    ----------
+    name : str
+    displacement : array, shape (n_dof,) [m]
+        Counted from the given placement, with the flight to the first touch.
+    velocity : array, shape (n_dof,) [m/s]
+    """
+
+    name: str
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Snapshots:
+    """Asks a run for its fields while it goes on; nothing is kept but by the one who asks.
+
+    Parameters
+    ----------
+    interval : int
+        Steps from one instant to the next; the first is the start.
+    receive : callable
+        Called with the time [s] and a tuple of :class:`MotionOfBody`, body a first.
+    """
+
+    interval: int
+    receive: Callable[[float, tuple[MotionOfBody, ...]], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
