@@ -1,0 +1,173 @@
+"""C compilers for the binaries of an FMU: that of the system, or the one of the package ziglang."""
+
+import importlib.util
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from klack.errors import ConvergenceError, InputError
+from klack.input.problem import one_of
+
+__all__ = ["PLATFORMS", "Target", "compile_library", "require_compilers", "this_platform"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """A platform that binaries can be made for.
+
+    Parameters
+    ----------
+    folders : tuple of str
+        Of its binaries inside an FMU of version 2 and of version 3.
+    suffix : str
+        Of a shared library.
+    triple : str
+        What zig calls it.
+    cross : tuple of str
+        Programs that compile for it on any machine.
+    package : str
+        Words for who has none of them.
+    """
+
+    folders: tuple[str, str]
+    suffix: str
+    triple: str
+    cross: tuple[str, ...]
+    package: str
+
+    def folder(self, fmi: int) -> str:
+        """Folder under ``binaries``."""
+        return self.folders[fmi - 2]
+
+
+_LOCAL = ("gcc", "cc", "clang")  # for the machine that they run on
+
+PLATFORMS = {
+    "linux64": Target(
+        folders=("linux64", "x86_64-linux"),
+        suffix=".so",
+        triple="x86_64-linux-gnu",
+        cross=(),
+        package="gcc",
+    ),
+    "win64": Target(
+        folders=("win64", "x86_64-windows"),
+        suffix=".dll",
+        triple="x86_64-windows-gnu",
+        cross=("x86_64-w64-mingw32-gcc",),
+        package="mingw-w64",
+    ),
+    "darwin64": Target(
+        folders=("darwin64", "x86_64-darwin"),
+        suffix=".dylib",
+        triple="x86_64-macos",
+        cross=(),
+        package="the Xcode command line tools",
+    ),
+    "aarch64-linux": Target(
+        folders=("aarch64-linux", "aarch64-linux"),
+        suffix=".so",
+        triple="aarch64-linux-gnu",
+        cross=(),
+        package="gcc",
+    ),
+    "aarch64-darwin": Target(
+        folders=("aarch64-darwin", "aarch64-darwin"),
+        suffix=".dylib",
+        triple="aarch64-macos",
+        cross=(),
+        package="the Xcode command line tools",
+    ),
+}
+"""Platforms by their names in FMI 2.0; where that has none, by those of FMI 3.0."""
+
+# no fused multiplications: every processor computes the same numbers
+_OPTIONS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-shared")
+_LOG_TAIL = 2000
+
+
+def this_platform() -> str:
+    """Name of the platform that this program runs on."""
+    arm = platform.machine().lower() in ("arm64", "aarch64")
+    if sys.platform == "win32":
+        return "win64"
+    if sys.platform == "darwin":
+        return "aarch64-darwin" if arm else "darwin64"
+    return "aarch64-linux" if arm else "linux64"
+
+
+def require_compilers(platforms: Sequence[str] | None) -> None:
+    """Check that there is a compiler for every platform; None is that of this program.
+
+    Raises
+    ------
+    InputError
+        For an unknown platform, and for one without compiler; the text says what to install.
+    """
+    for name in (this_platform(),) if platforms is None else platforms:
+        _command(name)
+
+
+def compile_library(
+    sources: Sequence[Path], include: Sequence[Path], library: Path, *, platform: str
+) -> None:
+    """Compile C sources into a shared library without other dependencies than the C library.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+    include : sequence of Path
+        Folders of headers.
+    library : Path
+        Written; its folder exists.
+    platform : str
+        One of :data:`PLATFORMS`.
+
+    Raises
+    ------
+    InputError
+        Without a compiler for that platform.
+    ConvergenceError
+        If the compiler fails; its words are in the text.
+    """
+    command = [*_command(platform), *_OPTIONS]
+    if PLATFORMS[platform].suffix == ".dll":
+        command += ["-static-libgcc"]
+    else:
+        command += ["-fPIC"]
+    command += [f"-I{folder}" for folder in include] + [str(source) for source in sources]
+    command += ["-o", str(library), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode != 0 or not library.is_file():
+        raise ConvergenceError(
+            f"compiling an FMU for {platform}: {command[0]} failed.\n{done.stderr[-_LOG_TAIL:]}\n"
+            "Try: another compiler; the sources need C99 and nothing else."
+        )
+
+
+def _command(name: str) -> list[str]:
+    """Start of the command line of the compiler for a platform."""
+    if name not in PLATFORMS:
+        raise InputError(
+            "platforms of an FMU",
+            got=f"'{name}'",
+            expected=f"one of: {one_of(list(PLATFORMS))}",
+            hint="linux64 and win64 are usual.",
+        )
+    target = PLATFORMS[name]
+    programs = target.cross + (_LOCAL if name == this_platform() else ())
+    for program in programs:
+        if found := shutil.which(program):
+            return [found]
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", target.triple]
+    raise InputError(
+        f"compiling an FMU for {name}",
+        got="no C compiler for it",
+        expected=f"one of: {one_of([*programs, 'the Python package ziglang'])}",
+        hint=f"install {target.package}, or pip install 'klack[exchange]', which brings ziglang.",
+    )
