@@ -1,0 +1,53 @@
+"""The folder that models are written into."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from klack.errors import InputError
+from klack.exchange.modal_model import ModalModel
+from klack.exchange.results.whole_file import whole_files
+
+__all__ = ["LONGEST", "model_folder"]
+
+LONGEST = 55
+"""Characters of the name of a model; MATLAB allows 63 for the name of a file."""
+
+
+@contextmanager
+def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
+    """Give a place for the files of these models; they move into ``folder`` when all are complete.
+
+    Raises
+    ------
+    InputError
+        For two models of one name (small and capital letters are the same, as for many file
+        systems), a name that is too long, a model without modes, or a folder that cannot be
+        written to.
+    """
+    for name, count in Counter(model.name.lower() for model in models).items():
+        if count > 1:
+            raise InputError(
+                str(folder),
+                got=f"{count} models of the name '{name}'",
+                expected="distinct names",
+                hint="rename a body of the case.",
+            )
+    for model in models:
+        if len(model.name) > LONGEST:
+            raise InputError(
+                str(folder),
+                got=f"the model name '{model.name}' of {len(model.name)} characters",
+                expected=f"at most {LONGEST}, so that MATLAB takes it with an ending",
+                hint="give the case or the body a shorter name.",
+            )
+        if model.mode_count == 0:
+            raise InputError(
+                f"model '{model.name}'",
+                got="no modes",
+                expected="a body that can move",
+                hint="a rigid wall needs no model: leave it out.",
+            )
+    with whole_files(folder) as stage:
+        yield stage

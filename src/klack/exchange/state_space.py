@@ -1,0 +1,274 @@
+r"""State space of a modal model: first order A, B, C, D and sparse second order M, D, K, B, C.
+
+With the state ``x = (q, v)`` of modal displacements and velocities and the forces ``u``,
+
+.. math::
+    \dot x = A x + B u + x_c, \qquad y = C x + D u + y_0 .
+
+A body has the forces on its ports as inputs.  A pair has the outside forces, then the force of each
+contact; its outputs end with the gap of each contact.  So the pair becomes the model of
+:mod:`klack.exchange.modal_model` as soon as each contact force is fed back from its gap.
+``x_c`` and ``y_0`` (constant forces, gaps at ``q = 0``) are zero for a body.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, diags_array
+
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.errors import InputError, MissingExtraError
+from klack.exchange.modal_model import ModalModel, ModelContact
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = [
+    "ContactKind",
+    "SecondOrder",
+    "StateSpace",
+    "contact_kind",
+    "law_table",
+    "second_order",
+    "start_speed",
+    "state_space",
+    "to_control",
+]
+
+ContactKind = Literal["none", "linear", "power", "table"]
+"""A squeeze film alone, ``F = k d``, ``F = K d^n``, piecewise cubic."""
+
+_LARGEST = 2**31 - 2**20
+"""Bytes of A: MATLAB files of version 5 hold less than 2 GiB in one structure."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StateSpace:
+    """First-order form of ``n = 2 m`` states.
+
+    Parameters
+    ----------
+    A, B, C, D : array, shapes (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
+        D is zero: what the modes miss is not in it.
+    residual_feedthrough : array, shape (n_outputs, n_inputs) [m/N]
+        D with the residual compliance of a body, for those who want it; zero for a pair.
+    constant_rate : array, shape (n,)
+        ``x_c``.
+    output_offset : array, shape (n_outputs,)
+        ``y_0``.
+    start : array, shape (n,)
+        State at the start.
+    state_names, state_units, input_names, input_units, output_names, output_units : tuple of str
+        Modal displacements are in m sqrt(kg).
+    """
+
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    C: NDArray[np.float64]
+    D: NDArray[np.float64]
+    residual_feedthrough: NDArray[np.float64]
+    constant_rate: NDArray[np.float64]
+    output_offset: NDArray[np.float64]
+    start: NDArray[np.float64]
+    state_names: tuple[str, ...]
+    state_units: tuple[str, ...]
+    input_names: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_names: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SecondOrder:
+    """Second-order form ``M q'' + D q' + K q = B u``, ``y = C q + G q'``, sparse.
+
+    Parameters
+    ----------
+    M, D, K : sparse array, shape (m, m)
+        Identity, ``2 zeta omega``, ``omega^2``.
+    B : sparse array, shape (m, n_inputs)
+    C, G : sparse array, shape (n_outputs, m)
+        Of modal displacements and velocities.
+    """
+
+    M: csc_array
+    D: csc_array
+    K: csc_array
+    B: csc_array
+    C: csc_array
+    G: csc_array
+
+
+def state_space(model: ModalModel) -> StateSpace:
+    """Return the first-order form with inputs, outputs and contacts in the order of the model.
+
+    Raises
+    ------
+    InputError
+        For so many modes that A would not fit into 2 GB, or for none.
+    """
+    m = model.mode_count
+    _require_size(model)
+    push, moved, speed = _matrices(model)
+    A = np.zeros((2 * m, 2 * m))
+    i = np.arange(m)
+    A[i, m + i] = 1.0
+    A[m + i, i] = -(model.omega**2)
+    A[m + i, m + i] = -2.0 * model.damping * model.omega
+    offsets = [output.offset for output in model.outputs]
+    contacts = [contact.name for contact in model.contacts]
+    D = np.zeros((len(moved), push.shape[1]))
+    return StateSpace(
+        A=A,
+        B=np.vstack([np.zeros_like(push), push]),
+        C=np.hstack([moved, speed]),
+        D=D,
+        residual_feedthrough=_with_residual(model, D),
+        constant_rate=np.concatenate([np.zeros(m), model.constant]),
+        output_offset=np.array([*offsets, *(contact.gap for contact in model.contacts)]),
+        start=np.concatenate([model.start, model.start_velocity]),
+        state_names=tuple(f"{kind}_{name}" for kind in "qv" for name in model.mode_names),
+        state_units=("m.kg^(1/2)",) * m + ("m/s.kg^(1/2)",) * m,
+        input_names=(
+            *(item.name for item in model.inputs),
+            *(f"total_force_{name}" for name in contacts),
+        ),
+        input_units=("N",) * push.shape[1],
+        output_names=(
+            *(output.name for output in model.outputs),
+            *(f"gap_{name}" for name in contacts),
+        ),
+        output_units=(
+            *("m" if output.quantity == "displacement" else "m/s" for output in model.outputs),
+            *("m" for _ in contacts),
+        ),
+    )
+
+
+def second_order(model: ModalModel) -> SecondOrder:
+    """Return the second-order form, with the inputs and outputs of :func:`state_space`."""
+    push, moved, speed = _matrices(model)
+    return SecondOrder(
+        M=csc_array(diags_array(np.ones(model.mode_count))),
+        D=csc_array(diags_array(2.0 * model.damping * model.omega)),
+        K=csc_array(diags_array(model.omega**2)),
+        B=csc_array(push),
+        C=csc_array(moved),
+        G=csc_array(speed),
+    )
+
+
+def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "control.StateSpace":
+    """Return the linear part as an object of the package python-control, with all names.
+
+    Constant forces, gaps at ``q = 0`` and the state at the start are not part of such an object:
+    see :func:`state_space`.
+
+    Parameters
+    ----------
+    model : ModalModel
+    residual_compliance : bool
+        Put what the modes of a body miss into D.
+
+    Raises
+    ------
+    MissingExtraError
+        Without the package ``control``.
+    """
+    try:
+        import control
+    except ImportError as error:
+        raise MissingExtraError("control", "A model for python-control", "control") from error
+    form = state_space(model)
+    return control.StateSpace(
+        form.A,
+        form.B,
+        form.C,
+        form.residual_feedthrough if residual_compliance else form.D,
+        name=model.name,
+        states=list(form.state_names),
+        inputs=list(form.input_names),
+        outputs=list(form.output_names),
+        remove_useless_states=False,
+    )
+
+
+def start_speed(model: ModalModel) -> float:
+    """Velocity [m/s] of the moving body of a pair at the start, + opening; 0 for a body."""
+    square = float(model.rise @ model.rise)
+    return float(model.rise @ model.start_velocity) / square if square else 0.0
+
+
+def contact_kind(contact: ModelContact) -> ContactKind:
+    """Form of the elastic law of a contact.
+
+    Raises
+    ------
+    InputError
+        For a law with dissipation: it needs the speed of each first touch, and would count the
+        wave losses of bodies with modes twice.
+    """
+    law = contact.law
+    if law is None:
+        return "none"
+    if isinstance(law, LinearLaw):
+        return "linear"
+    if isinstance(law, HertzLaw):
+        return "power"
+    if isinstance(law, TableLaw):
+        return "table"
+    assert isinstance(law, HuntCrossley)
+    raise InputError(
+        f"contact '{contact.name}'",
+        got="a law with dissipation (Hunt and Crossley)",
+        expected="an elastic law: consistent, linear, Hertz or table",
+        hint="bodies with modes lose energy by themselves; use the consistent law of klack.",
+    )
+
+
+def law_table(contact: ModelContact) -> NDArray[np.float64]:
+    """Rows of a table law: start [m], force there [N], factors of s, s^2, s^3; shape (k, 5).
+
+    The last row has no end: it is the linear continuation.
+    """
+    law = contact.law
+    assert isinstance(law, TableLaw)
+    return np.column_stack([law.indentation, law.force_points, *law.coefficients])
+
+
+def _matrices(
+    model: ModalModel,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Modal forces of inputs and contacts; factors of q and of v in outputs and gaps."""
+    gaps = np.array([contact.shape for contact in model.contacts]).reshape(-1, model.mode_count)
+    moved, speed = model.output_matrices()
+    return (
+        np.hstack([model.input_matrix(), gaps.T]),
+        np.vstack([moved, gaps]),
+        np.vstack([speed, np.zeros_like(gaps)]),
+    )
+
+
+def _with_residual(model: ModalModel, D: NDArray[np.float64]) -> NDArray[np.float64]:
+    """D with the residual compliance at the displacements of the ports that have an input."""
+    out = D.copy()
+    if model.kind == "body":
+        rows = {output.name: i for i, output in enumerate(model.outputs)}
+        for k, item in enumerate(model.inputs):
+            row = rows.get(f"displacement_{item.name.removeprefix('force_')}")
+            if row is not None:
+                out[row] = model.residual_compliance[k]
+    return out
+
+
+def _require_size(model: ModalModel) -> None:
+    states = 2 * model.mode_count
+    if states**2 * 8 > _LARGEST:
+        raise InputError(
+            f"model '{model.name}'",
+            got=f"{states} states: a dense A of {states**2 * 8 / 2**30:.1f} GiB",
+            expected="less than 2 GiB, the limit of MATLAB files of version 5",
+            hint="keep fewer modes: frequencies above 2 MHz do not matter for an impact.",
+        )
