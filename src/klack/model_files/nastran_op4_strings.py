@@ -1,0 +1,151 @@
+"""Strings of non-zeros of an OUTPUT4 matrix, collected while its records are gone through."""
+
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+
+__all__ = ["Op4Header", "Op4Strings"]
+
+_PACKED = 65536
+_SINGLE, _DOUBLE = 1, 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Op4Header:
+    """Heading of a matrix.
+
+    Parameters
+    ----------
+    name : str
+    columns : int
+        And rows: it is square.
+    double : bool
+        Double precision.
+    big : bool
+        Strings have a head of two integers.
+    """
+
+    name: str
+    columns: int
+    double: bool
+    big: bool
+
+    @classmethod
+    def checked(cls, where: str, head: list[int], name: str) -> Self:
+        """Check columns, rows, form and type.
+
+        Raises
+        ------
+        InputError
+            For complex and for rectangular matrices.
+        """
+        columns, rows, _, kind = head
+        name = name.strip(" \0")
+        if kind not in (_SINGLE, _DOUBLE) or abs(rows) != columns or columns < 1:
+            raise InputError(
+                f"{where}: {name}",
+                got=f"a matrix of {abs(rows)} rows, {columns} columns and type {kind}",
+                expected="a square matrix of type 1 or 2 (real)",
+                hint="write K and M alone, of a model without damping.",
+            )
+        return cls(
+            name=name,
+            columns=columns,
+            double=kind == _DOUBLE,
+            big=rows < 0 or rows >= _PACKED,
+        )
+
+
+@dataclass(kw_only=True)
+class Op4Strings:
+    """Where the values of a binary matrix lie: column, first row, first byte and count each.
+
+    Parameters
+    ----------
+    header : Op4Header
+    data : array of bytes
+        The file.
+    order : {"<", ">"}
+        Of bytes.
+    word : {4, 8}
+        Bytes of an integer and of a number in single precision.
+    """
+
+    header: Op4Header
+    data: NDArray[np.uint8]
+    order: str = "<"
+    word: int = 4
+    column: list[int] = field(default_factory=list)
+    row: list[int] = field(default_factory=list)
+    first: list[int] = field(default_factory=list)
+    count: list[int] = field(default_factory=list)
+
+    @property
+    def item(self) -> int:
+        """Bytes of a value."""
+        return 8 if self.header.double else self.word
+
+    def add_column(self, where: str, column: int, row: int, first: int, words: int) -> None:
+        """Take a column of ``words`` words from byte ``first``; ``row`` is 0 for strings."""
+        per_value = self.item // self.word
+        if row > 0:
+            self._add(where, column, row, first, words, per_value)
+            return
+        end = first + words * self.word
+        heads = self.data[first:end].view(f"{self.order}i{self.word}")
+        at = 0
+        while at < words:
+            if self.header.big:
+                length, row = int(heads[at]) - 1, int(heads[at + 1]) if at + 1 < words else 0
+                at += 2
+            else:
+                packed = int(heads[at])
+                length = (packed >> 16) - 1
+                row = packed - ((length + 1) << 16)
+                at += 1
+            if length < 0 or at + length > words:
+                raise _damaged(where)
+            self._add(where, column, row, first + at * self.word, length, per_value)
+            at += length
+
+    def _add(self, where: str, column: int, row: int, first: int, words: int, per: int) -> None:
+        count = words // per
+        if words % per or row < 1 or row - 1 + count > self.header.columns:
+            raise _damaged(where)
+        self.column.append(column)
+        self.row.append(row)
+        self.first.append(first)
+        self.count.append(count)
+
+    def entries(
+        self, where: str
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """Row, column (from zero) and value of all non-zeros."""
+        count = np.array(self.count, dtype=np.int64)
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        row = np.repeat(np.array(self.row, dtype=np.int64) - 1, count) + within
+        column = np.repeat(np.array(self.column, dtype=np.int64) - 1, count)
+        value = self._values(count)
+        kept = (value != 0) | (row == column)
+        return row[kept], column[kept], value[kept]
+
+    def _values(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
+        kind = np.dtype(f"{self.order}f{self.item}")
+        parts = [
+            self.data[first : first + n * self.item].view(kind)
+            for first, n in zip(self.first, count.tolist(), strict=True)
+        ]
+        return np.concatenate(parts).astype(np.float64) if parts else np.empty(0)
+
+
+def _damaged(where: str) -> InputError:
+    return InputError(
+        where,
+        got="a string of numbers that does not fit its column",
+        expected="strings inside of the matrix",
+        hint="the file is damaged; write it again.",
+    )

@@ -1,0 +1,197 @@
+"""One stiffness or mass matrix as its file has it: its numbers, and what its rows mean."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from klack.errors import InputError
+
+__all__ = ["Role", "RowPlaces", "SystemMatrix", "choose_matrix", "symmetric_matrix"]
+
+Role = Literal["stiffness", "mass"]
+
+_LARGEST_ASYMMETRY = 1e-6
+_SEEN_ASYMMETRY = 1e-12
+_USUAL_NAMES: dict[Role, frozenset[str]] = {
+    "stiffness": frozenset(
+        "k stiffness stiff stif kmat kaa kaax kgg kggx kjj kjjx kll kff kxx kbb k2gg".split()
+    ),
+    "mass": frozenset("m mass mas mmat maa maax mgg mggx mjj mjjx mll mff mxx mbb m2gg".split()),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowPlaces:
+    """Node and direction of every row of a matrix.
+
+    Parameters
+    ----------
+    node : int array, shape (n,)
+        Number of the node in its program.
+    direction : int array, shape (n,)
+        1, 2, 3 for x, y, z (1, 2 for r, z of a body of revolution); 4 to 6 for rotations.
+    """
+
+    node: NDArray[np.int64]
+    direction: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SystemMatrix:
+    """A symmetric matrix in the units of its file.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        In the file; empty where the file holds one matrix without name.
+    matrix : csr_array, shape (n, n)
+        Both triangles.
+    rows : RowPlaces or None
+        None where the file does not say.
+    held : RowPlaces or None
+        Degrees of freedom that the program has taken out because they are constrained.
+    notes : tuple of str
+        What was found while reading.
+    """
+
+    path: Path
+    name: str
+    matrix: csr_array
+    rows: RowPlaces | None = None
+    held: RowPlaces | None = None
+    notes: tuple[str, ...] = ()
+
+
+def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Role | None) -> str:
+    """Name of one matrix of a file: the wanted one, the only one, or the one of the usual name.
+
+    Raises
+    ------
+    InputError
+        If none or several fit; lists the names there are.
+    """
+    known = list(dict.fromkeys(names))
+    if wanted is not None:
+        found = [name for name in known if name == wanted] or [
+            name for name in known if name.lower() == wanted.lower()
+        ]
+    elif len(known) == 1:
+        found = known
+    else:
+        usual = _USUAL_NAMES.get(role, frozenset()) if role else frozenset()
+        found = [name for name in known if name.lower() in usual]
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(repr(name) for name in known[:12]) + (", ..." if len(known) > 12 else "")
+    key = f"{role or 'stiffness'}_name"
+    raise InputError(
+        where,
+        got=f"no matrix '{wanted}'" if wanted else f"{len(known)} matrices",
+        expected=f"one of: {listed}" if known else "a matrix",
+        hint=f"say which one with {key}." if known else "check what was written to this file.",
+    )
+
+
+def symmetric_matrix(
+    where: str,
+    row: NDArray[np.int64],
+    column: NDArray[np.int64],
+    value: NDArray[np.float64],
+    size: int,
+) -> tuple[csr_array, tuple[str, ...]]:
+    """Build a symmetric matrix from its entries: a lower, an upper or both triangles.
+
+    Parameters
+    ----------
+    where : str
+        File, for errors.
+    row, column : int arrays
+        From zero.
+    value : array
+    size : int
+        Number of rows.
+
+    Returns
+    -------
+    matrix : csr_array, shape (size, size)
+    notes : tuple of str
+
+    Raises
+    ------
+    InputError
+        For entries outside, entries given twice, numbers that are not finite, fewer entries than
+        rows, and for a matrix that is not symmetric (with its asymmetry).
+    """
+    _check_entries(where, row, column, value, size)
+    A = coo_array((value, (row, column)), shape=(size, size)).tocsr()
+    if A.nnz < len(value):
+        raise InputError(
+            where,
+            got=f"{len(value) - A.nnz} entries that are given twice",
+            expected="each entry once",
+            hint="write the matrix again; do not join files of several steps.",
+        )
+    below, above = bool(np.any(row > column)), bool(np.any(row < column))
+    if below != above:
+        A = csr_array(A + A.T.tocsr())
+        A.setdiag(A.diagonal() / 2)
+        return A, (f"its {'lower' if below else 'upper'} triangle was stored",)
+    if not below:
+        return A, ("it is diagonal",)
+    return _symmetrised(where, A)
+
+
+def _symmetrised(where: str, A: csr_array) -> tuple[csr_array, tuple[str, ...]]:
+    difference = (A - A.T).tocsr()
+    size = float(np.linalg.norm(A.data))
+    asymmetry = float(np.linalg.norm(difference.data)) / size if size else 0.0
+    if not asymmetry <= _LARGEST_ASYMMETRY:
+        raise InputError(
+            where,
+            got=f"a matrix that is not symmetric: |A - A^T| / |A| = {asymmetry:.2g}",
+            expected=f"at most {_LARGEST_ASYMMETRY:g}",
+            hint="write K and M of a linear elastic model without friction, follower loads or "
+            "rotating frame; dampers have no place in them.",
+        )
+    if asymmetry == 0.0:
+        return A, ()
+    notes = (f"asymmetry {asymmetry:.1g}, made symmetric",) if asymmetry > _SEEN_ASYMMETRY else ()
+    return csr_array(A - 0.5 * difference), notes
+
+
+def _check_entries(
+    where: str,
+    row: NDArray[np.int64],
+    column: NDArray[np.int64],
+    value: NDArray[np.float64],
+    size: int,
+) -> None:
+    if size < 1 or len(value) < size:
+        raise InputError(
+            where,
+            got=f"{size} rows with {len(value)} entries",
+            expected="one entry or more in every row",
+            hint="the file is cut off, or its mass matrix leaves nodes without mass.",
+        )
+    for index in (row, column):
+        low, high = int(index.min()), int(index.max())
+        if low < 0 or high >= size:
+            raise InputError(
+                where,
+                got=f"an entry in row or column {(low if low < 0 else high) + 1}",
+                expected=f"1 to {size}",
+                hint="the file is damaged; write it again.",
+            )
+    if not np.all(np.isfinite(value)):
+        raise InputError(
+            where,
+            got=f"{np.count_nonzero(~np.isfinite(value))} entries that are no finite numbers",
+            expected="finite numbers",
+            hint="the run that made the matrix has failed; check its log.",
+        )
