@@ -279,6 +279,9 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             hint="reduce with modal or Rayleigh damping, or give force and displacement of one "
             "place.",
         )
+    own_share = np.diag(G.real)
+    if own_share.min() < -limit:
+        raise _makes_energy(where, ports[int(np.argmin(own_share))], float(own_share.min()))
     apart = np.abs(G.real - G.real.T)
     if np.max(apart) > limit:
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(apart)), apart.shape))
@@ -292,14 +295,17 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
         )
     values, vectors = np.linalg.eigh(0.5 * (G.real + G.real.T))
     if values[0] < -limit:
-        port = ports[int(np.argmax(np.abs(vectors[:, 0])))]
-        raise InputError(
-            where,
-            got=f"a share of {values[0]:.6g} 1/kg at port '{port}'",
-            expected="shares of 0 or more (passivity): force and displacement point the same way",
-            hint="check the signs of input and output, and that the output is a displacement, not "
-            "an acceleration.",
-        )
+        raise _makes_energy(where, ports[int(np.argmax(np.abs(vectors[:, 0])))], float(values[0]))
+
+
+def _makes_energy(where: str, port: str, share: float) -> InputError:
+    return InputError(
+        where,
+        got=f"a share of {share:.6g} 1/kg at port '{port}'",
+        expected="shares of 0 or more (passivity): force and displacement point the same way",
+        hint="check the signs of input and output, and that the output is a displacement, not "
+        "an acceleration.",
+    )
 
 
 def _not_displacement(where: str) -> InputError:

@@ -107,14 +107,15 @@ def body_of_modes(
 def shapes_of_gram(gram: Floats, most: int) -> Floats:
     r"""Factor :math:`G = \sum_k \varphi_k \varphi_k^T`, shape (most, n_ports), largest first.
 
-    The component of the largest magnitude of each shape is positive.
+    The first component of (nearly) the largest magnitude of each shape is positive.
     """
     values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
     order = np.argsort(values)[::-1][:most]
     shapes = np.zeros((most, len(gram)))
     shapes[: len(order)] = (vectors[:, order] * np.sqrt(np.maximum(values[order], 0.0))).T
     for shape in shapes:
-        if shape[np.argmax(np.abs(shape))] < 0:
+        size = np.abs(shape)
+        if shape[np.argmax(size >= 0.99 * size.max(initial=0.0))] < 0:
             shape *= -1.0
     return shapes
 
