@@ -11,6 +11,10 @@ import pytest
 
 from klack.case import load_case, read_case, shipped_cases
 from klack.case.schema import Case
+from klack.contact.laws import LinearLaw
+from klack.simulation.bodies import rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 from klack.workflow.impact import run_impact
 from klack.workflow.shots import run_shots
 from klack.workflow.study import ImpactStudy
@@ -35,6 +39,7 @@ def test_all_shipped_cases_are_tested():
         "demo-stroke",  # in test_workflow_stroke.py
         "demo-valve",
         "demo-valve-axisymmetric",
+        "from-other-tools",
         "measured",  # in test_measured_strokes.py
         "needle-from-inp",
         "sphere-on-rod",
@@ -95,6 +100,31 @@ def test_two_rods_follow_wave_theory():
         assert np.mean(result.history.force[middle]) == pytest.approx(plateau, rel=0.01)
         assert result.measures.impulse == pytest.approx(plateau * duration, rel=0.005)
         assert result.measures.restitution == pytest.approx(0.5, abs=0.005)
+
+
+def test_reduced_models_of_other_programs_follow_wave_theory_and_the_exact_rods():
+    """St Venant as above; the files hold the exact rods, the universal file in five decimals."""
+    study = study_of("from-other-tools", "reduced")
+    result = study.levels["reduced"]
+    steel = {"young": 210e9, "density": 7850.0, "area": pi * 0.002**2}
+    needle = rod_body("needle", length=0.040, elastic_modes=40, **steel)
+    seat = rod_body("seat", length=0.080, elastic_modes=80, **steel)
+    plateau, duration = 7850 * sqrt(210e9 / 7850) * steel["area"] / 2, 0.080 / sqrt(210e9 / 7850)
+    assert result.measures.impulse == pytest.approx(plateau * duration, rel=0.005)
+    assert result.measures.restitution == pytest.approx(0.5, abs=0.005)
+    contact = ContactPair(
+        body_a="needle",
+        port_a="bottom",
+        body_b="seat",
+        port_b="top",
+        law=LinearLaw(1e10),
+        gap=0.0,
+        series_compliance=float(needle.residual_compliance[0, 0]),
+    )
+    system = ReducedSystem(bodies=(needle, seat), contacts=(contact,))
+    own = simulate_impact(system, speed=1.0, duration=40e-6, step=10e-9)
+    difference = np.abs(result.history.force - own.force).max()
+    assert difference < 1e-5 * own.force.max()
 
 
 def test_sphere_on_rod_is_near_zener():

@@ -1,7 +1,7 @@
 """The models of a case that can leave klack: its reduced bodies, and the pair with its contacts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from klack import __version__
@@ -15,6 +15,7 @@ from klack.mesh.mesh import Mesh
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.system import ContactPair, ReducedSystem
+from klack.workflow.given_pair import build_given_pair
 from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
 from klack.workflow.problem import build_problem
 from klack.workflow.progress import Progress, silent
@@ -65,6 +66,8 @@ def case_models(
     """
     if isinstance(case, ValveCase):
         return _of_valve(case, progress, threads)
+    if not case.has_surfaces:
+        return _of_given(case, progress, threads)
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)
@@ -90,6 +93,25 @@ def case_models(
         provenance=provenance,
         step=case.run.reduced_step,
     )
+
+
+def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels:
+    """Bodies that other programs have reduced or assembled, joined at their ports."""
+    given = build_given_pair(case, progress, threads=threads)
+    bodies = (given.upper, given.lower)
+    sources = {item.name: item.source for item in given.summaries}
+    provenance = replace(_provenance(case, {}), meshes=sources)
+    pair = pair_model(
+        f"{case.name}_pair",
+        given.system(case),
+        moving=given.upper.name,
+        contact_names=("contact",),
+        speed=-case.motion.speed,
+        step=case.run.reduced_step,
+        duration=case.run.duration,
+        provenance=provenance,
+    )
+    return CaseModels(bodies=bodies, pair=pair, provenance=provenance, step=case.run.reduced_step)
 
 
 def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseModels:

@@ -254,14 +254,17 @@ def _computed(study: ImpactStudy) -> Section:
         ("surfaces", contact.surfaces),
         ("closing speed", f"{study.speed:.4g} m/s"),
         ("gap at the start", quantity(study.gap, "m", 3)),
-        ("contact points", count(contact.points)),
-        ("half width at peak force", quantity(contact.half_width, "m", 3)),
-        (
-            "element size over half width",
-            f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
-        ),
-        ("local law", law.kind),
     ]
+    if contact.points:  # none where bodies meet at ports
+        facts += [
+            ("contact points", count(contact.points)),
+            ("half width at peak force", quantity(contact.half_width, "m", 3)),
+            (
+                "element size over half width",
+                f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
+            ),
+        ]
+    facts.append(("local law", law.kind))
     return Section(
         title="What was computed from what",
         tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
@@ -307,6 +310,12 @@ def size_verdict(ratio: float) -> str:
     return "good" if ratio <= 1 else "coarse" if ratio <= 1.5 else "too coarse"
 
 
+def _mesh(body: BodySummary) -> str:
+    if body.elements:
+        return f"{count(body.elements)} elements, {count(body.nodes)} nodes"
+    return f"{count(body.nodes)} nodes" if body.nodes else "none"
+
+
 def _modes(body: BodySummary) -> str:
     if not body.frequencies.size:
         return "none"
@@ -320,13 +329,7 @@ _BODY_ROWS: tuple[tuple[str, Callable[[BodySummary], str]], ...] = (
     ("support", lambda body: body.support),
     ("material", lambda body: body.material),
     ("mass", lambda body: quantity(1e3 * body.mass, "g")),
-    (
-        "mesh",
-        lambda body: (
-            f"{count(body.elements)} elements, {count(body.nodes)} nodes\n"
-            f"{count(body.dofs)} degrees of freedom"
-        ),
-    ),
+    ("mesh", lambda body: f"{_mesh(body)}\n{count(body.dofs)} degrees of freedom"),
     ("kept elastic modes", _modes),
     ("contact compliance in these modes", lambda body: share(body.compliance_share)),
 )

@@ -370,9 +370,11 @@ def law_chart(study: ImpactStudy) -> Chart:
             )
         )
     note = (
-        "The law carries exactly the compliance that the kept modes leave out. The straight line "
-        f"is fitted between {low:.3g} and {high:.3g} N."
+        "The law carries exactly the compliance that the kept modes leave out. "
+        if study.contact.points
+        else "The law of the case, in series with what the modes of both bodies miss. "
     )
+    note += f"The straight line is fitted between {low:.3g} and {high:.3g} N."
     if len(curves) == 3 or np.isfinite(law.classical_stiffness):
         note += (
             " The classical stiffness is that of a static submodel of the contact region alone "
@@ -430,6 +432,8 @@ def approach_chart(study: ImpactStudy) -> Chart:
             "Frictionless static contact of the two complete bodies, counted from first touch. "
             "What the local law does not carry, the kept modes carry; between 20 and 80 % for the "
             "law is a good division."
+            if contact.points
+            else "Local law and modes of both bodies at their ports, in series."
         ),
     )
 

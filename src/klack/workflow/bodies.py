@@ -67,6 +67,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
         drawn.
     """
+    _require_surfaces(case)
     progress("mesh", 0.0)
     moving, stop = case.contact.moving, case.contact.stop
     touch = find_touch(case.bodies, moving, stop)
@@ -90,6 +91,17 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         lower_surface=lower_surface,
         pose=pose,
     )
+
+
+def _require_surfaces(case: Case) -> None:
+    for name, body in case.bodies.items():
+        if not body.has_surfaces:
+            raise InputError(
+                f"{case.path or 'case'}: bodies.{name}",
+                got="a reduced model, or nodes without elements",
+                expected="bodies with meshed surfaces",
+                hint="'klack impact', 'klack reduce' and 'klack export' take such bodies.",
+            )
 
 
 def _places_of_moving_body(case: Case, touch: Touch | None) -> tuple[tuple[float, ...], ...]:

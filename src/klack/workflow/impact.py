@@ -21,6 +21,7 @@ from klack.reduction.reduce import Correction
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
 from klack.workflow.body_summary import summarise_body
+from klack.workflow.given_impact import run_given_impact
 from klack.workflow.interface_level import (
     build_guide,
     build_interface,
@@ -88,7 +89,8 @@ def run_impact(
     levels : sequence of str
         Among :data:`klack.case.schema.LEVELS`.
     certify : bool
-        Estimate the error of reduced levels by one interface-level run with twice as many modes.
+        Estimate the error of reduced levels by one interface-level run with twice as many modes;
+        bodies without surfaces have no such level.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -101,6 +103,8 @@ def run_impact(
     begin = perf_counter()
     wanted = case.require_levels(levels)
     _require_time_to_touch(case)
+    if not case.has_surfaces:
+        return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
     clock = StageClock(progress)
     with collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)

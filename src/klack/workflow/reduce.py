@@ -10,6 +10,7 @@ import numpy as np
 from klack.case.schema import Case
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
+from klack.workflow.given_pair import build_given_pair
 from klack.workflow.levels import elastic_count, first_stiffness, mode_pools, own_pair
 from klack.workflow.problem import build_problem
 from klack.workflow.progress import Progress, silent
@@ -50,9 +51,9 @@ class ReductionStudy:
                 body.name,
                 str(body.dof_count),
                 str(elastic_count(body)),
-                f"{body.frequencies[body.rigid_count + elastic_count(body) - 1] / 1e3:.4g}",
+                f"{_highest(body) / 1e3:.4g}",
                 f"{body.static_compliance[0, 0]:.4g}",
-                f"{100 * body.compliance_share[0]:.3g}",
+                f"{100 * body.compliance_share[0]:.3g}" if body.static_compliance[0, 0] else "-",
             )
             for body in self.bodies
         )
@@ -93,10 +94,16 @@ class ReductionStudy:
                 writer.writerows([f"{value:.9g}" for value in row] for row in table)
 
 
+def _highest(body: ReducedBody) -> float:
+    """Highest frequency of a mode that is no attachment mode [Hz]."""
+    kept = body.frequencies[: body.rigid_count + elastic_count(body)]
+    return float(kept[-1]) if len(kept) else 0.0
+
+
 def _body_json(body: ReducedBody) -> dict[str, Any]:
     elastic = slice(body.rigid_count, None)
     return {
-        "mass_kg": body.mass,
+        "mass_kg": body.mass if np.isfinite(body.mass) else None,
         "degrees_of_freedom": body.dof_count,
         "rigid_modes": body.rigid_count,
         "frequencies_Hz": [float(f) for f in body.frequencies[elastic]],
@@ -111,8 +118,13 @@ def run_reduce(
 ) -> ReductionStudy:
     """Reduce both bodies of a case at their contact and compare transfer functions.
 
-    The reduced bodies keep the displacement of all named surfaces (recovery), for pictures.
+    The reduced bodies keep the displacement of all named surfaces (recovery), for pictures.  Where
+    a body has no surfaces, both are reduced at their ports, without transfer functions: the full
+    order of a reduced model is not known.
     """
+    if not case.has_surfaces:
+        given = build_given_pair(case, progress, threads=threads)
+        return ReductionStudy(case=case.name, bodies=(given.upper, given.lower), transfer=())
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=TRANSFER_MODES, progress=progress)
     progress("reduced", 0.0)
