@@ -198,7 +198,7 @@ def simulate_full_order(
         steps = ceil(duration / step * (1.0 - 1e-9))
         # products of contact size: more threads only wait for each other, at twice the time
         with threadpool_limits(limits=1, user_api="blas"):
-            show = None if snapshots is None else partial(_show, run, start, snapshots)
+            show = None if snapshots is None else _Show(run, start, snapshots)
             record = _march(run, steps, stop_after_separation, energy_interval, progress, show)
         loop_time = perf_counter() - begin - set_up_time
         return _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
@@ -599,19 +599,26 @@ def _march(
     return record
 
 
-def _show(run: _Run, start: float, snapshots: Snapshots) -> None:
-    """Hand out the fields, if it is time."""
-    if run.steps % snapshots.interval:
-        return
-    motion = tuple(
-        MotionOfBody(
-            name=body.name,
-            displacement=body.whole(body.u),
-            velocity=body.whole(body.velocity(run.y)),
-        )
-        for body in run.bodies
-    )
-    snapshots.receive(start + run.steps * run.step, motion)
+class _Show:
+    """Hands out the fields after every step for which it is time."""
+
+    def __init__(self, run: _Run, start: float, snapshots: Snapshots) -> None:
+        self.run, self.start, self.snapshots = run, start, snapshots
+        self.before = [body.u for body in run.bodies]
+
+    def __call__(self) -> None:
+        run = self.run
+        if run.steps % self.snapshots.interval == 0:
+            motion = tuple(
+                MotionOfBody(
+                    name=body.name,
+                    displacement=body.whole(body.u),
+                    velocity=body.whole((body.u - before) / run.step if run.steps else body.v),
+                )
+                for body, before in zip(run.bodies, self.before, strict=True)
+            )
+            self.snapshots.receive(self.start + run.steps * run.step, motion)
+        self.before = [body.u for body in run.bodies]
 
 
 def _check_rim(run: _Run) -> None:

@@ -85,6 +85,7 @@ class MotionOfBody:
     displacement : array, shape (n_dof,) [m]
         Counted from the given placement, with the flight to the first touch.
     velocity : array, shape (n_dof,) [m/s]
+        Mean over the step before, in which modes cancel that the step does not resolve.
     """
 
     name: str

@@ -34,9 +34,9 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_files(folder: Path) -> Iterator[Path]:
-    """Give a hidden folder whose files move into ``folder`` when all of them are complete.
+    """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
 
-    Files of the same names are replaced, everything else in ``folder`` stays.
+    Files and folders of the same names are replaced, everything else in ``folder`` stays.
 
     Raises
     ------
@@ -48,7 +48,10 @@ def whole_files(folder: Path) -> Iterator[Path]:
         stage.mkdir(parents=True)
         yield stage
         for item in sorted(stage.iterdir()):
-            item.replace(folder / item.name)
+            target = folder / item.name
+            if target.is_dir() and not target.is_symlink():
+                target.rename(stage / f"old.{item.name}")
+            item.replace(target)
     except OSError as error:
         raise _refuse(folder, error) from error
     finally:

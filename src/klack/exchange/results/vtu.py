@@ -1,0 +1,143 @@
+"""Unstructured grids of VTK (``.vtu``) and series of them (``.pvd``), as ParaView reads them.
+
+The node order of all element families is that of VTK.  Numbers are binary, compressed by zlib and
+written as base64, so that a file is valid XML.
+"""
+
+import zlib
+from base64 import b64encode
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.mesh.mesh import Mesh
+
+__all__ = ["SeriesFile", "VtuGrid", "write_pvd"]
+
+_CELLS = {
+    **{"tri3": 5, "quad4": 9, "tet4": 10, "hex8": 12, "wedge6": 13},
+    **{"tri6": 22, "quad8": 23, "tet10": 24, "hex20": 25, "wedge15": 26},
+}
+_TYPES = {"f4": "Float32", "f8": "Float64", "i8": "Int64", "u1": "UInt8"}
+_PIECE = 2**20  # bytes that are compressed at once
+
+
+class VtuGrid:
+    """One mesh, ready to be written with any number of fields.
+
+    An axisymmetric mesh lies in the plane y = 0: x is the radius and z the axis, so that it fits to
+    solids and can be revolved about z (ParaView: *Rotational Extrusion*).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        points = mesh.points
+        if mesh.dimension == 2:
+            points = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+        cells = [block.connectivity for block in mesh.blocks]
+        sizes = np.concatenate([np.full(len(c), c.shape[1]) for c in cells])
+        types = np.concatenate(
+            [np.full(len(b.connectivity), _CELLS[b.family], dtype="u1") for b in mesh.blocks]
+        )
+        solids = list(mesh.solids)
+        solid = np.concatenate(
+            [np.full(len(b.connectivity), solids.index(b.solid)) for b in mesh.blocks]
+        )
+        self._points = len(points)
+        nodes = np.concatenate([c.ravel() for c in cells])
+        self._head = (
+            '<?xml version="1.0"?>\n'
+            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+            'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
+        )
+        self._piece = (
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(sizes)}">\n'
+            f"<Points>\n{_array('Points', points.astype('f8'))}</Points>\n"
+            f"<Cells>\n{_array('connectivity', nodes.astype('i8'))}"
+            f"{_array('offsets', np.cumsum(sizes).astype('i8'))}{_array('types', types)}</Cells>\n"
+            f"<CellData>\n{_array('solid', solid.astype('i8'))}</CellData>\n"
+        )
+
+    def write(self, path: Path, fields: Mapping[str, NDArray[Any]], time: float) -> None:
+        """Write the grid with its fields.
+
+        Parameters
+        ----------
+        path : Path
+        fields : mapping of str to array, shape (n_points,) or (n_points, components)
+            Written in single precision.  Two components are those along x and z.
+        time : float [s]
+        """
+        data = "".join(_array(name, self._three(values)) for name, values in fields.items())
+        stamp = _array("TimeValue", np.array([time]), tuples=True)
+        path.write_text(
+            f"{self._head}<FieldData>\n{stamp}</FieldData>\n{self._piece}"
+            f"<PointData>\n{data}</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+            encoding="ascii",
+        )
+
+    def _three(self, values: NDArray[Any]) -> NDArray[np.float32]:
+        plain = np.asarray(values, dtype=np.float32).reshape(self._points, -1)
+        if plain.shape[1] == 2:
+            plain = np.column_stack([plain[:, 0], np.zeros_like(plain[:, 0]), plain[:, 1]])
+        return plain[:, 0] if plain.shape[1] == 1 else plain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeriesFile:
+    """One file of a series: its time [s], which part it shows, and its place beside the series."""
+
+    time: float
+    part: int
+    name: str
+    file: str
+
+
+def write_pvd(path: Path, files: Iterable[SeriesFile]) -> None:
+    """Write the list that makes a series of grids: ParaView opens it as one.
+
+    Parameters
+    ----------
+    path : Path
+    files : iterable of SeriesFile
+    """
+    lines = [
+        f'<DataSet timestep="{item.time!r}" part="{item.part}" name={quoteattr(item.name)} '
+        f"file={quoteattr(item.file)}/>\n"
+        for item in files
+    ]
+    text = (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<VTKFile type="Collection" version="1.0" '
+        'byte_order="LittleEndian">\n<Collection>\n'
+        f"{''.join(lines)}</Collection>\n</VTKFile>\n"
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def _array(name: str, values: NDArray[Any], *, tuples: bool = False) -> str:
+    """One array with its head: number of pieces, size of a piece, of the last, compressed sizes."""
+    raw = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
+    pieces = [zlib.compress(raw[i : i + _PIECE], 4) for i in range(0, len(raw), _PIECE)]
+    rest = len(raw) % _PIECE
+    head = np.array([len(pieces), _PIECE, rest, *map(len, pieces)], dtype="<u8").tobytes()
+    components = values.shape[1] if values.ndim == 2 else 1
+    count = f' NumberOfTuples="{len(values)}"' if tuples else ""
+    names = ""
+    if components == 6:
+        names = "".join(
+            f' ComponentName{i}="{word}"' for i, word in enumerate(("XX", "YY", "ZZ", "XY", "YZ",
+                                                                     "XZ"))
+        )  # fmt: skip
+    return (
+        f'<DataArray type="{_TYPES[values.dtype.str[1:]]}" Name={quoteattr(name)} '
+        f'NumberOfComponents="{components}"{names}{count} format="binary">'
+        f"{(b64encode(head) + b64encode(b''.join(pieces))).decode()}</DataArray>\n"
+    )
