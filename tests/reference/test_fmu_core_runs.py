@@ -1,0 +1,332 @@
+"""Co-simulation against klack's own runs of the same bodies: impact kernel, interface, network.
+
+The C core repeats the same steps, so only round-off may differ.
+"""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.exchange.fmu.build import source_texts
+from klack.exchange.fmu.compiler import compile_library, this_platform
+from klack.exchange.fmu.model_description import SOURCE_FILES
+from klack.exchange.fmu.variables import fmu_variables
+from klack.exchange.modal_model import Provenance, pair_model
+from klack.mechanics.force import constant_force_step
+from klack.network.rows import Ambient, Book, FilmRow, Rows
+from klack.simulation.bodies import rigid_mass_body, rod_body
+from klack.simulation.impact import simulate
+from klack.simulation.network_run import simulate_network
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.verification.interface_motion import interface_motion
+
+fmpy = pytest.importorskip("fmpy")
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+
+STEEL = {"young": 2.1e11, "density": 7850.0}
+STEP = 20e-9  # [s]
+MADE = Provenance(case="rods", title="Rods", version="1", created="2026-01-01T00:00:00")
+ROUND_OFF = 1e-11  # of the largest value, after thousands of steps; 3e-14 was seen
+TABLE = TableLaw(np.array([0.2, 0.5, 1.0, 2.0]) * 1e-6, [20.0, 70.0, 190.0, 520.0])
+FILM = FilmRow(cubic=5e-17, linear=4e-12, cut_off=0.3e-6, suction=2.0)
+
+
+def needle(modes=8, damping=0.0):
+    return rod_body(
+        "needle", length=0.03, area=1.2e-5, elastic_modes=modes, damping=damping, **STEEL
+    )
+
+
+def held(name, modes=12, length=0.05):
+    return rod_body(name, length=length, area=6e-5, elastic_modes=modes, support="bottom", **STEEL)
+
+
+def on_seat(upper, law, *, gap=0.1e-6, series=0.0, **more):
+    port = "bottom" if "bottom" in upper.port_names else "contact"
+    contact = ContactPair(
+        body_a=upper.name,
+        port_a=port,
+        body_b="seat",
+        port_b="top",
+        law=law,
+        gap=gap,
+        series_compliance=series,
+    )
+    return ReducedSystem(bodies=(upper, held("seat")), contacts=(contact,), **more)
+
+
+def model_of(system, *, speed=0.0, films=(), step=STEP):
+    names = [f"stop_{i}" for i in range(len(system.contacts))]
+    return pair_model(
+        "rods",
+        system,
+        moving="needle",
+        contact_names=names,
+        films=films,
+        speed=speed,
+        step=step,
+        duration=1e-4,
+        provenance=MADE,
+    )
+
+
+def compiled(model, folder):
+    """Binary alone, where an unpacked FMU has it: faster than a whole FMU."""
+    sources, binaries = folder / "sources", folder / "binaries" / "linux64"
+    sources.mkdir()
+    binaries.mkdir(parents=True)
+    for name, text in source_texts(model, 2, "guid").items():
+        (sources / name).write_bytes(text)
+    compile_library(
+        [sources / name for name in SOURCE_FILES[2]],
+        [sources],
+        binaries / f"{model.name}.so",
+        platform=this_platform(),
+    )
+
+
+class Unit:
+    """A model compiled for co-simulation and started."""
+
+    def __init__(self, model, folder, **start):
+        from fmpy.fmi2 import FMU2Slave
+
+        compiled(model, folder)
+        self.references = {v.name: i for i, v in enumerate(fmu_variables(model))}
+        self.fmu = FMU2Slave(guid="guid", unzipDirectory=folder, modelIdentifier=model.name)
+        self.fmu.instantiate()
+        self.fmu.setupExperiment()
+        self.set(**start)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def set(self, **values):
+        self.fmu.setReal([self.references[name] for name in values], list(values.values()))
+
+    def get(self, *names):
+        return np.array(self.fmu.getReal([self.references[name] for name in names]))
+
+    def run(self, steps, span, *names):
+        out = np.empty((steps, len(names)))
+        for i in range(steps):
+            self.fmu.doStep(i * span, span)
+            out[i] = self.get(*names)
+        return out
+
+
+def differ(a, b):
+    return np.max(np.abs(a - b)) / np.max(np.abs(b))
+
+
+CASES = {
+    "linear": on_seat(needle(), LinearLaw(1e9)),
+    "pressed, damped modes": on_seat(
+        needle(damping=0.01), LinearLaw(1e9), forces=(AxialForce(body="needle", force=-40.0),)
+    ),
+    "spring": on_seat(
+        needle(),
+        LinearLaw(1e9),
+        springs=(ReturnSpring(body="needle", port="top", stiffness=2e4, preload=15.0),),
+    ),
+    "Hertz": on_seat(needle(), HertzLaw(1.5e12)),
+    "table": on_seat(needle(), TABLE),
+    "in series": on_seat(needle(), TABLE, series=1e-9),
+    "Hunt-Crossley": on_seat(
+        rigid_mass_body("needle", 3e-3), HuntCrossley(HertzLaw(1.5e12), gonthier_coefficient(0.7))
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_co_simulation_repeats_the_impact_kernel(name, tmp_path):
+    system, per_step, steps = CASES[name], 25, 120
+    native = simulate(
+        system,
+        velocities={"needle": -0.4},
+        step=STEP,
+        duration=steps * per_step * STEP,
+        steps_per_record=per_step,
+    )
+    unit = Unit(model_of(system, speed=-0.4), tmp_path)
+
+    own = unit.run(
+        steps, per_step * STEP, "mean_contact_force", "peak_contact_force", "velocity", "gap"
+    )
+
+    force = native.force[:, 0]
+    assert np.count_nonzero(force) > 10
+    assert np.any(force[-20:] == 0.0) or "pressed" in name
+    assert differ(own[:, 0], force) < ROUND_OFF
+    assert own[:, 1].max() == pytest.approx(native.peak_force.max(), rel=ROUND_OFF)
+    assert differ(own[:, 2], native.velocity[1:, 0]) < ROUND_OFF
+    y = native.displacement[1:, 0, 0] - native.displacement[1:, 0, 1]
+    assert differ(own[:, 3], system.contacts[0].gap + y) < ROUND_OFF
+
+
+@pytest.mark.parametrize("per_step", [1, 3, 100, 3000])
+def test_communication_step_changes_nothing(per_step, tmp_path):
+    """Without forces from outside every division of the time gives the same motion."""
+    system, total = on_seat(needle(), TABLE, series=1e-9), 3000
+    native = simulate(system, velocities={"needle": -0.4}, step=STEP, duration=total * STEP)
+    unit = Unit(model_of(system, speed=-0.4), tmp_path)
+
+    own = unit.run(total // per_step, per_step * STEP, "peak_contact_force", "velocity")
+
+    assert own[:, 0].max() == pytest.approx(native.peak_force.max(), rel=ROUND_OFF)
+    assert own[-1, 1] == pytest.approx(native.velocity[-1, 0], rel=ROUND_OFF)
+
+
+def between_two(law, gaps, series=(0.0, 0.0), **more):
+    """Needle between its seat and a stop above it."""
+    ends = (("needle", "bottom", "seat", "top"), ("stop", "top", "needle", "top"))
+    contacts = tuple(
+        ContactPair(
+            body_a=a,
+            port_a=pa,
+            body_b=b,
+            port_b=pb,
+            law=law,
+            gap=gap,
+            series_compliance=compliance,
+        )
+        for (a, pa, b, pb), gap, compliance in zip(ends, gaps, series, strict=True)
+    )
+    bodies = (needle(), held("seat"), held("stop", 9, 0.04))
+    return ReducedSystem(bodies=bodies, contacts=contacts, **more)
+
+
+@pytest.mark.parametrize("series", [0.0, 1e-9])
+def test_two_dry_contacts_repeat_the_impact_kernel(series, tmp_path):
+    """Squeezed by waves: both contacts are closed at the same time now and then."""
+    system = between_two(LinearLaw(8e8), (0.05e-6, 0.01e-6), (series, 0.0))
+    native = simulate(
+        system, velocities={"needle": -0.3}, step=STEP, duration=6e-5, steps_per_record=10
+    )
+    unit = Unit(model_of(system, speed=-0.3), tmp_path)
+
+    names = [f"mean_contact_force_stop_{i}" for i in range(2)]
+    own = unit.run(len(native.force), 10 * STEP, *names)
+
+    assert np.any(np.all(native.force > 0.0, axis=1))
+    # forces settle to 1e-17 m, which a stiffness of 1e9 N/m makes 1e-8 N
+    assert differ(own, native.force) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("law", "series", "film"),
+    [
+        (TABLE, 0.0, FILM),
+        (TABLE, 2e-9, FILM),
+        (LinearLaw(1e9), 1e-9, FilmRow(cubic=4e-18, linear=0.0, cut_off=0.6e-6, suction=0.2)),
+        (None, 1e-9, FILM),
+    ],
+    ids=["parallel", "in series", "thin film", "film alone"],
+)
+def test_film_repeats_the_interface_step(law, series, film, tmp_path):
+    upper, lower, steps = needle(), held("seat"), 6000
+    native = interface_motion(
+        upper,
+        lower,
+        law,
+        film=film,
+        series=series,
+        gap=1e-6,
+        speed=0.2,
+        press=60.0,
+        step=STEP,
+        steps=steps,
+    )
+    model = model_of(on_seat(upper, law or TABLE, gap=1e-6, series=series), films=(film,))
+    if law is None:
+        model = replace(model, contacts=(replace(model.contacts[0], law=None),))
+    unit = Unit(model, tmp_path, start_velocity=-0.2, force=-60.0)
+
+    own = unit.run(steps // 20, 20 * STEP, "mean_contact_force", "film_force", "gap")
+
+    mean = native.contact_force.reshape(-1, 20).mean(axis=1)
+    assert native.film_force.max() > 1.0
+    if law is not None:
+        assert mean.max() > 10.0
+        assert differ(own[:, 0], mean) < 1e-8  # forces are accepted to 1e-9 N
+    assert differ(own[:, 1], native.film_force[19::20]) < 1e-8
+    assert differ(own[:, 2], native.gap[20::20]) < 1e-9
+
+
+def test_two_contacts_with_films_follow_the_network(tmp_path):
+    """Up against the stop, then, with the force turned round, down to the seat."""
+    films = (FILM, FilmRow(cubic=9e-17, linear=0.0, cut_off=0.5e-6, suction=3.0))
+    system = between_two(TABLE, (0.0, 2e-6), (2e-9, 1e-9))
+    unit = Unit(model_of(system, films=films), tmp_path, force=50.0)
+    half, span = 150, 1e-6
+    forces = np.repeat([50.0, -50.0], half)
+
+    own = np.empty((2 * half, 3))
+    for i, force in enumerate(forces):
+        unit.set(force=force)
+        unit.fmu.doStep(i * span, span)
+        own[i] = unit.get("velocity", "mean_contact_force_stop_0", "mean_contact_force_stop_1")
+
+    native = network_run(system, films, (50.0, -50.0), half * span, span)
+    for column, channel in enumerate(native):
+        assert np.max(np.abs(channel)) > 0.05
+        # the network's forces settle to 1e-12 m only
+        assert differ(own[:, column], channel) < 1e-6
+
+
+def network_run(system, films, forces, half, span):
+    """Velocity of the needle and both contact forces; the force acts over its mass."""
+    rows, state, found = None, None, []
+    for force in forces:
+        rows = rows_of(system, films, force)
+        result = simulate_network(
+            rows, duration=half, step=STEP, coarse=1, record=span, start="free", state=state
+        )
+        state = result.state
+        found.append(
+            [
+                result.channels[name].values[1:]
+                for name in ("needle velocity", "stop_0 contact force", "stop_1 contact force")
+            ]
+        )
+    return [np.concatenate(parts) for parts in zip(*found, strict=True)]
+
+
+def rows_of(system, films, force):
+    rows, handle = Rows(ambient=Ambient()), 0
+    place = {}
+    for body in system.bodies:
+        if body.name == "needle":  # a port that spreads a force over the mass
+            spread = np.zeros(body.mode_count)
+            spread[: body.rigid_count] = body.rigid_axial / body.mass
+            body = replace(
+                body,
+                port_names=(*body.port_names, "mass"),
+                port_shapes=np.column_stack([body.port_shapes, spread]),
+                static_compliance=np.pad(body.static_compliance, (0, 1)),
+            )
+        rows.component = body.name
+        rows.handles = {name: handle + i for i, name in enumerate(body.port_names)}
+        place |= {(body.name, name): h for name, h in rows.handles.items()}
+        rows.body(body, body.port_names)
+        handle += len(body.port_names)
+    rows.component, rows.handles = "force", {"end": place["needle", "mass"]}
+    rows.element(
+        constant_force_step,
+        ports=(place["needle", "mass"],),
+        parameters=(force,),
+        books=(Book("work", "supply"),),
+    )
+    for i, (contact, film) in enumerate(zip(system.contacts, films, strict=True)):
+        rows.component = f"stop_{i}"
+        rows.interface(
+            upper=place[contact.body_a, contact.port_a],
+            lower=place[contact.body_b, contact.port_b],
+            gap=contact.gap,
+            law=contact.law,
+            series_compliance=contact.series_compliance,
+            film=film,
+        )
+    return rows
