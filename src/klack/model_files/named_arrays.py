@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from klack.errors import InputError, KlackError
+from klack.model_files.mat5 import MatValue, read_mat5
 from klack.model_files.matrix_listing import read_listing
 
 __all__ = ["NamedArrays", "read_named_arrays"]
 
 _LARGEST = 1 << 30  # bytes of all arrays together
-_DEEPEST = 4
 _NUMBERS = "iufb"
 
 
@@ -138,64 +139,37 @@ def _too_large(path: Path, size: int) -> InputError:
 
 
 def _matlab(path: Path) -> Read:
-    from scipy.io import loadmat, whosmat
-
-    if path.stat().st_size > _LARGEST:
-        raise _too_large(path, path.stat().st_size)
-    hint = "save it again with save -v7; of a MATLAB ss object save what ssdata gives."
-    try:
-        size = sum(8 * int(np.prod([float(n) for n in shape])) for _, shape, _ in whosmat(path))
-        if size > _LARGEST:
-            raise _too_large(path, size)
-        content = loadmat(path, struct_as_record=True, squeeze_me=False)
-    except KlackError:
-        raise
-    except Exception as error:  # scipy meets damage with any kind of error
-        raise _damaged(path, "a MATLAB file", error, hint) from error
     arrays: dict[str, NDArray[np.float64]] = {}
     texts: dict[str, tuple[str, ...]] = {}
-    for key, value in content.items():
-        if not key.startswith("__"):
-            _collect(path, key, value, arrays, texts, 0)
+    for key, value in read_mat5(path, largest=_LARGEST).items():
+        _collect(path, key, value, arrays, texts)
     return arrays, texts
 
 
 def _collect(
     path: Path,
     key: str,
-    value: Any,
+    value: MatValue,
     arrays: dict[str, NDArray[np.float64]],
     texts: dict[str, tuple[str, ...]],
-    depth: int,
 ) -> None:
     """Sort one value of a MATLAB file into numbers and texts; what is neither is left out."""
-    if hasattr(value, "toarray"):  # sparse
-        if 8 * float(value.shape[0]) * float(value.shape[1]) > _LARGEST:
-            raise _too_large(path, 8 * value.shape[0] * value.shape[1])
-        value = value.toarray()
-    if not isinstance(value, np.ndarray) or depth > _DEEPEST:
-        return
-    if value.dtype.names is not None and value.size == 1:
-        item = value.ravel()[0]
-        for name in value.dtype.names:
-            _collect(path, f"{key}.{name}", item[name], arrays, texts, depth + 1)
-    elif value.dtype.kind == "U":
-        texts[key] = tuple(str(text).strip() for text in value.ravel())
-    elif value.dtype.kind == "O" and value.size <= 100_000:
-        words = [_word(item) for item in value.ravel()]
-        if words and all(word is not None for word in words):
-            texts[key] = tuple(str(word) for word in words)
-    elif value.dtype.kind in _NUMBERS and value.ndim == 2:
-        arrays[key] = np.array(value, dtype=np.float64)
-
-
-def _word(item: Any) -> str | None:
-    """Text of one cell of a cell array."""
-    if isinstance(item, np.ndarray) and item.dtype.kind == "U":
-        return str(item.ravel()[0]).strip() if item.size else ""
-    if isinstance(item, np.ndarray) and item.size == 0:
-        return ""
-    return None
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _collect(path, f"{key}.{name}", item, arrays, texts)
+    elif isinstance(value, csc_array):
+        size = 8 * value.shape[0] * value.shape[1]
+        if size > _LARGEST:
+            raise _too_large(path, size)
+        arrays[key] = value.toarray()
+    elif isinstance(value, np.ndarray) and value.ndim == 2:
+        arrays[key] = value
+    elif isinstance(value, tuple):
+        texts[key] = value
+    elif isinstance(value, list):
+        words = [item[0] if isinstance(item, tuple) and item else item for item in value]
+        if words and all(isinstance(word, str) for word in words):
+            texts[key] = tuple(words)
 
 
 # --------------------------------------------------------------------------- NumPy
