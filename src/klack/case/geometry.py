@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from math import tau
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import Field, model_validator
 
 from klack.errors import InputError
+from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
@@ -29,29 +29,6 @@ __all__ = [
 ]
 
 
-def _existing_file(value: Any, info: ValidationInfo) -> Path:
-    """Resolve a path relative to the folder of the case; it must be a file."""
-    if isinstance(value, Path):
-        value = str(value)
-    if not isinstance(value, str) or not value.strip():
-        got, hint = f"'{value}'", "write the name of a file, relative to the case file."
-        raise CaseProblem((), got=got, expected="a file name", hint=hint)
-    folder = info.context.get("folder", Path()) if info.context else Path()
-    path = (folder / Path(value).expanduser()).resolve()
-    if not path.is_file():
-        kind = "a folder" if path.is_dir() else "a file that does not exist"
-        raise CaseProblem(
-            (),
-            got=f"'{value}', {kind} ({path})",
-            expected="an existing file, relative to the folder of the case",
-            hint="check the spelling and the folder.",
-        )
-    return path
-
-
-InputPath = Annotated[
-    Path, BeforeValidator(_existing_file), WithJsonSchema({"type": "string", "format": "path"})
-]
 Point = tuple[Number, Number]
 
 

@@ -1,0 +1,36 @@
+"""The name of a file in a case, looked for relative to the folder of the case."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
+
+from klack.input.problem import CaseProblem
+
+__all__ = ["InputPath"]
+
+
+def _existing_file(value: Any, info: ValidationInfo) -> Path:
+    """Resolve a path relative to the folder of the case; it must be a file."""
+    if isinstance(value, Path):
+        value = str(value)
+    if not isinstance(value, str) or not value.strip():
+        got, hint = f"'{value}'", "write the name of a file, relative to the case file."
+        raise CaseProblem((), got=got, expected="a file name", hint=hint)
+    folder = info.context.get("folder", Path()) if info.context else Path()
+    path = (folder / Path(value).expanduser()).resolve()
+    if not path.is_file():
+        kind = "a folder" if path.is_dir() else "a file that does not exist"
+        raise CaseProblem(
+            (),
+            got=f"'{value}', {kind} ({path})",
+            expected="an existing file, relative to the folder of the case",
+            hint="check the spelling and the folder.",
+        )
+    return path
+
+
+InputPath = Annotated[
+    Path, BeforeValidator(_existing_file), WithJsonSchema({"type": "string", "format": "path"})
+]
+"""Field of a section that names an existing file."""
