@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,9 +168,9 @@ def _in_order(where: str, M: SystemMatrix, rows: RowPlaces, m_rows: RowPlaces) -
 
 def _moved(A: csr_array, place: NDArray[np.int64], size: int) -> csr_array:
     """Matrix whose row i comes to stand in row ``place[i]``."""
-    index = np.int32 if size < 2**31 else np.int64
-    row = np.repeat(place.astype(index), np.diff(A.indptr))
-    column = place.astype(index)[A.indices]
+    moved: NDArray[Any] = place.astype(np.int32 if size < 2**31 else np.int64)
+    row: NDArray[Any] = np.repeat(moved, np.diff(A.indptr))
+    column: NDArray[Any] = moved[A.indices]
     return coo_array((A.data, (row, column)), shape=(size, size)).tocsr()
 
 

@@ -23,7 +23,14 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.reduction.face_samples import face_samples
 
-__all__ = ["Observer", "Port", "node_observer", "pressure_port", "surface_port"]
+__all__ = [
+    "Observer",
+    "Port",
+    "node_observer",
+    "node_set_port",
+    "pressure_port",
+    "surface_port",
+]
 
 Direction = Literal["x", "y", "z", "r"] | ArrayLike
 
@@ -99,12 +106,7 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
     where = f"port '{name}' on surface '{surface.name}'"
     unit = _unit_vector(mesh, direction, where)
     if mesh.dimension == 2 and abs(unit[0]) > 0:
-        raise InputError(
-            where,
-            got="a radial direction on an axisymmetric body",
-            expected="'z'",
-            hint="a radial traction has no resultant around the circle; use a 3-D body.",
-        )
+        raise _radial(where)
     weights = np.zeros(mesh.node_count)
     for block in surface.blocks:
         at = face_samples(mesh, block)
@@ -144,6 +146,44 @@ def pressure_port(mesh: Mesh, surface: str | Surface, *, name: str) -> Port:
     size = float(np.linalg.norm(resultant))
     _require_area(f"port '{name}' on surface '{surface.name}'", size if size > 1e-9 * total else 0)
     return Port(name, (load / size).ravel())
+
+
+def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str) -> Port:
+    """Port of equal forces on the nodes of a set, resultant 1 N along ``direction``.
+
+    For bodies without faces.  Equal weights are no uniform pressure: on quadratic elements corner
+    nodes should carry nothing of it, so take a set of many nodes, or a mesh with faces and
+    :func:`surface_port`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With the set among its ``node_sets``.
+    node_set : str
+    direction : "x", "y", "z", or array, shape (dimension,)
+        An axisymmetric body takes ``"z"`` only.
+    name : str
+
+    Raises
+    ------
+    InputError
+        For a set that the mesh does not have, or without nodes.
+    """
+    where = f"port '{name}' on node set '{node_set}'"
+    nodes = mesh.node_sets.get(node_set)
+    if nodes is None or not len(nodes):
+        raise InputError(
+            where,
+            got="a name that the mesh does not have" if nodes is None else "a set without nodes",
+            expected=f"one of: {', '.join(sorted(mesh.node_sets)) or 'none'}",
+            hint="name the set in geometry.nodes.sets, or in the mesh file.",
+        )
+    unit = _unit_vector(mesh, direction, where)
+    if mesh.dimension == 2 and abs(unit[0]) > 0:
+        raise _radial(where)
+    pattern = np.zeros((mesh.node_count, mesh.dimension))
+    pattern[nodes] = unit / len(nodes)
+    return Port(name, pattern.ravel())
 
 
 def node_observer(
@@ -192,6 +232,15 @@ def _unit_vector(mesh: Mesh, direction: Direction, where: str) -> NDArray[np.flo
             hint="an axisymmetric body has the directions r and z, a solid x, y and z.",
         )
     return vector / length
+
+
+def _radial(where: str) -> InputError:
+    return InputError(
+        where,
+        got="a radial direction on an axisymmetric body",
+        expected="'z'",
+        hint="a radial traction has no resultant around the circle; use a 3-D body.",
+    )
 
 
 def _require_area(where: str, area: float) -> None:

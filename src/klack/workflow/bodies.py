@@ -20,9 +20,10 @@ from klack.mesh.mesh_file import read_mesh_file
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_revolved, mesh_step
-from klack.mesh.supports import sector_nodes, surface_nodes
 from klack.mesh.swept import sweep
 from klack.units import format_si
+from klack.workflow.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.workflow.held_nodes import held_nodes
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
 
@@ -138,14 +139,19 @@ def find_touch(
 
 
 def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
-    """Assemble stiffness and mass of a body of the case, with its supports."""
+    """Stiffness and mass of a body of the case, assembled here or given, with its supports."""
+    body = case.bodies[name]
+    if body.matrices is not None:
+        return assembled_from_matrices(case, name, mesh)
     materials = case.materials_of(name, mesh.solids)
-    return elastic_body(name, mesh, materials, fixed_nodes=_fixed_nodes(case.bodies[name], mesh))
+    return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
 
 
 def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
     """Mesh one body, refined at the given places ((r, z) or (x, y, z))."""
     geometry = body.geometry
+    if geometry.nodes is not None:
+        return node_mesh(geometry.nodes, geometry.dimension, f"bodies.{name}.geometry.nodes")[0]
     if geometry.mesh is not None:
         solids = tuple(body.material) if isinstance(body.material, dict) else None
         mesh = read_mesh_file(geometry.mesh.file, geometry.mesh.unit, solids=solids).mesh
@@ -280,16 +286,3 @@ def _check_refinement(
                 AccuracyWarning,
                 stacklevel=2,
             )
-
-
-def _fixed_nodes(body: CaseBody, mesh: Mesh) -> np.ndarray:
-    held = [np.empty(0, dtype=np.int64)]
-    for support in body.fixed or ():
-        if support.sectors is None:
-            held.append(surface_nodes(mesh, support.surface))
-        else:
-            sectors = support.sectors
-            held.append(
-                sector_nodes(mesh, support.surface, sectors.count, sectors.width, sectors.first)
-            )
-    return np.unique(np.concatenate(held))

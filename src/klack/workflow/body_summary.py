@@ -4,6 +4,7 @@ import numpy as np
 
 from klack.case.bodies import CaseFile
 from klack.elasticity.body import ElasticBody
+from klack.elasticity.plausible_material import estimate_material
 from klack.materials import Material
 from klack.reduction.reduced_body import ReducedBody
 from klack.workflow.levels import elastic_count
@@ -32,20 +33,31 @@ def summarise_body(
         if sectors is not None:
             where += f" in {sectors.count} sectors of {np.degrees(sectors.width):.4g} deg"
         supports.append(where)
-    materials = case.materials_of(body.name, body.mesh.solids)
     first, last = reduced.rigid_count, reduced.rigid_count + elastic_count(reduced)
     return BodySummary(
         name=body.name,
         model="axisymmetric" if body.dimension == 2 else "3-D",
         source=source,
         support="held at " + " and ".join(supports) if supports else "free",
-        material="; ".join(dict.fromkeys(_in_words(m) for m in materials.values())),
+        material=_material(case, body),
         mass=body.mass,
         nodes=body.mesh.node_count,
         elements=body.mesh.element_count,
         dofs=body.dof_count,
         frequencies=reduced.frequencies[first:last],
         compliance_share=compliance_share,
+    )
+
+
+def _material(case: CaseFile, body: ElasticBody) -> str:
+    given = case.bodies[body.name].matrices
+    if given is None:
+        materials = case.materials_of(body.name, body.mesh.solids)
+        return "; ".join(dict.fromkeys(_in_words(m) for m in materials.values()))
+    found = estimate_material(body.K, body.mesh, body.mass)
+    return (
+        f"matrices {given.stiffness.name} and {given.mass.name} ({found.density_in_words}, wave "
+        f"speed {found.wave_speed:.4g} m/s)"
     )
 
 

@@ -18,9 +18,10 @@ from klack.reduction.from_craig_bampton import body_of_craig_bampton
 from klack.reduction.from_modal_data import body_of_modal_data
 from klack.reduction.from_state_space import body_of_state_space, state_space_in_si
 from klack.reduction.reduced_body import ReducedBody, StateSpace
+from klack.workflow.assembled_bodies import assembled_from_matrices
 from klack.workflow.damping_choice import damping_of
 
-__all__ = ["reduced_from_file"]
+__all__ = ["assembled_from_matrices", "reduced_from_file"]
 
 _MASS = 0.01
 _SAME_UNIT = 1e-3

@@ -11,10 +11,11 @@ from klack.contact.laws import HertzLaw, LinearLaw
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
-from klack.reduction.ports import Port, surface_port
+from klack.reduction.ports import Port, node_set_port, surface_port
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.system import ReducedSystem
+from klack.workflow.assembled_bodies import assembled_from_matrices
 from klack.workflow.bodies import assemble_body, mesh_body
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.damping_choice import damping_of
@@ -154,10 +155,8 @@ def _side(case: Case, surface: SurfaceName, threads: int | None) -> tuple[Reduce
 def _elastic(case: Case, surface: SurfaceName) -> tuple[ElasticBody, Port]:
     given = case.bodies[surface.body]
     if not given.has_surfaces:
-        from klack.workflow.given_bodies import assembled_from_matrices, node_set_port
-
         body = assembled_from_matrices(case, surface.body, None)
-        return body, node_set_port(body, surface.surface, name=surface.surface)
+        return body, node_set_port(body.mesh, surface.surface, "z", name=surface.surface)
     mesh = mesh_body(given, surface.body, ())
     body = assemble_body(case, surface.body, mesh)
     return body, surface_port(mesh, surface.surface, "z", name=surface.surface)
