@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.exchange.modal_model import ModalModel
 
@@ -25,6 +26,10 @@ UNITS: Mapping[str, Mapping[str, int]] = {
     "m.kg1/2/s2": {},
 }
 """Units of the variables and their SI exponents; modal units have half powers, so none."""
+
+
+_USUAL_FORCE, _USUAL_WAY = 100.0, 1e-6  # [N], [m]
+_LEAST_SHARE = 1e-2  # of the largest mode shape, for modes that nothing pushes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +82,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
             unit="N",
             causality="input",
             start=0.0,
-            nominal=100.0,
+            nominal=_USUAL_FORCE,
         )
         for item in model.inputs
     ]
@@ -89,7 +94,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
                 description=output.description,
                 unit="m" if moved else "m/s",
                 causality="output",
-                nominal=1e-6 if moved else 1.0,
+                nominal=_USUAL_WAY if moved else 1.0,
             )
         )
     for i, contact in enumerate(model.contacts):
@@ -111,7 +116,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
                     unit=unit,
                     causality="output",
                     minimum=0.0 if force and "contact" in name else None,
-                    nominal=100.0 if force else 1e-6,
+                    nominal=_USUAL_FORCE if force else _USUAL_WAY,
                 )
             )
     variables.append(
@@ -156,10 +161,12 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
         ]
     first = len(variables)
     m = model.mode_count
-    scale = np.sqrt(max(float(model.rise @ model.rise), 1e-6))
-    for kind, unit, start, nominal in (
-        ("q", "m.kg1/2", model.start, 1e-6 * scale),
-        ("v", "m.kg1/2/s", model.start_velocity, scale),
+    for kind, unit, start, nominal in zip(
+        ("q", "v"),
+        ("m.kg1/2", "m.kg1/2/s"),
+        (model.start, model.start_velocity),
+        _usual_states(model),
+        strict=True,
     ):
         variables += [
             FmuVariable(
@@ -169,7 +176,7 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
                 unit=unit,
                 causality="local",
                 start=float(start[i]),
-                nominal=nominal,
+                nominal=float(nominal[i]),
             )
             for i in range(m)
         ]
@@ -185,6 +192,24 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
         for i, state in enumerate(variables[first:])
     ]
     return tuple(variables)
+
+
+def _usual_states(model: ModalModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Usual sizes of modal displacements and velocities; solvers scale their tolerance by them.
+
+    Rigid modes: 1 um and 1 m/s.  Elastic ones ring with a sudden force ``F`` of 100 N at the port
+    that moves them most, ``F phi / omega^2`` and ``F phi / omega``.
+    """
+    rigid = np.sqrt(max(float(model.rise @ model.rise), 1e-6))
+    shapes = [item.shape for item in (*model.inputs, *model.contacts)]
+    phi = np.abs(np.array(shapes).reshape(-1, model.mode_count)).max(axis=0, initial=0.0)
+    phi = np.maximum(phi, _LEAST_SHARE * phi.max(initial=1e-3))
+    omega = np.where(model.omega > 0.0, model.omega, np.inf)
+    elastic = model.omega > 0.0
+    return (
+        np.where(elastic, _USUAL_FORCE * phi / omega**2, _USUAL_WAY * rigid),
+        np.where(elastic, _USUAL_FORCE * phi / omega, rigid),
+    )
 
 
 def _distinct(variables: Sequence[FmuVariable]) -> list[FmuVariable]:
