@@ -201,7 +201,7 @@ def _usual_states(model: ModalModel) -> tuple[NDArray[np.float64], NDArray[np.fl
     that moves them most, ``F phi / omega^2`` and ``F phi / omega``.
     """
     rigid = np.sqrt(max(float(model.rise @ model.rise), 1e-6))
-    shapes = [item.shape for item in (*model.inputs, *model.contacts)]
+    shapes = [item.shape for item in model.inputs] + [item.shape for item in model.contacts]
     phi = np.abs(np.array(shapes).reshape(-1, model.mode_count)).max(axis=0, initial=0.0)
     phi = np.maximum(phi, _LEAST_SHARE * phi.max(initial=1e-3))
     omega = np.where(model.omega > 0.0, model.omega, np.inf)
