@@ -1,0 +1,248 @@
+"""Truth: programs of others run the FMUs, and give what klack's own solvers give.
+
+Importers: fmpy (both versions of the standard; its CVode for model exchange), libcosimpy (the C++
+library libcosim with FMI Library), ecospy (the C++ library ecos), and a small C program that knows
+nothing but the function names, on Linux and, under wine, with the Windows binary.
+"""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.case import find_case, load_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.simulation.impact import simulate
+from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
+from klack.workflow.problem import build_problem
+from klack.workflow.progress import silent
+
+fmpy = pytest.importorskip("fmpy")
+validation = pytest.importorskip("fmpy.validation")
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+
+HOST = Path(__file__).parents[1] / "data" / "fmu_host.c"
+WINDOWS_COMPILER = "x86_64-w64-mingw32-gcc"
+STEP, COUNT = 1e-7, 550
+OUTPUTS = ["lift", "velocity", "contact_force", "mean_contact_force", "peak_contact_force"]
+
+
+class Impact:
+    """The axisymmetric impact: klack's record at its own step and at a sixteenth, and the FMUs."""
+
+    def __init__(self, folder):
+        case = load_case(find_case("demo-valve-axisymmetric"))
+        problem = build_problem(case, silent)
+        pools = mode_pools(problem, at_least=1, progress=silent)
+        reduced = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        problem.close()
+        system = impact_system(case, reduced.upper, reduced.lower, reduced.law)
+        self.native, self.fine = (
+            simulate(
+                system,
+                velocities={reduced.upper.name: -case.motion.speed},
+                step=case.run.reduced_step / parts,
+                duration=COUNT * STEP,
+                steps_per_record=parts,
+            )
+            for parts in (1, 16)
+        )
+        self.model = case_models(case).pair
+        windows = shutil.which(WINDOWS_COMPILER) is not None
+        platforms = ("linux64", "win64") if windows else ("linux64",)
+        self.fmu = {
+            fmi: str(build_fmu(self.model, folder / f"{fmi}.fmu", fmi=fmi, platforms=platforms))
+            for fmi in (2, 3)
+        }
+
+
+@pytest.fixture(scope="module")
+def impact(tmp_path_factory):
+    return Impact(tmp_path_factory.mktemp("impact"))
+
+
+@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
+def fmi(request):
+    return request.param
+
+
+def references(path):
+    return {v.name: v.valueReference for v in fmpy.read_model_description(path).modelVariables}
+
+
+def test_validator_finds_nothing(impact, fmi):
+    assert validation.validate_fmu(impact.fmu[fmi]) == []
+
+
+def test_co_simulation_is_the_native_run(impact, fmi):
+    native = impact.native
+    found = fmpy.simulate_fmu(
+        impact.fmu[fmi],
+        fmi_type="CoSimulation",
+        stop_time=COUNT * STEP,
+        step_size=native.step,
+        output_interval=native.step,
+        output=OUTPUTS,
+    )
+    n = len(native.force)
+
+    # the same steps in another order of summation
+    force = found["mean_contact_force"][1 : n + 1]
+    peak = native.peak_force.max()
+    np.testing.assert_allclose(force, native.force[:, 0], rtol=0.0, atol=1e-11 * peak)
+    np.testing.assert_allclose(found["velocity"][: n + 1], native.velocity[:, 0], atol=1e-11)
+    assert found["peak_contact_force"].max() == pytest.approx(peak, rel=1e-12)
+
+
+def test_communication_step_without_inputs_changes_nothing(impact, fmi):
+    coarse, fine = (
+        fmpy.simulate_fmu(
+            impact.fmu[fmi],
+            fmi_type="CoSimulation",
+            stop_time=COUNT * STEP,
+            step_size=step,
+            output_interval=1e-6,
+            output=OUTPUTS,
+        )
+        for step in (1e-6, STEP)
+    )
+
+    # the internal steps are the same 20 ns
+    np.testing.assert_allclose(coarse["lift"], fine["lift"], rtol=1e-10, atol=1e-18)
+    assert coarse["peak_contact_force"].max() == pytest.approx(
+        impact.native.peak_force.max(), rel=1e-11
+    )
+
+
+def test_model_exchange_under_cvode_is_the_native_run(impact, fmi):
+    fine = impact.fine
+    found = fmpy.simulate_fmu(
+        impact.fmu[fmi],
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=1e-10,
+        stop_time=COUNT * STEP,
+        output_interval=fine.step,
+        output=OUTPUTS,
+    )
+    time = fine.step * np.arange(len(fine.velocity))
+    velocity = np.interp(time, found["time"], found["velocity"])
+
+    # klack at 1.25 ns against 20 ns: 4e-6 in the peak
+    assert found["contact_force"].max() == pytest.approx(fine.peak_force.max(), rel=1e-5)
+    assert impact.native.peak_force.max() == pytest.approx(fine.peak_force.max(), rel=1e-5)
+    np.testing.assert_allclose(velocity, fine.velocity[:, 0], rtol=0.0, atol=1e-6)
+    impulse = fine.force.sum() * fine.step
+    mass = impulse / (fine.velocity[-1, 0] - fine.velocity[0, 0])
+    gained = found["velocity"][-1] - found["velocity"][0]
+    assert mass * gained == pytest.approx(impulse, rel=1e-6)
+
+
+def test_lift_of_both_kinds_agrees(impact, fmi):
+    runs = [
+        fmpy.simulate_fmu(
+            impact.fmu[fmi],
+            fmi_type=kind,
+            stop_time=COUNT * STEP,
+            output_interval=STEP,
+            output=["lift"],
+            **more,
+        )
+        for kind, more in (
+            ("CoSimulation", {"step_size": STEP}),
+            ("ModelExchange", {"solver": "CVode", "relative_tolerance": 1e-10}),
+        )
+    ]
+    lift = np.interp(runs[0]["time"], runs[1]["time"], runs[1]["lift"])
+
+    way = np.ptp(runs[0]["lift"])
+    np.testing.assert_allclose(runs[0]["lift"], lift, rtol=0.0, atol=1e-6 * way)
+
+
+def test_libcosim_gives_the_native_peak(impact):
+    pytest.importorskip("libcosimpy")
+    from libcosimpy.CosimEnums import CosimVariableType
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    reference = references(impact.fmu[2])
+    execution = CosimExecution.from_step_size(round(STEP * 1e9))
+    slave = execution.add_local_slave(CosimLocalSlave(impact.fmu[2], "impact"))
+    observer = CosimObserver.create_time_series(COUNT + 1)
+    execution.add_observer(observer)
+    found = {}
+    names = ("peak_contact_force", "velocity")
+    for name in names:
+        observer.start_time_series(slave, reference[name], CosimVariableType.REAL)
+    assert execution.step(COUNT)
+    for name in names:
+        found[name] = observer.time_series_real_samples(slave, reference[name], 1, COUNT)[2]
+
+    assert len(found["velocity"]) == COUNT
+    assert max(found["peak_contact_force"]) == pytest.approx(
+        impact.native.peak_force.max(), rel=1e-11
+    )
+    assert found["velocity"][-1] == pytest.approx(impact.native.velocity[-1, 0], rel=1e-10)
+
+
+def test_ecos_gives_the_native_peak(impact):
+    try:
+        import ecospy
+    except (ImportError, OSError) as error:
+        pytest.skip(f"ecospy: {error}")
+
+    with ecospy.EcosSimulationStructure() as structure:
+        structure.add_model("impact", impact.fmu[2])
+        with ecospy.EcosSimulation(structure=structure, step_size=STEP) as simulation:
+            assert simulation.init()
+            peak = 0.0
+            for _ in range(COUNT):
+                simulation.step()
+                peak = max(peak, simulation.get_real("impact::peak_contact_force"))
+            velocity = simulation.get_real("impact::velocity")
+
+    assert peak == pytest.approx(impact.native.peak_force.max(), rel=1e-11)
+    assert velocity == pytest.approx(impact.native.velocity[-1, 0], rel=1e-10)
+
+
+def by_host(impact, folder, compiler, platform, ending, run):
+    """Peak force and last velocity that the small C program prints."""
+    unpacked = Path(fmpy.extract(impact.fmu[2], str(folder / "unpacked")))
+    host = folder / "host.exe"
+    subprocess.run([compiler, "-O1", str(HOST), "-o", str(host), *ending], check=True)
+    (library,) = (unpacked / "binaries" / platform).iterdir()
+    reference = references(impact.fmu[2])
+    numbers = [repr(STEP), str(COUNT)]
+    numbers += [str(reference[name]) for name in ("peak_contact_force", "velocity")]
+    guid = fmpy.read_model_description(impact.fmu[2]).guid
+    done = subprocess.run(
+        [*run, str(host), str(library), guid, *numbers],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [float(word) for word in done.stdout.split()]
+
+
+def test_bare_c_program_gives_the_native_peak(impact, tmp_path):
+    peak, velocity = by_host(impact, tmp_path, "gcc", "linux64", ["-ldl"], [])
+
+    assert peak == pytest.approx(impact.native.peak_force.max(), rel=1e-11)
+    assert velocity == pytest.approx(impact.native.velocity[-1, 0], rel=1e-10)
+
+
+@pytest.mark.skipif(shutil.which(WINDOWS_COMPILER) is None, reason="no mingw")
+@pytest.mark.skipif(shutil.which("wine") is None, reason="no wine")
+def test_windows_binary_gives_the_native_peak(impact, tmp_path, monkeypatch):
+    monkeypatch.setenv("WINEDEBUG", "-all")
+    peak, velocity = by_host(impact, tmp_path, WINDOWS_COMPILER, "win64", [], ["wine"])
+
+    # sin, exp and log of another C library
+    assert peak == pytest.approx(impact.native.peak_force.max(), rel=1e-9)
+    assert velocity == pytest.approx(impact.native.velocity[-1, 0], rel=1e-9)

@@ -1,0 +1,120 @@
+"""Truth: klack's network solver runs bodies and end stops of a valve; fmpy runs their FMU.
+
+With the films taken out the same model has model exchange, and CVode of SUNDIALS runs it.
+"""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from klack.case import find_case
+from klack.case.valve_reader import load_any_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.mechanics.force import ConstantForce
+from klack.network.network import Network
+from klack.simulation.network_run import simulate_network
+from klack.workflow.valve import build_valve
+
+fmpy = pytest.importorskip("fmpy")
+validation = pytest.importorskip("fmpy.validation")
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+
+OPENING = ("contact_force_opening", "peak_contact_force_opening")
+FORCE, DURATION = 20.0, 3e-4  # [N] opening, on the spring face; one impact on the opening stop
+
+
+@pytest.fixture(scope="module")
+def case():
+    return load_any_case(find_case("demo-stroke"))
+
+
+@pytest.fixture(scope="module")
+def pair(case):
+    return case_models(case).pair
+
+
+def native(case):
+    """Flexible bodies and end stops of the valve alone, pushed by a constant force."""
+    valve = build_valve(case)
+    parts = {
+        name: part
+        for name, part in valve.network.components.items()
+        if part.type in ("flexible-body", "end-stop")
+    }
+    joined = [
+        [port for port in ports if port.split(".")[0] in parts]
+        for ports in valve.network.connections
+    ]
+    joined = [ports + ["drive.end"] * ("needle.spring_face" in ports) for ports in joined]
+    network = Network(
+        parts | {"drive": ConstantForce(force=FORCE)},
+        [ports for ports in joined if len(ports) > 1],
+        fluid=valve.network.fluid,
+    )
+    return simulate_network(
+        network.rows(), duration=DURATION, step=case.run.step, coarse=1, record=1e-6, start="free"
+    )
+
+
+def by_fmu(path, kind, **more):
+    return fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        stop_time=DURATION,
+        start_values={"force_spring_face": FORCE} | more.pop("start_values", {}),
+        output=[*("velocity", "lift", "gap_opening"), *OPENING],
+        **more,
+    )
+
+
+def test_co_simulation_with_films_is_the_native_network(case, pair, tmp_path):
+    run = native(case)
+    path = build_fmu(pair, tmp_path / "v.fmu", fmi=2, platforms=("linux64",))
+    found = by_fmu(path, "CoSimulation", step_size=1e-6, output_interval=1e-6)
+    record = run.interfaces["opening"]
+
+    assert record.contact_force.max() > 500.0  # the needle has hit its stop
+    # the same steps with other sums of round-off, which an impact enlarges
+    assert found["peak_contact_force_opening"].max() == pytest.approx(
+        record.contact_force.max(), rel=1e-9
+    )
+    velocity = run.channels["needle velocity"].values
+    np.testing.assert_allclose(found["velocity"], velocity, rtol=0.0, atol=1e-7)
+    gap = run.channels["opening gap"].values
+    np.testing.assert_allclose(found["gap_opening"], gap, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_films_in_series_leave_co_simulation_alone(pair, tmp_path, fmi):
+    path = build_fmu(pair, tmp_path / "v.fmu", fmi=fmi, platforms=("linux64",))
+    description = fmpy.read_model_description(str(path))
+
+    assert validation.validate_fmu(str(path)) == []
+    assert description.modelExchange is None
+    assert description.coSimulation is not None
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_dry_model_exchange_is_dry_co_simulation(pair, tmp_path, fmi):
+    dry = replace(pair, contacts=tuple(replace(c, film=None) for c in pair.contacts))
+    path = build_fmu(dry, tmp_path / "d.fmu", fmi=fmi, platforms=("linux64",))
+    fine = by_fmu(
+        path,
+        "CoSimulation",
+        step_size=1e-6,
+        output_interval=1e-6,
+        start_values={"internal_step": 1.25e-9},
+    )
+    exchanged = by_fmu(
+        path, "ModelExchange", solver="CVode", relative_tolerance=1e-9, output_interval=2e-8
+    )
+
+    assert validation.validate_fmu(str(path)) == []
+    peak = fine["peak_contact_force_opening"].max()
+    assert peak > 500.0
+    assert exchanged["contact_force_opening"].max() == pytest.approx(peak, rel=1e-4)
+    lift = np.interp(fine["time"], exchanged["time"], exchanged["lift"])
+    np.testing.assert_allclose(lift, fine["lift"], rtol=0.0, atol=1e-6 * 1e-4)
