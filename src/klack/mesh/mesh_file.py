@@ -1,22 +1,51 @@
 """Finished meshes from files of other programs; the ending of the name says which."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Protocol
 
 from klack.errors import InputError
 from klack.mesh.abaqus import read_abaqus_model
+from klack.mesh.ansys_archive import read_ansys_archive
+from klack.mesh.ansys_blocks import is_archive
+from klack.mesh.file_mesh import require_unit
+from klack.mesh.gmsh import read_gmsh
 from klack.mesh.mesh_model import MeshModel
+from klack.mesh.nastran import read_nastran
+from klack.mesh.plausible import require_plausible_size
+from klack.mesh.vtk_file import read_vtk
 
-__all__ = ["MESH_FORMATS", "read_mesh_file"]
-
-Reader = Callable[[Path, float | None, Sequence[str] | None], MeshModel]
+__all__ = ["MESH_FORMATS", "read_mesh_file", "require_unit"]
 
 
-def _abaqus(path: Path, unit_length: float | None, solids: Sequence[str] | None) -> MeshModel:
+class _Reader(Protocol):
+    def __call__(
+        self, path: Path, unit_length: float | None, *, solids: Sequence[str] | None
+    ) -> MeshModel: ...
+
+
+def _abaqus(path: Path, unit_length: float | None, *, solids: Sequence[str] | None) -> MeshModel:
     return read_abaqus_model(path, require_unit(path, unit_length), solids=solids)
 
 
-MESH_FORMATS: Mapping[str, tuple[str, Reader]] = {".inp": ("Abaqus or CalculiX input", _abaqus)}
+def _nastran_or_ansys(
+    path: Path, unit_length: float | None, *, solids: Sequence[str] | None
+) -> MeshModel:
+    """Read a file of the ending that both programs use; ANSYS opens its blocks with commands."""
+    read = read_ansys_archive if path.is_file() and is_archive(path) else read_nastran
+    return read(path, unit_length, solids=solids)
+
+
+MESH_FORMATS: Mapping[str, tuple[str, _Reader]] = {
+    ".inp": ("Abaqus or CalculiX input", _abaqus),
+    ".cdb": ("ANSYS archive", read_ansys_archive),
+    ".bdf": ("Nastran bulk data", read_nastran),
+    ".nas": ("Nastran bulk data", read_nastran),
+    ".dat": ("Nastran bulk data or ANSYS input", _nastran_or_ansys),
+    ".msh": ("Gmsh mesh", read_gmsh),
+    ".vtk": ("VTK grid", read_vtk),
+    ".vtu": ("VTK grid", read_vtk),
+}
 """Ending of the file name: program, and its reader."""
 
 
@@ -37,7 +66,8 @@ def read_mesh_file(
     Raises
     ------
     InputError
-        With file and place, if the file cannot be read, is of another kind, or names no unit.
+        With file and place, if the file cannot be read, is of another kind, names no unit, or
+        holds a body of no plausible size (the sign of a wrong unit).
     """
     path = Path(path)
     if path.suffix.lower() not in MESH_FORMATS:
@@ -49,16 +79,6 @@ def read_mesh_file(
             hint="export the mesh from its program in one of these formats.",
         )
     _, read = MESH_FORMATS[path.suffix.lower()]
-    return read(path, unit_length, solids)
-
-
-def require_unit(path: Path, unit_length: float | None) -> float:
-    """Unit of length that the user gave; raise where the file names none either."""
-    if unit_length is None:
-        raise InputError(
-            str(path),
-            got="no unit of length",
-            expected="the unit of its coordinates: such files do not say",
-            hint="add 'unit: mm' (or the unit of your model) beside the file.",
-        )
-    return unit_length
+    model = read(path, unit_length, solids=solids)
+    require_plausible_size(str(path), model.mesh, model.unit_length)
+    return model

@@ -1,0 +1,131 @@
+"""Surfaces from surface elements, and from node sets that cover faces."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.boundary import FaceTable
+from klack.mesh.mesh import ElementBlock, FaceBlock, Surface
+
+__all__ = ["MarkedFaces", "named_faces"]
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class MarkedFaces:
+    """Surface elements under one name.
+
+    Parameters
+    ----------
+    name : str
+    numbers : int array, shape (n,)
+        Element numbers of the file, for error texts.
+    corners : int array, shape (n, 2..4)
+        Nodes counted from 0; -1 for a node of no element.
+    """
+
+    name: str
+    numbers: Ints
+    corners: Ints
+
+
+def named_faces(
+    where: str,
+    blocks: tuple[ElementBlock, ...],
+    marks: tuple[MarkedFaces, ...],
+    sets: Mapping[str, Ints],
+    *,
+    all_solids: bool,
+) -> tuple[dict[str, Surface], dict[str, Ints]]:
+    """Find the faces of solid elements that surface elements and node sets name.
+
+    Parameters
+    ----------
+    where : str
+        The file, for error texts.
+    blocks : tuple of ElementBlock
+    marks : tuple of MarkedFaces
+    sets : mapping of name to sorted nodes
+        Node sets that may cover faces.
+    all_solids : bool
+        True: every surface element must lie on a solid.  False: the solids of some may be left
+        out.
+
+    Returns
+    -------
+    surfaces : dict of Surface
+        Outer faces.
+    inner : dict of node arrays
+        Nodes of surface elements between two solid elements: they have no side.
+
+    Raises
+    ------
+    InputError
+        For surface elements on no solid element: shells are not modelled.
+    """
+    count = 1 + max(int(block.connectivity.max()) for block in blocks)
+    near = np.zeros(count + 1, dtype=bool)  # the last place is that of -1
+    for nodes in (*(mark.corners for mark in marks), *sets.values()):
+        near[nodes] = True
+    near[-1] = False
+    table = FaceTable.of(_with_faces_on(blocks, near))
+    rows: dict[str, list[Ints]] = {}
+    inner: dict[str, list[Ints]] = {}
+    for mark in marks:
+        found = np.where((mark.corners < 0).any(axis=1), -1, table.find(mark.corners))
+        lost = found < 0
+        if all_solids and lost.any():
+            _refuse_shells(where, mark, lost)
+        found = found[~lost]
+        between = table.shared[found] if len(found) else np.zeros(0, dtype=bool)
+        if between.any():
+            inner.setdefault(mark.name, []).append(table.surface("", found[between]).nodes)
+        if not between.all():
+            rows.setdefault(mark.name, []).append(found[~between])
+    surfaces = {
+        name: table.surface(name, np.unique(np.concatenate(parts))) for name, parts in rows.items()
+    }
+    for name, nodes in sets.items():
+        if name not in surfaces:
+            surface = _covered(table, name, nodes, count)
+            if surface.face_count:
+                surfaces[name] = surface
+    return surfaces, {name: np.unique(np.concatenate(parts)) for name, parts in inner.items()}
+
+
+def _with_faces_on(
+    blocks: tuple[ElementBlock, ...], near: NDArray[np.bool_]
+) -> tuple[ElementBlock, ...]:
+    """Elements that may have a face with all nodes among those of interest."""
+    parts = []
+    for block in blocks:
+        touched = near[block.connectivity].sum(axis=1) >= block.topology.dimension
+        parts.append(ElementBlock(block.family, block.connectivity[touched], block.solid))
+    return tuple(parts)
+
+
+def _covered(table: FaceTable, name: str, nodes: Ints, count: int) -> Surface:
+    """Outer faces all of whose nodes are in the set."""
+    member = np.zeros(count + 1, dtype=bool)
+    member[nodes] = True
+    corners_in = (member[table.keys] | (table.keys < 0)).all(axis=1)
+    surface = table.surface(name, np.flatnonzero(corners_in & ~table.shared))
+    kept = tuple(
+        FaceBlock(block.family, inside)
+        for block in surface.blocks
+        if len(inside := block.connectivity[member[block.connectivity].all(axis=1)])
+    )
+    return Surface(name, kept)
+
+
+def _refuse_shells(where: str, mark: MarkedFaces, lost: NDArray[np.bool_]) -> None:
+    raise InputError(
+        f"{where}: element {mark.numbers[lost][0]} ('{mark.name}')",
+        got=f"{lost.sum()} surface elements that are no faces of a solid element",
+        expected="surface elements that only mark faces of the solid mesh",
+        hint="shells and membranes are not modelled: take them out of the file.",
+    )
