@@ -7,6 +7,9 @@ from klack.mesh.abaqus import read_abaqus
 
 NODES = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n"
 TET = NODES + "*ELEMENT, TYPE=C3D4, ELSET=body\n1, 1, 2, 3, 4\n"
+PART = "*PART, NAME=a\n" + TET + "*END PART\n"
+INSTANCE = "*INSTANCE, NAME=i, PART=a\n*END INSTANCE\n"
+RING = "*PART, NAME=r\n*NODE\n1,1,0\n2,2,0\n3,1,1\n*ELEMENT, TYPE=CAX3\n1,1,2,3\n*END PART\n"
 
 FAULTS = {
     "not a deck": ("solid cube\n", r"x.inp:1: got 'solid cube', expected a keyword"),
@@ -50,8 +53,77 @@ FAULTS = {
     "surface type": (TET + "*SURFACE, NAME=s, TYPE=CUTTING\n1\n", "got TYPE=CUTTING"),
     "generated": (TET + "*NGEN\n1, 4\n", "x.inp:8: .NGEN: got a keyword that makes nodes"),
     "cylindrical": ("*NODE, SYSTEM=C\n1,1,1,1\n", "got SYSTEM=C"),
-    "moved instance": (TET + "*INSTANCE, NAME=i\n0., 0., 1.\n", "moved or turned"),
-    "two parts": (TET + "*PART, NAME=a\n*PART, NAME=b\n", "x.inp:9: .PART: got a second one"),
+    "instance alone": (TET + "*INSTANCE, NAME=i\n", "x.inp:8: .INSTANCE: got no parameter PART"),
+    "unknown part": (
+        PART + "*INSTANCE, NAME=i, PART=b\n",
+        r"x.inp:10: .INSTANCE: got PART=b, expected a part that is defined above \(A\)",
+    ),
+    "half a placement": (
+        PART + "*INSTANCE, NAME=i, PART=a\n0., 0., 1.\n0., 0., 1., 90.\n",
+        "x.inp:10: .INSTANCE: got data lines of 3, 4 numbers, expected a translation",
+    ),
+    "no axis": (
+        PART + "*INSTANCE, NAME=i, PART=a\n0., 0., 1.\n1., 2., 3., 1., 2., 3., 90.\n",
+        "x.inp:10: .INSTANCE: got an axis of length 0",
+    ),
+    "instance twice": (PART + 2 * INSTANCE, "x.inp:12: .INSTANCE: got a second instance 'i'"),
+    "part twice": (PART + PART, "x.inp:10: .PART: got a second part 'a'"),
+    "part in a part": (
+        "*PART, NAME=a\n*PART, NAME=b\n",
+        "x.inp:2: .PART: got .PART of x.inp:1 without its end",
+    ),
+    "open part": (PART + "*PART, NAME=b\n", "x.inp:10: .PART: got the end of the file"),
+    "end only": (TET + "*END PART\n", "x.inp:8: .END PART: got an end without a beginning"),
+    "parts without assembly": (
+        PART + PART.replace("NAME=a", "NAME=b"),
+        "got 2 parts and no .INSTANCE",
+    ),
+    "set of no instance": (
+        PART + INSTANCE + "*NSET, NSET=n, INSTANCE=j\n1\n",
+        r"x.inp:12: .NSET: got INSTANCE=j, expected an instance that is defined above \(i\)",
+    ),
+    "not in the instance": (
+        PART + INSTANCE + "*NSET, NSET=n, INSTANCE=i\n1, 9\n",
+        "x.inp:13: got node 9, which the file does not define",
+    ),
+    "number without instance": (
+        PART + INSTANCE + "*NSET, NSET=n\n1\n",
+        "x.inp:13: got node 1, which the file does not define",
+    ),
+    "set of two instances": (
+        PART + INSTANCE + INSTANCE.replace("NAME=i", "NAME=j") + "*ELSET, ELSET=e\nbody\n",
+        r"x.inp:15: got element set 'body' of several instances.*\(i.body, j.body\)",
+    ),
+    "ring off its axis": (
+        RING + "*INSTANCE, NAME=i, PART=r\n1., 0., 0.\n*END INSTANCE\n",
+        "x.inp:9: .INSTANCE: got an axisymmetric part that is turned, or moved away",
+    ),
+    "offset": (NODES + "*ELEMENT, TYPE=C3D4, OFFSET=10\n1,1,2,3,4\n", "the parameter OFFSET"),
+    "edge of a shell": (
+        TET + "*ELEMENT, TYPE=S3, ELSET=m\n2, 1, 2, 3\n*SURFACE, NAME=s\nm, S3\n",
+        r"x.inp:11: got face 'S3', expected SPOS or SNEG \(tri3\)",
+    ),
+    "side of a solid": (TET + "*SURFACE, NAME=s\n1, SPOS\n", "x.inp:9: got face 'SPOS'"),
+    "faces cut out": (TET + "*SURFACE, NAME=s, CROP\nbody,\n", "the parameter CROP"),
+    "difference": (
+        TET + "*SURFACE, NAME=s, COMBINE=DIFFERENCE\na, b\n",
+        "got COMBINE=DIFFERENCE, expected COMBINE=UNION",
+    ),
+    "union of nothing": (
+        TET + "*SURFACE, NAME=s, COMBINE=UNION\na, b\n",
+        r"x.inp:9: got surface 'a', expected a surface defined above \(none\)",
+    ),
+    "empty field": (NODES + "5, , 1, 2\n", "x.inp:6: got '', expected a finite number"),
+    "two in one field": (NODES + "5, 0, 1 2, 2\n", "x.inp:6: got '1 2'"),
+    "huge label": (f"*NODE\n{10**30}, 0, 0, 0\n", "x.inp:2: got '10000"),
+    "thousands": ("*NODE\n1, 1_000, 0, 0\n", "x.inp:2: got '1_000'"),
+    "infinite": ("*NODE\n1, 1e999, 0, 0\n", "x.inp:2: got '1e999'"),
+    "material without values": (
+        TET + "*MATERIAL, NAME=m\n*ELASTIC\n*DENSITY\n1.\n",
+        "x.inp:9: .ELASTIC: got no data line",
+    ),
+    "long name of a file": (f"*INCLUDE, INPUT={'x' * 5000}\n", "xxx: got file name too long"),
+    "endless line": ("*NODE " + 30_000 * "x", "x.inp:1: got a line of 30006 bytes"),
     "inverted": (
         NODES + "*ELEMENT, TYPE=C3D4, ELSET=body\n77, 1, 3, 2, 4\n",
         r"element 77 \(tet4, solid 'body'\) at x, y, z = 250, 250, 250 mm: got a smallest scaled",

@@ -7,6 +7,7 @@ a named surface) becomes a surface, provided that every one of them lies on a so
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,17 @@ from numpy.typing import NDArray
 from klack.errors import InputError, require_positive
 from klack.mesh.abaqus_deck import Deck, read_deck
 from klack.mesh.abaqus_elements import ElementGroup
-from klack.mesh.abaqus_keywords import DataLine
-from klack.mesh.abaqus_surfaces import FaceFinder, require_on_solids
+from klack.mesh.abaqus_faces import FaceFinder, RowBlock, require_on_solids
+from klack.mesh.abaqus_numbering import distinct
+from klack.mesh.abaqus_scope import Scope
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import require_positive_jacobians
 
 __all__ = ["read_abaqus", "read_abaqus_model"]
+
+_CHECKED = 50_000  # elements at a time
 
 
 def read_abaqus(
@@ -60,49 +64,48 @@ def read_abaqus_model(
     """Read mesh, materials and sections; see :func:`read_abaqus`."""
     require_positive("read_abaqus: unit_length", unit_length, "m")
     path = Path(path)
-    deck = read_deck(path)
-    return _build(path, deck, unit_length, solids)
+    return _build(path, read_deck(path), unit_length, solids)
 
 
 def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | None) -> MeshModel:
-    solid_groups = [group for group in deck.groups if group.solid and len(group.numbers)]
-    _require_solids(path, deck, solid_groups)
-    labels = np.array(sorted(deck.nodes), dtype=np.int64)
-    coordinates = np.array([deck.nodes[i] for i in labels.tolist()])
-    name_of, sections = _solid_names(deck, solid_groups)
-    blocks, numbers = _blocks(solid_groups, name_of, labels)
-    require_on_solids(deck, blocks, labels)
-    blocks, numbers = _kept(path, blocks, numbers, wanted)
-    resolver = FaceFinder(blocks, numbers, labels, deck)
-    surfaces, node_sets = resolver.surfaces_and_sets()
-    dimension = blocks[0].topology.dimension
-    used = np.unique(np.concatenate([block.connectivity.ravel() for block in blocks]))
+    scope = deck.scope
+    _require_solids(path, scope)
+    labels = np.concatenate(scope.labels)
+    dimension = next(FAMILIES[group.family].dimension for group in scope.groups if group.solid)
+    names, sections = _solid_names(scope)
+    blocks = _blocks(scope, names)
+    require_on_solids(scope, blocks)
+    blocks = _kept(path, scope, blocks, wanted)
+    surfaces, node_sets = FaceFinder(blocks, scope).surfaces_and_sets()
+    used = _used_nodes(scope, blocks, labels)
     new = np.full(len(labels), -1)
     new[used] = np.arange(len(used))
     mesh = Mesh(
-        points=coordinates[used, :dimension] * unit_length,
-        blocks=tuple(ElementBlock(b.family, new[b.connectivity], b.solid) for b in blocks),
+        points=_points(scope)[used, :dimension] * unit_length,
+        blocks=tuple(_renumbered_block(block.elements, new) for block in blocks),
         surfaces={name: _renumbered(surface, new) for name, surface in surfaces.items()},
         node_sets={
             name: kept for name, nodes in node_sets.items() if len(kept := _present(new, nodes))
         },
     )
     _require_right_of_axis(path, mesh, labels[used])
-    require_positive_jacobians(str(path), mesh, numbers=numbers)
+    numbers = np.concatenate([group.numbers for group in scope.groups])
+    _require_sound(path, mesh, [numbers[block.rows] for block in blocks])
+    rows, sizes = np.concatenate([b.rows for b in blocks]), [len(b.rows) for b in blocks]
     return MeshModel(
         mesh=mesh,
-        node_numbers=labels[used],
-        element_numbers=numbers,
+        node_numbers=_unique(labels, used),
+        element_numbers=tuple(np.split(_unique(numbers, rows), np.cumsum(sizes)[:-1])),
         materials=deck.materials,
         sections={name: sections[name] for name in mesh.solids if name in sections},
         unit_length=unit_length,
     )
 
 
-def _require_solids(path: Path, deck: Deck, groups: list[ElementGroup]) -> None:
-    dimensions = {FAMILIES[group.family].dimension for group in groups}
+def _require_solids(path: Path, scope: Scope) -> None:
+    dimensions = {FAMILIES[group.family].dimension for group in scope.groups if group.solid}
     if len(dimensions) != 1:
-        kinds = ", ".join(sorted({group.family for group in deck.groups})) or "none"
+        kinds = ", ".join(sorted({group.family for group in scope.groups})) or "none"
         raise InputError(
             str(path),
             got=f"elements with the topology {kinds}",
@@ -111,72 +114,144 @@ def _require_solids(path: Path, deck: Deck, groups: list[ElementGroup]) -> None:
         )
 
 
-def _solid_names(deck: Deck, groups: list[ElementGroup]) -> tuple[dict[int, str], dict[str, str]]:
-    """Name of the solid of every solid element number, and material name by solid."""
-    name_of: dict[int, str] = {}
+@dataclass(frozen=True, slots=True)
+class _SolidNames:
+    """Name of the solid of every element: its place in a list, -1 for surface elements."""
+
+    shown: list[str]
+    of_element: NDArray[np.int32]
+
+
+def _solid_names(scope: Scope) -> tuple[_SolidNames, dict[str, str]]:
+    """Names of the solids, and material name by solid."""
+    shown: dict[str, int] = {}
+    of_element = np.full(scope.elements.count, -1, dtype=np.int32)
+    sets = scope.elements.sets
+    for group in scope.groups:
+        if group.solid:
+            name = _label(scope, group)
+            of_element[group.first : group.first + len(group.numbers)] = shown.setdefault(
+                name, len(shown)
+            )
+    label, solid = of_element.copy(), of_element >= 0
+    free = np.bincount(label[solid], minlength=len(shown))  # elements of a label without a name
+    for key in dict.fromkeys(scope.listed):
+        listed = sets.members(key)
+        if not len(listed) or not solid[listed].all():
+            continue
+        count = np.bincount(label[listed], minlength=len(free))
+        inside = count > 0
+        if (count[inside] == free[inside]).all():  # made of whole labels
+            of_element[listed] = shown.setdefault(sets.names.shortest(key), len(shown))
+            free[inside] = -1
     sections: dict[str, str] = {}
-    members: dict[str, NDArray[np.int64]] = {}
-    for group in groups:
-        label = group.elset or "solid"
-        members[label] = np.append(members.get(label, group.numbers[:0]), group.numbers)
-    free = dict(members)
-    for name in dict.fromkeys(deck.listed):
-        listed = set(deck.elsets.numbers(name).tolist())
-        whole = [label for label, part in free.items() if listed.issuperset(part.tolist())]
-        if whole and sum(len(free[label]) for label in whole) == len(listed):
-            for label in whole:
-                name_of.update(dict.fromkeys(free.pop(label).tolist(), name))
-    for label, part in free.items():
-        name_of.update(dict.fromkeys(part.tolist(), label))
-    for keyword in deck.sections:
-        name = keyword.parameter("ELSET")
-        elements = deck.elsets.resolve(DataLine(keyword.place, ()), name).tolist()
-        known = [element for element in elements if element in name_of]
-        name_of.update(dict.fromkeys(known, name))
-        if "MATERIAL" in keyword.parameters:
-            sections[name] = keyword.parameters["MATERIAL"]
-    return name_of, sections
+    for section in scope.sections:
+        name = sets.names.shortest(section.elset)
+        rows = sets.members(section.elset)
+        of_element[rows[solid[rows]]] = shown.setdefault(name, len(shown))
+        if section.material:
+            sections[name] = section.material
+    return _SolidNames(list(shown), of_element), sections
 
 
-def _blocks(
-    groups: list[ElementGroup], name_of: dict[int, str], labels: NDArray[np.int64]
-) -> tuple[tuple[ElementBlock, ...], tuple[NDArray[np.int64], ...]]:
-    """One block per solid and family, nodes counted from 0, and their element numbers."""
-    blocks, numbers = [], []
-    names = [np.array([name_of[i] for i in group.numbers.tolist()]) for group in groups]
-    for name in dict.fromkeys(np.concatenate(names).tolist()):
-        for family in dict.fromkeys(group.family for group in groups):
-            here = [
-                (group, own == name)
-                for group, own in zip(groups, names, strict=True)
-                if group.family == family and (own == name).any()
-            ]
-            if here:
-                nodes = np.concatenate([group.nodes[mask] for group, mask in here])
-                blocks.append(ElementBlock(family, np.searchsorted(labels, nodes), name))
-                numbers.append(np.concatenate([group.numbers[mask] for group, mask in here]))
-    return tuple(blocks), tuple(numbers)
+def _label(scope: Scope, group: ElementGroup) -> str:
+    """Name of the solid as long as nothing else gives it one."""
+    if group.elset:
+        names = scope.elements.sets.names
+        return names.shortest(names.require(group.place, group.elset))
+    return group.instance if len(scope.instances) > 1 else "solid"
+
+
+def _blocks(scope: Scope, names: _SolidNames) -> tuple[RowBlock, ...]:
+    """One block per solid and family, with nodes as rows of the scope."""
+    found: dict[tuple[int, str], list[tuple[NDArray[np.int64], NDArray[np.int64]]]] = {}
+    for group in scope.groups:
+        if not group.solid:
+            continue
+        own = names.of_element[group.first : group.first + len(group.numbers)]
+        if (own == own[0]).all():
+            found.setdefault((int(own[0]), group.family), []).append((group.rows, group.nodes))
+            continue
+        order = np.argsort(own, kind="stable")
+        cuts = np.flatnonzero(np.diff(own[order])) + 1
+        for part in sorted(np.split(order, cuts), key=lambda part: int(part[0])):
+            key = int(own[part[0]]), group.family
+            found.setdefault(key, []).append((group.first + part, group.nodes[part]))
+    solids = list(dict.fromkeys(name for name, _ in found))
+    families = list(dict.fromkeys(group.family for group in scope.groups if group.solid))
+    order_of = {solid: i for i, solid in enumerate(solids)}
+    keys = sorted(found, key=lambda key: (order_of[key[0]], families.index(key[1])))
+    blocks = []
+    for name, family in keys:
+        rows, nodes = zip(*found[name, family], strict=True)
+        joined = nodes[0] if len(nodes) == 1 else np.concatenate(nodes)
+        element_block = ElementBlock(family, joined, names.shown[name])
+        blocks.append(RowBlock(element_block, np.concatenate(rows)))
+    return tuple(blocks)
 
 
 def _kept(
-    path: Path,
-    blocks: tuple[ElementBlock, ...],
-    numbers: tuple[NDArray[np.int64], ...],
-    wanted: Sequence[str] | None,
-) -> tuple[tuple[ElementBlock, ...], tuple[NDArray[np.int64], ...]]:
+    path: Path, scope: Scope, blocks: tuple[RowBlock, ...], wanted: Sequence[str] | None
+) -> tuple[RowBlock, ...]:
     if wanted is None:
-        return blocks, numbers
-    known = {block.solid for block in blocks}
+        return blocks
+    known = {block.elements.solid for block in blocks}
+    names = scope.elements.sets.names
+    chosen = set()
     for name in wanted:
-        if name not in known:
+        key = None if name in known else names.find(name)
+        solid = name if key is None else names.shortest(key)
+        if solid not in known:
             raise InputError(
                 f"{path}: solid '{name}'",
                 got="a name that the file does not have",
                 expected=f"one of: {', '.join(sorted(known))}",
                 hint="solids are called after the sets of *SOLID SECTION or *ELEMENT.",
             )
-    keep = [i for i, block in enumerate(blocks) if block.solid in wanted]
-    return tuple(blocks[i] for i in keep), tuple(numbers[i] for i in keep)
+        chosen.add(solid)
+    return tuple(block for block in blocks if block.elements.solid in chosen)
+
+
+def _used_nodes(
+    scope: Scope, blocks: Sequence[RowBlock], labels: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Rows of the nodes of the elements: by instance, in it by number."""
+    mask = np.zeros(len(labels), dtype=bool)
+    for block in blocks:
+        mask[block.elements.connectivity] = True
+    used = np.flatnonzero(mask)
+    owner = np.zeros(len(labels), dtype=np.int32)
+    for number, instance in enumerate(scope.instances.values(), start=1):
+        owner[instance.first_node : instance.first_node + instance.scope.nodes.count] = number
+    return used[np.lexsort((labels[used], owner[used]))]
+
+
+def _unique(numbers: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of the file; where instances share them, counted on through the file from 1."""
+    own = numbers[rows]
+    return own if len(distinct(own)) == len(own) else rows + 1
+
+
+def _points(scope: Scope) -> NDArray[np.float64]:
+    """Coordinates of all nodes, which the scope then holds no longer."""
+    points = scope.points[0] if len(scope.points) == 1 else np.concatenate(scope.points)
+    scope.points.clear()
+    return points
+
+
+def _renumbered_block(block: ElementBlock, new: NDArray[np.int64]) -> ElementBlock:
+    return ElementBlock(block.family, new[block.connectivity], block.solid)
+
+
+def _require_sound(path: Path, mesh: Mesh, numbers: Sequence[NDArray[np.int64]]) -> None:
+    """No element is inverted; checked some thousand at a time to save memory."""
+    for block, part in zip(mesh.blocks, numbers, strict=True):
+        for start in range(0, len(part), _CHECKED):
+            cut = slice(start, start + _CHECKED)
+            piece = ElementBlock(block.family, block.connectivity[cut], block.solid)
+            require_positive_jacobians(
+                str(path), Mesh(points=mesh.points, blocks=(piece,)), numbers=[part[cut]]
+            )
 
 
 def _present(new: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:

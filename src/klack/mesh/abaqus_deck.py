@@ -1,180 +1,237 @@
-"""Keywords of an Abaqus or CalculiX file, collected: nodes, elements, sets, surfaces, materials."""
+"""Keywords of an Abaqus or CalculiX file, collected: parts, instances, assembly, materials."""
 
-from dataclasses import dataclass, field
+import warnings
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from klack.errors import InputError
-from klack.mesh.abaqus_elements import ElementGroup, read_elements
+from klack.errors import AccuracyWarning, InputError
+from klack.mesh.abaqus_instances import Placement, add_instance, read_placement
 from klack.mesh.abaqus_keywords import DataLine, Keyword, read_keywords
-from klack.mesh.abaqus_sets import NamedSets, integer, number, records
+from klack.mesh.abaqus_numbers import number, records
+from klack.mesh.abaqus_scope import Scope, Section
+from klack.mesh.abaqus_surfaces import read_surface
 from klack.mesh.mesh_model import FileMaterial
 
 __all__ = ["Deck", "read_deck"]
 
 _GENERATING = {"NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM"}
+_IGNORED = {
+    "TRANSFORM",
+    *("TIE", "EQUATION", "MPC", "COUPLING", "KINEMATIC", "DISTRIBUTING", "RIGID BODY"),
+    *("EMBEDDED ELEMENT", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "MODEL CHANGE"),
+}
+_END_OF_MATERIAL = {"MATERIAL", "STEP", "PART", "ASSEMBLY", "SOLID SECTION", "NODE", "ELEMENT"}
 
 
-@dataclass
+@dataclass(frozen=True, slots=True)
 class Deck:
-    """Content of the keywords, numbers as in the file."""
+    """What a file holds: all instances in one scope, and the materials."""
 
-    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
-    groups: list[ElementGroup] = field(default_factory=list)
-    elements: set[int] = field(default_factory=set)
-    nsets: NamedSets = field(default_factory=lambda: NamedSets("node"))
-    elsets: NamedSets = field(default_factory=lambda: NamedSets("element"))
-    listed: list[str] = field(default_factory=list)  # names of *ELSET keywords
-    surfaces: list[Keyword] = field(default_factory=list)
-    sections: list[Keyword] = field(default_factory=list)
-    materials: dict[str, FileMaterial] = field(default_factory=dict)
-    parts: list[Keyword] = field(default_factory=list)
-    instances: list[Keyword] = field(default_factory=list)
+    scope: Scope
+    materials: dict[str, FileMaterial]
 
 
 def read_deck(path: Path) -> Deck:
-    """Read all keywords that describe the model, up to its steps."""
-    deck = Deck()
-    keywords = read_keywords(path)
+    """Read all keywords that describe the model, without its steps.
+
+    Warns
+    -----
+    AccuracyWarning
+        Once, if the file holds *TRANSFORM or constraints between nodes, which are passed over.
+    """
+    reader = _Reader(path)
     in_step = False
-    for i, keyword in enumerate(keywords):
+    for keyword in read_keywords(path):
         in_step = (in_step or keyword.name == "STEP") and keyword.name != "END STEP"
         if not in_step:
-            _take(deck, keyword, keywords[i + 1 :])
-    return deck
+            reader.take(keyword)
+    return reader.finish()
 
 
-def _take(deck: Deck, keyword: Keyword, rest: list[Keyword]) -> None:
-    """Put one keyword into the deck."""
-    match keyword.name:
-        case "NODE":
-            _take_nodes(deck, keyword)
-        case "ELEMENT":
-            _take_elements(deck, keyword)
-        case "NSET":
-            name = keyword.parameter("NSET")
-            if "ELSET" in keyword.parameters:
-                members = deck.elsets.resolve(
-                    DataLine(keyword.place, ()), keyword.parameter("ELSET")
+@dataclass
+class _Material:
+    """A *MATERIAL of which the values are still coming."""
+
+    name: str
+    elastic: tuple[float, float] | None = None
+    density: float | None = None
+
+
+@dataclass
+class _Reader:
+    """Where in the file we are."""
+
+    path: Path
+    root: Scope = field(default_factory=Scope)
+    parts: dict[str, Scope] = field(default_factory=dict)
+    scope: Scope | None = None  # of the part or instance that is open
+    opened: Keyword | None = None
+    placement: Placement | None = None
+    material: _Material | None = None
+    materials: dict[str, FileMaterial] = field(default_factory=dict)
+    ignored: dict[str, str] = field(default_factory=dict)
+
+    def take(self, keyword: Keyword) -> None:
+        """Put one keyword where it belongs."""
+        if keyword.name in _END_OF_MATERIAL:
+            self.material = None
+        match keyword.name:
+            case "PART" | "INSTANCE":
+                self._open(keyword)
+            case "END PART" | "END INSTANCE":
+                self._close(keyword)
+            case "ASSEMBLY" | "END ASSEMBLY":
+                self._require_closed(keyword)
+            case "MATERIAL":
+                self.material = _Material(keyword.parameter("NAME"))
+            case "ELASTIC" | "DENSITY":
+                self._take_value(keyword)
+            case name if name in _GENERATING:
+                raise InputError(
+                    f"{keyword.place}: *{keyword.name}",
+                    got="a keyword that makes nodes or elements",
+                    expected="all nodes and elements written out",
+                    hint="write the file again from the preprocessor, as a flat mesh.",
                 )
-                deck.nsets.add(name, _nodes_of(deck, members))
-            else:
-                deck.nsets.read(keyword, name, deck.nodes.__contains__)
-        case "ELSET":
-            name = keyword.parameter("ELSET")
-            deck.elsets.read(keyword, name, deck.elements.__contains__)
-            deck.listed.append(name)
-        case "SURFACE":
-            deck.surfaces.append(keyword)
-        case "SOLID SECTION":
-            deck.sections.append(keyword)
-        case "MATERIAL":
-            _take_material(deck, keyword, rest)
-        case "PART":
-            _take_single(deck.parts, keyword)
-        case "INSTANCE":
-            _take_single(deck.instances, keyword)
-        case name if name in _GENERATING:
+            case name if name in _IGNORED:
+                self.ignored.setdefault(name, keyword.place)
+            case _:
+                (self.root if self.scope is None else self.scope).take(keyword)
+
+    def _require_closed(self, keyword: Keyword) -> None:
+        if self.opened is not None:
             raise InputError(
                 f"{keyword.place}: *{keyword.name}",
-                got="a keyword that makes nodes or elements",
-                expected="all nodes and elements written out",
-                hint="write the file again from the preprocessor, as a flat mesh.",
+                got=f"*{self.opened.name} of {self.opened.place} without its end",
+                expected=f"*END {self.opened.name} before",
+                hint="the file may be cut off or edited by hand.",
             )
 
+    def _open(self, keyword: Keyword) -> None:
+        self._require_closed(keyword)
+        name = keyword.parameter("NAME" if keyword.name == "PART" else "PART").upper()
+        if keyword.name == "PART":
+            if name in self.parts:
+                raise InputError(
+                    f"{keyword.place}: *PART",
+                    got=f"a second part '{keyword.parameter('NAME')[:80]}'",
+                    expected="every name once",
+                    hint="look for a file that is included twice.",
+                )
+            self.scope = Scope()
+        else:
+            keyword.parameter("NAME")
+            if name not in self.parts:
+                raise InputError(
+                    f"{keyword.place}: *INSTANCE",
+                    got=f"PART={keyword.parameter('PART')[:80]}",
+                    expected=f"a part that is defined above ({', '.join(self.parts) or 'none'})",
+                    hint="check the spelling; instances of results files are not read.",
+                )
+            self.scope = self.parts[name].copy()
+            self.placement = read_placement(keyword)
+        self.opened = keyword
 
-def _take_single(seen: list[Keyword], keyword: Keyword) -> None:
-    seen.append(keyword)
-    if len(seen) > 1 or (keyword.name == "INSTANCE" and keyword.data):
-        raise InputError(
-            f"{keyword.place}: *{keyword.name}",
-            got="a second one" if len(seen) > 1 else "an instance that is moved or turned",
-            expected="one part with one instance in place",
-            hint="write every body into its own file, or as a flat file without parts.",
-        )
-
-
-def _take_nodes(deck: Deck, keyword: Keyword) -> None:
-    if keyword.parameters.get("SYSTEM", "R").upper() != "R":
-        raise InputError(
-            f"{keyword.place}: *NODE",
-            got=f"SYSTEM={keyword.parameters['SYSTEM']}",
-            expected="rectangular coordinates",
-            hint="write the file again with global rectangular coordinates.",
-        )
-    numbers = []
-    for line in keyword.data:
-        count = len(line.fields)
-        if count not in (3, 4):
+    def _close(self, keyword: Keyword) -> None:
+        opened = self.opened
+        if self.scope is None or opened is None or keyword.name != f"END {opened.name}":
             raise InputError(
-                line.place,
-                got=f"{count} numbers",
-                expected="a node number and 2 or 3 coordinates",
+                f"{keyword.place}: *{keyword.name}",
+                got="an end without a beginning",
+                expected=f"*{keyword.name.removeprefix('END ')} before",
+                hint="the file may be shuffled or edited by hand.",
+            )
+        _finish(self.scope)
+        if opened.name == "PART":
+            self.parts[opened.parameter("NAME").upper()] = self.scope
+        elif self.placement is not None:
+            name = opened.parameter("NAME")
+            add_instance(self.root, name, self.scope, self.placement, opened.place)
+        self.scope = self.opened = self.placement = None
+
+    def _take_value(self, keyword: Keyword) -> None:
+        """Read *ELASTIC (isotropic) or *DENSITY of the present material."""
+        if self.material is None:
+            return
+        if keyword.name == "DENSITY":
+            line, fields = _first_record(keyword, (1, 2), "a density")
+            self.material.density = number(line, fields[0])
+        elif keyword.parameters.get("TYPE", "ISOTROPIC").upper().startswith("ISO"):
+            line, fields = _first_record(keyword, (2, 3), "Young's modulus and Poisson's ratio")
+            self.material.elastic = number(line, fields[0]), number(line, fields[1])
+        if self.material.elastic is not None:
+            young, poisson = self.material.elastic
+            self.materials[self.material.name] = FileMaterial(
+                name=self.material.name,
+                young=young,
+                poisson=poisson,
+                density=self.material.density,
+            )
+
+    def finish(self) -> Deck:
+        """Resolve what had to wait for the end of the file."""
+        if self.opened is not None:
+            raise InputError(
+                f"{self.opened.place}: *{self.opened.name}",
+                got="the end of the file",
+                expected=f"*END {self.opened.name} before",
                 hint="the file may be cut off: write it again from the preprocessor.",
             )
-        label = integer(line, line.fields[0])
-        x = [number(line, text) for text in line.fields[1:]]
-        if label in deck.nodes:
-            _defined_twice(line, "node", label)
-        deck.nodes[label] = (x[0], x[1], x[2] if count == 4 else 0.0)
-        numbers.append(label)
-    if "NSET" in keyword.parameters:
-        deck.nsets.add(keyword.parameter("NSET"), numbers)
+        if self.parts and not self.root.instances:
+            self._add_only_part()
+        _finish(self.root)
+        self._warn()
+        shown = {name.upper(): name for name in self.materials}
+        self.root.sections = [
+            replace(section, material=shown.get(section.material.upper(), section.material))
+            for section in self.root.sections
+        ]
+        return Deck(self.root, self.materials)
+
+    def _add_only_part(self) -> None:
+        """A part without an assembly is taken as drawn."""
+        if len(self.parts) > 1 or self.root.groups:
+            raise InputError(
+                str(self.path),
+                got=f"{len(self.parts)} parts and no *INSTANCE",
+                expected="an assembly with instances of the parts",
+                hint="write the whole model, or one part per file.",
+            )
+        ((name, part),) = self.parts.items()
+        placement = read_placement(Keyword("INSTANCE", {}, str(self.path)))
+        add_instance(self.root, name, part, placement, str(self.path))
+
+    def _warn(self) -> None:
+        if self.ignored:
+            found = ", ".join(f"*{name} ({place})" for name, place in self.ignored.items())
+            warnings.warn(
+                f"passed over: {found}. Only mesh, sets and materials are read; directions of "
+                "loads and constraints between nodes are not.",
+                AccuracyWarning,
+                stacklevel=4,
+            )
 
 
-def _take_elements(deck: Deck, keyword: Keyword) -> None:
-    group = read_elements(keyword)
-    before = len(deck.elements)
-    deck.elements.update(group.numbers.tolist())
-    if len(deck.elements) != before + len(group.numbers):
-        known = np.concatenate([*(g.numbers for g in deck.groups), group.numbers])
-        labels, counts = np.unique(known, return_counts=True)
-        _defined_twice(keyword.data[0], "element", int(labels[counts > 1][0]))
-    missing = [n for n in np.unique(group.nodes).tolist() if n not in deck.nodes]
-    if missing:
-        row = int(np.flatnonzero((group.nodes == missing[0]).any(axis=1))[0])
-        raise InputError(
-            f"{group.place}: *ELEMENT: element {group.numbers[row]}",
-            got=f"node {missing[0]}, which the file does not define above",
-            expected="nodes of this file",
-            hint="the file may be cut off, or its *NODE lines are in a file that is not included.",
-        )
-    deck.groups.append(group)
-    if group.elset:
-        deck.elsets.add(group.elset, group.numbers.tolist())
-
-
-def _defined_twice(line: DataLine, kind: str, label: int) -> None:
+def _first_record(
+    keyword: Keyword, lengths: tuple[int, int], what: str
+) -> tuple[DataLine, list[str]]:
+    for line, fields in records(keyword, lengths, what):
+        return line, fields
     raise InputError(
-        line.place,
-        got=f"{kind} {label} for the second time",
-        expected=f"every {kind} number once",
-        hint="look for a file that is included twice, or for two parts in one file.",
+        f"{keyword.place}: *{keyword.name}",
+        got="no data line",
+        expected=what,
+        hint="the file may be cut off or edited by hand.",
     )
 
 
-def _nodes_of(deck: Deck, elements: NDArray[np.int64]) -> list[int]:
-    parts = [g.nodes[np.isin(g.numbers, elements)].ravel() for g in deck.groups]
-    return np.unique(np.concatenate(parts)).tolist()
-
-
-def _take_material(deck: Deck, keyword: Keyword, rest: list[Keyword]) -> None:
-    """Read *ELASTIC (isotropic) and *DENSITY below a *MATERIAL."""
-    name = keyword.parameter("NAME")
-    elastic, density = None, None
-    for part in rest:
-        if part.name in ("MATERIAL", "STEP", "PART", "SOLID SECTION", "NODE", "ELEMENT"):
-            break
-        isotropic = part.parameters.get("TYPE", "ISOTROPIC").upper().startswith("ISO")
-        if part.name == "ELASTIC" and isotropic:
-            line, fields = next(records(part, (2, 3), "Young's modulus and Poisson's ratio"))
-            elastic = number(line, fields[0]), number(line, fields[1])
-        if part.name == "DENSITY":
-            line, fields = next(records(part, (1, 2), "a density"))
-            density = number(line, fields[0])
-    if elastic is not None:
-        deck.materials[name] = FileMaterial(
-            name=name, young=elastic[0], poisson=elastic[1], density=density
-        )
+def _finish(scope: Scope) -> None:
+    """Resolve surfaces and sections, which may name sets that come after them."""
+    for keyword in scope.waiting:
+        if keyword.name == "SURFACE":
+            read_surface(scope, keyword)
+        else:
+            name = keyword.parameter("ELSET")
+            key = scope.elements.sets.names.require(keyword.place, name)
+            scope.sections.append(Section(key, keyword.parameters.get("MATERIAL", "")))
+    scope.waiting.clear()

@@ -1,17 +1,17 @@
 """Element types of Abaqus and CalculiX, and their data lines."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.abaqus_keywords import Keyword
-from klack.mesh.abaqus_sets import integer, records
+from klack.mesh.abaqus_numbers import integer_records, records
 from klack.mesh.families import FAMILIES
 
-__all__ = ["ElementGroup", "read_elements"]
+__all__ = ["ElementGroup", "place_of_element", "read_elements"]
 
 # Letters behind the name (reduced, hybrid, modified, incompatible, thermal) keep the nodes.
 _SOLIDS = {
@@ -40,10 +40,15 @@ class ElementGroup:
     solid : bool
         False for surface elements.
     numbers : int array, shape (n,)
+        As in the file.
     nodes : int array, shape (n, k)
-        Node numbers of the file.
+        Rows of the nodes.
+    first : int
+        Row of the first element; the others follow.
     elset : str
         Set that the keyword names, or "".
+    instance : str
+        Instance of a part, or "".
     place : str
     """
 
@@ -51,30 +56,55 @@ class ElementGroup:
     solid: bool
     numbers: NDArray[np.int64]
     nodes: NDArray[np.int64]
+    first: int
     elset: str
+    instance: str
     place: str
 
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Rows of the elements."""
+        return np.arange(self.first, self.first + len(self.numbers))
 
-def read_elements(keyword: Keyword) -> ElementGroup:
-    """Elements of one *ELEMENT keyword."""
+    def adopted(self, instance: str, first_node: int, first_element: int) -> "ElementGroup":
+        """Elements of an instance, with its name before the set."""
+        return replace(
+            self,
+            nodes=self.nodes + first_node if first_node else self.nodes,
+            first=self.first + first_element,
+            elset=f"{instance}.{self.elset}" if self.elset else "",
+            instance=instance,
+        )
+
+
+def read_elements(keyword: Keyword) -> tuple[str, bool, NDArray[np.int64]]:
+    """Family, whether it is a solid, and the records of one *ELEMENT keyword."""
     kind = keyword.parameter("TYPE").upper()
     family, solid = _family(keyword, kind)
-    count = FAMILIES[family].nodes
-    rows = [
-        [integer(line, text) for text in fields]
-        for line, fields in records(
-            keyword, (count + 1, count + 1), f"an element number and {count} nodes ({kind})"
+    if "OFFSET" in keyword.parameters:
+        raise InputError(
+            f"{keyword.place}: *ELEMENT",
+            got="the parameter OFFSET, which makes node numbers",
+            expected="all nodes written out",
+            hint="write the file again from the preprocessor, as a flat mesh.",
         )
-    ]
-    table = np.array(rows, dtype=np.int64).reshape(-1, count + 1)
-    return ElementGroup(
-        family=family,
-        solid=solid,
-        numbers=table[:, 0],
-        nodes=table[:, 1:],
-        elset=keyword.parameters.get("ELSET", ""),
-        place=keyword.place,
-    )
+    return family, solid, integer_records(keyword, *_record(family, kind))
+
+
+def place_of_element(keyword: Keyword, label: int, count: int) -> str:
+    """Place of the record number ``count``, from 1, of an element."""
+    kind = keyword.parameter("TYPE").upper()
+    width, what = _record(_family(keyword, kind)[0], kind)
+    for line, fields in records(keyword, (width, width), what):
+        count -= int(fields[0]) == label
+        if not count:
+            return line.place
+    return keyword.place
+
+
+def _record(family: str, kind: str) -> tuple[int, str]:
+    nodes = FAMILIES[family].nodes
+    return nodes + 1, f"an element number and {nodes} nodes ({kind})"
 
 
 def _family(keyword: Keyword, kind: str) -> tuple[str, bool]:
@@ -86,7 +116,7 @@ def _family(keyword: Keyword, kind: str) -> tuple[str, bool]:
             return family, False
     raise InputError(
         f"{keyword.place}: *ELEMENT",
-        got=f"TYPE={kind}",
+        got=f"TYPE={kind[:40]}",
         expected="C3D4, C3D10, C3D8, C3D20, C3D6, C3D15, CAX3, CAX4, CAX6, CAX8 (and their "
         "variants R, H, I, M), or surface elements such as S3, STRI65, CPS6, SFM3D4",
         hint="take elements of other kinds out of the file.",

@@ -1,150 +1,139 @@
-"""Numbers in keyword files: nodes, elements, and the sets made of them."""
+"""Node and element sets of keyword files: numbers, ranges, sets of sets."""
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from array import array
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.abaqus_keywords import DataLine, Keyword
+from klack.mesh.abaqus_names import Names
+from klack.mesh.abaqus_numbering import Numbering, distinct
+from klack.mesh.abaqus_numbers import CUT_OFF, integer, integer_list, is_integer
 
-__all__ = ["NamedSets", "integer", "number", "records"]
+__all__ = ["NamedSets", "read_members"]
 
-_CUT_OFF = "the file may be cut off or edited by hand: write it again from the preprocessor."
+LARGEST_MEMBERS = 200_000_000
+"""Most members of all node sets, or of all element sets, together."""
 
+_FEW = 1_000_000
+_MANY_PARTS = 50
 
-def number(line: DataLine, text: str) -> float:
-    """Convert a finite number; Fortran's exponent D is accepted."""
-    try:
-        value = float(text.upper().replace("D", "E"))
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise InputError(line.place, got=repr(text), expected="a finite number", hint=_CUT_OFF)
-    return value
-
-
-def integer(line: DataLine, text: str) -> int:
-    """Convert a positive whole number."""
-    if not text.isdecimal() or int(text) == 0:
-        raise InputError(
-            line.place, got=repr(text), expected="a whole number above 0", hint=_CUT_OFF
-        )
-    return int(text)
-
-
-def records(
-    keyword: Keyword, lengths: tuple[int, int], what: str
-) -> Iterator[tuple[DataLine, list[str]]]:
-    """Yield records with their first line; a record goes on in the next line until it is full.
-
-    Parameters
-    ----------
-    keyword : Keyword
-    lengths : (least, most)
-        Fields per record; one with fewer than ``most`` is only complete if it is one line with
-        at least ``least``.
-    what : str
-        For the error text: what a record holds.
-    """
-    least, most = lengths
-    fields: list[str] = []
-    first = None
-    for line in keyword.data:
-        first = first or line
-        fields += line.fields
-        if len(fields) > most:
-            _wrong_length(first, len(fields), what)
-        if len(fields) >= least:
-            yield first, fields
-            fields, first = [], None
-    if first is not None:
-        _wrong_length(first, len(fields), what)
-
-
-def _wrong_length(line: DataLine, came: int, what: str) -> None:
-    raise InputError(line.place, got=f"{came} numbers", expected=what, hint=_CUT_OFF)
+Integers = NDArray[np.int64]
 
 
 @dataclass
 class NamedSets:
-    """Sets of numbers, found by name without regard to capitals.
+    """Sets of nodes or of elements, by name.
 
     Parameters
     ----------
-    kind : str
-        ``"node"`` or ``"element"``, for error texts.
+    names : Names of int arrays
+        Rows of the members.
+    size : int
+        Members that were added so far.
     """
 
-    kind: str
-    _names: dict[str, str] = field(default_factory=dict)
-    _parts: dict[str, list[NDArray[np.int64]]] = field(default_factory=dict)
+    names: Names[Integers]
+    size: int = 0
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names.values())
+    def copy(self) -> "NamedSets":
+        """Sets that can grow on their own."""
+        return NamedSets(self.names.copy(), self.size)
 
-    def find(self, name: str) -> str | None:
-        """Key of a set; the name of an instance in front (``Part-1-1.tip``) is left away."""
-        key = name.strip('"').upper()
-        for candidate in (key, key.rpartition(".")[2]):
-            if candidate in self._names:
-                return candidate
-        return None
+    def members(self, key: str) -> Integers:
+        """Rows of all members, ascending."""
+        parts = self.names.parts(key)
+        if parts:
+            parts[:] = [distinct(parts[0] if len(parts) == 1 else np.concatenate(parts))]
+        return parts[0] if parts else np.empty(0, dtype=np.int64)
 
-    def numbers(self, name: str) -> NDArray[np.int64]:
-        """Sorted members of a set that is known to exist."""
-        return np.unique(np.concatenate(self._parts[self.find(name) or name]))
+    def resolve(self, place: str, name: str) -> Integers:
+        """Members of a set that must be there."""
+        return self.members(self.names.require(place, name))
 
-    def resolve(self, line: DataLine, name: str) -> NDArray[np.int64]:
-        """Members of a set, named in a data line."""
-        if self.find(name) is None:
-            known = ", ".join(list(self)[:12]) or "none"
-            raise InputError(
-                line.place,
-                got=f"{self.kind} set '{name}'",
-                expected=f"a number, or a set defined above ({known})",
-                hint="check the spelling, or define the set before it is used.",
-            )
-        return self.numbers(name)
-
-    def add(self, name: str, members: Iterable[int]) -> None:
+    def add(self, place: str, name: str, rows: Integers) -> None:
         """Add members to a set, which is made if it is new."""
-        key = name.upper()
-        self._names.setdefault(key, name)
-        self._parts.setdefault(key, []).append(np.array(list(members), dtype=np.int64))
+        self._count(place, len(rows))
+        key = self.names.add(name, rows)
+        if len(self.names.parts(key)) > _MANY_PARTS:  # repetitions must not pile up
+            self.members(key)
 
-    def read(self, keyword: Keyword, name: str, exists: Callable[[int], bool]) -> None:
-        """Add what *NSET or *ELSET lists: numbers, names of sets, or GENERATE ranges."""
-        self.add(name, ())
-        if "GENERATE" in keyword.parameters:
-            for line in keyword.data:
-                self.add(name, (i for i in _range(line) if exists(i)))
-            return
-        members = []
-        for line in keyword.data:
-            for text in line.fields:
-                if not text.isdecimal():
-                    members += self.resolve(line, text).tolist()
-                elif exists(int(text)):
-                    members.append(int(text))
-                else:
-                    raise InputError(
-                        line.place,
-                        got=f"{self.kind} {text}, which the file does not define",
-                        expected=f"numbers of {self.kind}s of this file",
-                        hint=_CUT_OFF,
-                    )
-        self.add(name, members)
+    def adopt(self, place: str, instance: str, part: "NamedSets", first_row: int) -> None:
+        """Take over the sets of a part as ``instance.name``."""
+        self._count(place, part.size)
+        self.names.adopt(instance, part.names, lambda rows: rows + first_row)
+
+    def _count(self, place: str, more: int) -> None:
+        self.size += more
+        if self.size > LARGEST_MEMBERS:
+            raise InputError(
+                place,
+                got=f"sets of {self.size} members together",
+                expected=f"at most {LARGEST_MEMBERS}",
+                hint="take sets that are not needed out of the file.",
+            )
 
 
-def _range(line: DataLine) -> range:
+def read_members(
+    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
+) -> Integers:
+    """Rows of what *NSET or *ELSET lists: numbers, names of sets, or GENERATE ranges.
+
+    Parameters
+    ----------
+    keyword : Keyword
+    numbering : Numbering
+    resolve : function of a data line and a text to int array
+        Rows of what is no number that is known; raises if there is no such set.
+    """
+    if "GENERATE" in keyword.parameters:
+        return _collected(
+            numbering.within(*_range(line)) for line in keyword.lines() if line.fields
+        )
+    labels = integer_list(keyword)
+    if labels is not None:
+        rows = numbering.find(labels)
+        if (rows >= 0).all():
+            return rows
+    return _collected(_line_members(line, numbering, resolve) for line in keyword.lines())
+
+
+def _line_members(
+    line: DataLine, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
+) -> Integers:
+    labels = array("q", [int(text) for text in line.fields if is_integer(text)])
+    rows = numbering.find(np.array(labels, dtype=np.int64))
+    parts = [rows[rows >= 0]]
+    numbers = iter(rows.tolist())
+    for text in line.fields:
+        if not is_integer(text) or next(numbers) < 0:
+            parts.append(resolve(line, text))
+    return np.concatenate(parts)
+
+
+def _collected(parts: Iterable[Integers]) -> Integers:
+    """All parts in one, without letting repetitions pile up."""
+    found: list[Integers] = []
+    size = 0
+    for part in parts:
+        found.append(part)
+        size += len(part)
+        if size > 2 * _FEW and len(found) > 1:
+            found = [distinct(np.concatenate(found))]
+            size = min(len(found[0]), _FEW)
+    return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
+
+
+def _range(line: DataLine) -> tuple[int, int, int]:
     values = [integer(line, text) for text in line.fields]
     if len(values) not in (2, 3) or values[1] < values[0]:
         raise InputError(
             line.place,
-            got=", ".join(line.fields),
+            got=", ".join(line.fields[:8]),
             expected="first, last, step with last >= first (GENERATE)",
-            hint=_CUT_OFF,
+            hint=CUT_OFF,
         )
-    return range(values[0], values[1] + 1, values[2] if len(values) == 3 else 1)
+    return values[0], values[1], values[2] if len(values) == 3 else 1

@@ -1,166 +1,108 @@
-"""Surfaces of an Abaqus or CalculiX file: by face number, by surface elements, by nodes."""
+"""*SURFACE of a keyword file: which faces of which elements, or which nodes, it names."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.abaqus_deck import Deck
-from klack.mesh.abaqus_elements import ElementGroup
 from klack.mesh.abaqus_keywords import DataLine, Keyword
-from klack.mesh.boundary import FaceTable
+from klack.mesh.abaqus_numbers import is_integer
+from klack.mesh.abaqus_scope import FaceSelection, Scope
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import ElementBlock, Surface
 
-__all__ = ["FaceFinder", "require_on_solids"]
+__all__ = ["read_surface"]
 
+Integers = NDArray[np.int64]
 
-def _corner_candidates(group: ElementGroup) -> list[list[int]]:
-    """Local corner nodes; a three-node line has its middle last (gmsh) or second (Abaqus)."""
-    if group.family == "line3":
-        return [[0, 2], [0, 1]]
-    return [list(range(FAMILIES[group.family].corners))]
+_MARKER_SIDES = {"", "SPOS", "SNEG", "S1", "S2"}  # of surface elements: each is one face
 
 
-def _find_surface_elements(
-    table: FaceTable, group: ElementGroup, labels: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Row in the face table of every surface element, -1 where it is on no solid."""
-    nodes = np.searchsorted(labels, group.nodes)
-    rows = np.full(len(nodes), -1)
-    for corners in _corner_candidates(group):
-        rows = np.where(rows < 0, table.find(nodes[:, corners]), rows)
-    return rows
+def read_surface(scope: Scope, keyword: Keyword) -> None:
+    """Put the surface of one *SURFACE keyword into its scope, all sets of which are known."""
+    name = keyword.parameter("NAME")
+    kind = keyword.parameters.get("TYPE", "ELEMENT").upper()
+    if "COMBINE" in keyword.parameters:
+        _combine(scope, keyword, name)
+    elif "CROP" in keyword.parameters:
+        raise _unsupported(keyword, "the parameter CROP", "a surface without a box")
+    elif kind == "NODE":
+        rows = [scope.named(line, line.fields[0], "node") for line in _filled(keyword)]
+        members = np.concatenate([np.empty(0, dtype=np.int64), *rows])
+        scope.node_surfaces.add(keyword.place, name, members)
+    elif kind == "ELEMENT":
+        scope.surfaces.add(name, *_selections(scope, list(_filled(keyword))))
+    else:
+        raise _unsupported(keyword, f"TYPE={kind[:40]}", "TYPE=ELEMENT or TYPE=NODE")
 
 
-def require_on_solids(
-    deck: Deck, blocks: tuple[ElementBlock, ...], labels: NDArray[np.int64]
-) -> None:
-    """Surface elements carry no stiffness here, so they must be faces of solid elements."""
-    table = FaceTable.of(blocks)
-    for group in deck.groups:
-        if group.solid or not len(group.numbers):
-            continue
-        lost = _find_surface_elements(table, group, labels) < 0
-        if lost.any():
-            raise InputError(
-                f"{group.place}: *ELEMENT: element {group.numbers[lost][0]}",
-                got=f"{lost.sum()} surface elements that are no faces of a solid element",
-                expected="surface elements that only mark faces of the solid mesh",
-                hint="shells and membranes are not modelled: take them out of the file.",
-            )
+def _filled(keyword: Keyword) -> list[DataLine]:
+    return [line for line in keyword.lines() if line.fields]
 
 
-class FaceFinder:
-    """Turns sets and *SURFACE keywords into surfaces of the mesh."""
+def _unsupported(keyword: Keyword, got: str, expected: str) -> InputError:
+    return InputError(
+        f"{keyword.place}: *SURFACE",
+        got=got,
+        expected=expected,
+        hint="define the surface by element faces.",
+    )
 
-    def __init__(
-        self,
-        blocks: tuple[ElementBlock, ...],
-        numbers: tuple[NDArray[np.int64], ...],
-        labels: NDArray[np.int64],
-        deck: Deck,
-    ) -> None:
-        self._deck = deck
-        self._labels = labels
-        self._table = FaceTable.of(blocks)
-        # numbers of the solid elements with their place in the table, and of the surface ones
-        self._solid = {
-            label: (block, row)
-            for block, part in enumerate(numbers)
-            for row, label in enumerate(part.tolist())
-        }
-        self._marker: dict[int, int] = {}
-        for group in deck.groups:
-            if not group.solid and len(group.numbers):
-                rows = _find_surface_elements(self._table, group, labels)
-                self._marker.update(zip(group.numbers.tolist(), rows.tolist(), strict=True))
 
-    def surfaces_and_sets(self) -> tuple[dict[str, Surface], dict[str, NDArray[np.int64]]]:
-        """All named surfaces and node sets, nodes counted from 0."""
-        sets = {
-            name: np.searchsorted(self._labels, self._deck.nsets.numbers(name))
-            for name in self._deck.nsets
-        }
-        rows: dict[str, list[int]] = {}
-        for name in self._deck.elsets:
-            members = self._deck.elsets.numbers(name).tolist()
-            marked = [self._marker[i] for i in members if self._marker.get(i, -1) >= 0]
-            inner = [row for row in marked if self._table.shared[row]]
-            if inner:  # between two solids: no side to choose
-                sets.setdefault(name, self._table.surface(name, np.array(inner)).nodes)
-            if len(inner) < len(marked):
-                rows[name] = [row for row in marked if not self._table.shared[row]]
-        rows |= self._explicit(sets)
-        surfaces = {
-            name: self._table.surface(name, np.unique(np.array(part, dtype=np.int64)))
-            for name, part in rows.items()
-            if part
-        }
-        return surfaces, sets
+def _combine(scope: Scope, keyword: Keyword, name: str) -> None:
+    """Join surfaces that are defined above."""
+    how = keyword.parameter("COMBINE").upper()
+    if how != "UNION":
+        raise _unsupported(keyword, f"COMBINE={how[:40]}", "COMBINE=UNION")
+    for line in _filled(keyword):
+        for other in line.fields:
+            key = scope.surfaces.require(line.place, other)
+            scope.surfaces.add(name, *list(scope.surfaces.parts(key)))
 
-    def _explicit(self, sets: dict[str, NDArray[np.int64]]) -> dict[str, list[int]]:
-        rows: dict[str, list[int]] = {}
-        for keyword in self._deck.surfaces:
-            name = keyword.parameter("NAME")
-            kind = keyword.parameters.get("TYPE", "ELEMENT").upper()
-            if kind == "NODE":
-                sets[name] = self._node_surface(keyword)
-                rows.setdefault(name, []).extend(self._faces_within(sets[name]))
-            elif kind == "ELEMENT":
-                for line in keyword.data:
-                    rows.setdefault(name, []).extend(self._element_faces(line))
-            else:
-                raise InputError(
-                    f"{keyword.place}: *SURFACE",
-                    got=f"TYPE={kind}",
-                    expected="TYPE=ELEMENT or TYPE=NODE",
-                    hint="define the surface by element faces.",
-                )
-        return rows
 
-    def _node_surface(self, keyword: Keyword) -> NDArray[np.int64]:
-        members: list[int] = []
-        for line in keyword.data:
-            target = line.fields[0]
-            if target.isdecimal() and int(target) in self._deck.nodes:
-                members.append(int(target))
-            else:
-                members += self._deck.nsets.resolve(line, target).tolist()
-        return np.searchsorted(self._labels, np.unique(members))
-
-    def _faces_within(self, nodes: NDArray[np.int64]) -> list[int]:
-        """Outer faces all of whose corners are among the nodes."""
-        keys = self._table.keys
-        inside = (np.isin(keys, nodes) | (keys < 0)).all(axis=1) & ~self._table.shared
-        return np.flatnonzero(inside).tolist()
-
-    def _element_faces(self, line: DataLine) -> list[int]:
-        target = line.fields[0]
+def _selections(scope: Scope, lines: Sequence[DataLine]) -> list[FaceSelection]:
+    """Faces of all data lines; lines with one number each are looked up together."""
+    found: list[FaceSelection] = []
+    single: dict[str, list[DataLine]] = {}
+    for line in lines:
         label = line.fields[1].upper() if len(line.fields) > 1 else ""
-        if target.isdecimal():
-            if int(target) not in self._deck.elements:
-                self._deck.elsets.resolve(line, target)
-            members = [int(target)]
+        if is_integer(line.fields[0]):
+            single.setdefault(label, []).append(line)
         else:
-            members = self._deck.elsets.resolve(line, target).tolist()
-        marked = [self._marker[i] for i in members if i in self._marker]
-        solid = [self._solid[i] for i in members if i in self._solid]
-        rows = [row for row in marked if row >= 0]
-        if label in ("", "SPOS", "SNEG"):
-            for block, element in solid if not label else []:
-                own = self._table.rows_of(block, element)
-                rows += own[~self._table.shared[own]].tolist()
-            return rows
-        return rows + [self._face(line, label, block, element) for block, element in solid]
+            rows = scope.named(line, line.fields[0], "element")
+            found.append(FaceSelection(rows, _side(scope, line, label, rows)))
+    for label, those in single.items():
+        numbers = np.array([int(line.fields[0]) for line in those], dtype=np.int64)
+        rows = scope.elements.numbering.find(numbers)
+        for index in np.flatnonzero(rows < 0).tolist():
+            rows[index] = scope.named(those[index], those[index].fields[0], "element")[0]
+        wrong = _wrong_sides(scope, label, rows)
+        line = those[int(np.argmax(wrong))] if wrong.any() else those[0]
+        found.append(FaceSelection(rows, _side(scope, line, label, rows)))
+    return found
 
-    def _face(self, line: DataLine, label: str, block: int, element: int) -> int:
-        own = self._table.rows_of(block, element)
-        side = int(label[1:]) if label[:1] == "S" and label[1:].isdecimal() else 0
-        if not 1 <= side <= len(own):
-            raise InputError(
-                line.place,
-                got=f"face '{label}'",
-                expected=f"S1 to S{len(own)} ({self._table.blocks[block].family})",
-                hint="check the surface in the preprocessor.",
-            )
-        return int(own[side - 1])
+
+def _wrong_sides(scope: Scope, label: str, rows: Integers) -> NDArray[np.bool_]:
+    """True for every element that has no such face."""
+    side = int(label[1:]) if label[:1] == "S" and is_integer(label[1:]) else 0
+    wrong = [
+        not (label == "" or 1 <= side <= len(FAMILIES[group.family].faces))
+        if group.solid
+        else label not in _MARKER_SIDES
+        for group in scope.groups
+    ]
+    return np.array(wrong, dtype=bool)[scope.group_of(rows)]
+
+
+def _side(scope: Scope, line: DataLine, label: str, rows: Integers) -> int:
+    wrong = _wrong_sides(scope, label, rows)
+    if wrong.any():
+        group = scope.groups[int(scope.group_of(rows[wrong][:1])[0])]
+        sides = f"S1 to S{len(FAMILIES[group.family].faces)}" if group.solid else "SPOS or SNEG"
+        raise InputError(
+            line.place,
+            got=f"face '{label[:40]}'",
+            expected=f"{sides} ({group.family})",
+            hint="check the surface in the preprocessor.",
+        )
+    return int(label[1:]) if is_integer(label[1:]) else 0
