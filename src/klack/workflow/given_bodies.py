@@ -264,5 +264,7 @@ def _index(
         f"{model.file}: {side}",
         got=f"'{place}'",
         expected=f"one of: {one_of(names)}" if names else f"a number from 1 to {count}",
-        hint=nearest(place, names, "the file names no ports; give their numbers."),
+        hint=nearest(
+            place, names, "write a name or its number." if names else "the file has no names."
+        ),
     )
