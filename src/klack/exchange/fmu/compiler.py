@@ -87,7 +87,7 @@ PLATFORMS = {
 
 # no fused multiplications: every processor computes the same numbers
 _OPTIONS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-shared")
-_LOG_TAIL = 2000
+_LOG_HEAD = 2000
 
 
 def this_platform() -> str:
@@ -144,7 +144,7 @@ def compile_library(
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not library.is_file():
         raise ConvergenceError(
-            f"compiling an FMU for {platform}: {command[0]} failed.\n{done.stderr[-_LOG_TAIL:]}\n"
+            f"compiling an FMU for {platform}: {command[0]} failed.\n{done.stderr[:_LOG_HEAD]}\n"
             "Try: another compiler; the sources need C99 and nothing else."
         )
 
