@@ -1,0 +1,41 @@
+"""The example on the page about FMUs runs as the page says."""
+
+import contextlib
+import io
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from klack.case import find_case, load_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.fmu.variables import fmu_variables
+
+pytest.importorskip("fmpy")
+
+PAGE = (Path(__file__).parents[2] / "docs/how-to/export-fmu.md").read_text()
+(EXAMPLE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return case_models(load_case(find_case("demo-valve-axisymmetric"))).pair
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+def test_example_prints_what_the_page_says(pair, tmp_path, monkeypatch):
+    build_fmu(pair, tmp_path / f"{pair.name}.fmu", fmi=2, platforms=("linux64",))
+    monkeypatch.chdir(tmp_path)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(EXAMPLE, "export-fmu.md", "exec"), {})
+
+    assert printed.getvalue().strip() in EXAMPLE
+
+
+def test_page_names_every_variable(pair):
+    for variable in fmu_variables(pair):
+        if variable.causality != "local":
+            assert f"`{variable.name}`" in PAGE
