@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from klack.cli.output import staged_folder
+from klack.cli.output import listing, staged_folder
 from klack.cli.progress import show_progress
 
 if TYPE_CHECKING:
@@ -59,12 +59,12 @@ def export_models(
         progress(choice.to, 0.0)
         with staged_folder(folder) as stage:
             write_models(models, stage, choice)
-            made = sorted(path.name for path in stage.iterdir())
+            made = listing(path.name for path in stage.iterdir())
         progress(choice.to, 1.0)
     if not quiet:
         for model in models:
             print(described(model))
-        print(f"Written to {folder}: {', '.join(made)}")
+        print(f"Written to {folder}: {made}")
 
 
 def chosen(models: "CaseModels", choice: ModelChoice) -> tuple["ModalModel", ...]:

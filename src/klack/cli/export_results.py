@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from klack.cli.output import staged_folder
+from klack.cli.output import listing, staged_folder
 from klack.cli.progress import show_progress
 from klack.errors import InputError
 
@@ -46,9 +46,9 @@ def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
             from klack.exchange.results.csv_files import write_csv
 
             write_csv(table, stage)
-        made = sorted(path.name for path in stage.iterdir())
+        made = listing(path.name for path in stage.iterdir())
     if not quiet:
-        print(f"Written to {folder}: {', '.join(made)}")
+        print(f"Written to {folder}: {made}")
 
 
 def run_and_export(

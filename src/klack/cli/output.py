@@ -4,14 +4,16 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from klack.errors import InputError
 
-__all__ = ["require_folder", "require_json_target", "staged_folder", "write_json"]
+__all__ = ["listing", "require_folder", "require_json_target", "staged_folder", "write_json"]
+
+_MOST_NAMES = 8
 
 
 def require_json_target(path: Path | None) -> None:
@@ -55,6 +57,14 @@ def require_folder(folder: Path) -> None:
         raise _refuse("--out", folder, f"a path through the file {existing}", "a folder")
     if not os.access(existing, os.W_OK):
         raise _refuse("--out", folder, "a place that may not be written to", "a writable folder")
+
+
+def listing(names: Iterable[str]) -> str:
+    """Names of files in one line; of many, some of them and their number."""
+    every = sorted(names)
+    if len(every) <= _MOST_NAMES:
+        return ", ".join(every)
+    return f"{', '.join(every[: _MOST_NAMES - 1])}, ... ({len(every)} files)"
 
 
 @contextmanager

@@ -1,0 +1,130 @@
+"""klack export through main(argv); truth: the run of the same case, and what the messages promise.
+
+Readers that klack has no part in open what it wrote.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from klack.case import find_case
+from klack.case.reader import read_case
+from klack.cli.main import main
+from klack.workflow.impact import run_impact
+from klack.workflow.store import save_study
+
+VALVE = find_case("demo-valve-axisymmetric")
+
+
+@pytest.fixture(scope="module")
+def study():
+    return run_impact(read_case(VALVE.read_text(), VALVE), levels=("reduced",), certify=False)
+
+
+@pytest.fixture(scope="module")
+def stored(study, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("result")
+    save_study(study, folder)
+    return folder
+
+
+def exported(tmp_path: Path, *arguments: str, source: object = VALVE) -> set[str]:
+    out = tmp_path / "out"
+    assert main(["export", str(source), "--out", str(out), "-q", *arguments]) == 0
+    return {path.name for path in out.iterdir()}
+
+
+def test_models_for_matlab_hold_every_body_and_the_pair(tmp_path, study):
+    made = exported(tmp_path, "--to", "mat")
+
+    bodies = [body.name for body in study.bodies]
+    assert {f"{name}.mat" for name in (*bodies, "demo_valve_axisymmetric_pair")} <= made
+    held = scipy.io.loadmat(tmp_path / "out" / f"{bodies[0]}.mat", simplify_cells=True)["klack"]
+    elastic = held["frequencies_Hz"][1:]  # the needle is free: one rigid mode
+    np.testing.assert_allclose(elastic, study.bodies[0].frequencies, rtol=1e-12)
+
+
+def test_one_body_alone(tmp_path, study):
+    name = study.bodies[0].name
+
+    made = exported(tmp_path, "--to", "modelica", "--body", name)
+
+    assert made == {f"{name}.mo"}
+
+
+def test_a_body_that_is_not_there_is_refused_and_nothing_written(tmp_path, capsys):
+    out = tmp_path / "x"
+    arguments = ["export", str(VALVE), "--to", "csv", "--body", "nedle", "--out", str(out)]
+
+    assert main([*arguments, "-q"]) == 2
+
+    assert "nedle" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_an_fmu_of_the_pair_hits_as_hard_as_klack_says(tmp_path, study):
+    fmpy = pytest.importorskip("fmpy")
+
+    made = exported(tmp_path, "--to", "fmu", "--part", "pair")
+
+    assert made == {"demo_valve_axisymmetric_pair.fmu"}
+    history = study.levels["reduced"].history
+    run = fmpy.simulate_fmu(
+        str(tmp_path / "out" / "demo_valve_axisymmetric_pair.fmu"),
+        fmi_type="CoSimulation",
+        stop_time=len(history.force) * history.step,
+        output_interval=1e-6,
+        output=["peak_contact_force"],
+    )
+    peak = study.levels["reduced"].measures.peak_force
+    assert np.max(run["peak_contact_force"]) == pytest.approx(peak, rel=1e-9)  # the same steps
+
+
+@pytest.mark.parametrize(
+    ("target", "ending"), [("netcdf", ".nc"), ("mdf", ".mf4"), ("mat", ".mat"), ("csv", ".csv")]
+)
+def test_a_stored_result_is_written_for_others(tmp_path, stored, target, ending):
+    made = exported(tmp_path, "--to", target, source=stored)
+
+    assert any(name.endswith(ending) for name in made)
+
+
+def test_the_force_of_a_result_is_in_netcdf_to_the_last_bit(tmp_path, stored, study):
+    netcdf = pytest.importorskip("netCDF4")
+
+    (name,) = exported(tmp_path, "--to", "netcdf", source=stored)
+
+    with netcdf.Dataset(tmp_path / "out" / name) as data:
+        found = [v for v in _variables(data) if v.name.endswith("contact_force")]
+        assert found[0].units == "N"
+        np.testing.assert_array_equal(found[0][:], study.levels["reduced"].history.force)
+
+
+def _variables(group):
+    yield from group.variables.values()
+    for child in group.groups.values():
+        yield from _variables(child)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--to", "mat", "--fmi", "3"], "--fmi"),
+        (["--to", "fmu", "--frames", "10"], "--frames"),
+        (["--to", "netcdf", "--part", "body"], "--part"),
+        (["--to", "fmu", "--platform", "mars"], "mars"),
+        (["--to", "abaqus"], "abaqus"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_at_once(tmp_path, capsys, arguments, words):
+    assert main(["export", str(VALVE), *arguments, "--out", str(tmp_path / "x"), "-q"]) == 2
+
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
+def test_models_do_not_come_from_a_result(stored, capsys):
+    assert main(["export", str(stored), "--to", "fmu"]) == 2
+    assert "case" in capsys.readouterr().err
