@@ -8,10 +8,11 @@ import numpy as np
 
 from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel, ModelContact
-from klack.exchange.model_folder import model_folder
+from klack.exchange.model_folder import model_folder, named_apart
 from klack.exchange.state_space import (
     contact_kind,
     law_table,
+    relaxation_time,
     second_order,
     start_speed,
     state_space,
@@ -54,7 +55,7 @@ def write_matlab(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]
     names: list[str] = []
     with model_folder(models, folder) as stage:
         for model in models:
-            content = matlab_structure(model)
+            content = matlab_structure(named_apart(model))
             _require_size(model, content)
             names.append(f"{model.name}.mat")
             savemat(
@@ -120,8 +121,8 @@ def matlab_structure(model: ModalModel) -> dict[str, Any]:
         "step_s": model.step,
         "duration_s": model.duration,
         "provenance": {
-            "case": origin.case,
-            "title": origin.title,
+            "case": _text(origin.case),
+            "title": _text(origin.title),
             "klack_version": origin.version,
             "created": origin.created,
             "meshes": _cells([f"{name}: {words}" for name, words in origin.meshes.items()]),
@@ -148,7 +149,7 @@ def _of_pair(model: ModalModel) -> dict[str, Any]:
         "gap0_m": np.array([contact.gap for contact in model.contacts]),
         "contacts": contacts,
         "x_start": np.concatenate([first, np.zeros(len(contacts))]),
-        "relaxation_s": 0.5 * model.step,
+        "relaxation_s": relaxation_time(model),
     }
 
 
@@ -185,8 +186,16 @@ def _about(model: ModalModel) -> list[str]:
 
 def _cells(words: Sequence[str]) -> np.ndarray[Any, Any]:
     cells = np.empty((len(words), 1), dtype=object)
-    cells[:, 0] = words
+    cells[:, 0] = [_text(word) for word in words]
     return cells
+
+
+def _text(words: str) -> str:
+    """Text with a blank for each further byte of its letters.
+
+    scipy counts letters where Octave reads bytes: without them the end of "Stäbe" is lost.
+    """
+    return words + " " * (len(words.encode()) - len(words))
 
 
 def _require_size(model: ModalModel, content: dict[str, Any]) -> None:

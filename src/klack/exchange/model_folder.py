@@ -3,13 +3,15 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel
+from klack.exchange.results.naming import identifiers
 from klack.exchange.results.whole_file import whole_files
 
-__all__ = ["LONGEST", "model_folder"]
+__all__ = ["LONGEST", "model_folder", "named_apart"]
 
 LONGEST = 55
 """Characters of the name of a model; MATLAB allows 63 for the name of a file."""
@@ -51,3 +53,19 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
             )
     with whole_files(folder) as stage:
         yield stage
+
+
+def named_apart(model: ModalModel) -> ModalModel:
+    """Return the model with a number behind every name that comes again.
+
+    Ports ``tip-a`` and ``tip_a`` have the same name in most programs.
+    """
+    inputs = identifiers([item.name for item in model.inputs])
+    outputs = identifiers([output.name for output in model.outputs], inputs)
+    contacts = identifiers([contact.name for contact in model.contacts])
+    return replace(
+        model,
+        inputs=tuple(replace(a, name=n) for a, n in zip(model.inputs, inputs, strict=True)),
+        outputs=tuple(replace(a, name=n) for a, n in zip(model.outputs, outputs, strict=True)),
+        contacts=tuple(replace(a, name=n) for a, n in zip(model.contacts, contacts, strict=True)),
+    )

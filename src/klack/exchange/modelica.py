@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.exchange.modal_model import ModalModel
-from klack.exchange.model_folder import model_folder
+from klack.exchange.model_folder import model_folder, named_apart
 from klack.exchange.modelica_contact import contact_text, law_functions
 from klack.exchange.modelica_words import array, class_name, number, text
-from klack.exchange.state_space import start_speed
+from klack.exchange.state_space import relaxation_time, start_speed
 
 __all__ = ["modelica_text", "write_modelica"]
 
@@ -44,7 +44,7 @@ def write_modelica(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ..
     names = [f"{class_name(model.name)}.mo" for model in models]
     with model_folder(models, folder) as stage:
         for name, model in zip(names, models, strict=True):
-            (stage / name).write_text(modelica_text(model), encoding="utf-8")
+            (stage / name).write_text(modelica_text(named_apart(model)), encoding="utf-8")
     return tuple(folder / name for name in names)
 
 
@@ -108,7 +108,7 @@ def _interface(model: ModalModel) -> Iterable[str]:
         )
     if any(contact.film and contact.series_compliance for contact in model.contacts):
         yield (
-            f'  parameter Real relaxation(unit="s") = {number(0.5 * model.step)} '
+            f'  parameter Real relaxation(unit="s") = {number(relaxation_time(model))} '
             '"Of the compression of a series compliance where its film is weak";'
         )
 

@@ -34,14 +34,16 @@ class ContactText:
 def contact_text(model: ModalModel, index: int) -> ContactText:
     r"""Variables and equations of a contact.
 
-    A film in series with a compliance ``D`` has the state ``e``, the compression, with the gap
-    ``z = gap + e`` between the surfaces:
+    A film in series with a compliance ``D`` has the state ``e``, the compression.  With the gap
+    ``z = gap + e`` between the surfaces and ``e_c = max(e, -D F_s)``, where the film cavitates,
 
-    .. math:: \dot e = -\frac{e + D c(z)\,\dot g}{\max(D\,c(z), \tau)}, \qquad F = \max(e/D, -F_s)
+    .. math:: \dot e = -\frac{e_c + D c(z)\,\dot g}{\max(D\,c(z), \tau)} + \frac{e_c - e}{\tau},
+              \qquad F = e_c / D .
 
-    while ``z > 0``, which is ``F = -c \dot z`` wherever ``D c`` is above the relaxation time
-    ``tau``; far apart, where the force is small, it is late by ``tau`` and not stiff.  While
-    closed, the film is at rest and ``e`` decays.
+    This is ``F = -c \dot z`` wherever ``D c`` is above the relaxation time ``tau``; far apart,
+    where the force is small, it is late by ``tau`` and not stiff.  The contact is closed while
+    neither ``z`` nor the gap of the bodies is above zero; the film is at rest then and ``e``
+    decays.
     """
     contact = model.contacts[index]
     name = contact.name
@@ -58,37 +60,37 @@ def contact_text(model: ModalModel, index: int) -> ContactText:
     declared += [
         f'  output Real film_force_{name}(unit="N") "Force of the squeeze film, + apart";',
         f'  Real opening_{name}(unit="m") "Gap between the surfaces";',
+        f'  Real clear_{name}(unit="m") "Above 0: no contact";',
         f'  Real damping_{name}(unit="N.s/m") "Of the film";',
     ]
-    least = f"-suction_{name}"
+    rate = f"(gap_shape_{name}*v)"
     if contact.series_compliance == 0.0:
+        film_force = f"noEvent(max(-damping_{name}*{rate}, -suction_{name}))"
         equations += [
             f"  opening_{name} = gap_{name};",
-            f"  film_force_{name} = if opening_{name} > 0 then "
-            f"noEvent(max(-damping_{name}*(gap_shape_{name}*v), {least})) else 0;",
+            f"  clear_{name} = gap_{name};",
         ]
     else:
-        declared.append(
-            f'  Real compression_{name}(unit="m", start=0, fixed=true) "Of the series compliance";'
-        )
-        rate = f"pull_{name}/noEvent(max(series_{name}*damping_{name}, relaxation))"
-        declared.append(
-            f'  Real pull_{name}(unit="m") "What the compression lacks, below 0 to grow";'
-        )
-        equations += [
-            f"  opening_{name} = gap_{name} + compression_{name};",
-            f"  pull_{name} = -compression_{name} "
-            f"- series_{name}*damping_{name}*(gap_shape_{name}*v);",
-            f"  der(compression_{name}) = if opening_{name} > 0 then "
-            f"(if noEvent(compression_{name} <= -series_{name}*suction_{name} and pull_{name} < 0) "
-            f"then 0 else {rate}) else -compression_{name}/relaxation;",
-            f"  film_force_{name} = if opening_{name} > 0 then "
-            f"noEvent(max(compression_{name}/series_{name}, {least})) else 0;",
+        film_force = f"held_{name}/series_{name}"
+        declared += [
+            f'  Real compression_{name}(unit="m", start=0, fixed=true) "Of the series compliance";',
+            f'  Real held_{name}(unit="m") "Compression, where the film does not cavitate";',
         ]
+        equations += [
+            f"  held_{name} = noEvent(max(compression_{name}, -series_{name}*suction_{name}));",
+            f"  opening_{name} = gap_{name} + held_{name};",
+            f"  clear_{name} = noEvent(max(opening_{name}, gap_{name}));",
+            f"  der(compression_{name}) = if clear_{name} > 0 then",
+            f"    -(held_{name} + series_{name}*damping_{name}*{rate})",
+            f"    /noEvent(max(series_{name}*damping_{name}, relaxation))",
+            f"    + (held_{name} - compression_{name})/relaxation",
+            f"    else -compression_{name}/relaxation;",
+        ]
+    equations.append(f"  film_force_{name} = if clear_{name} > 0 then {film_force} else 0;")
     equations += [
         f"  damping_{name} = squeeze_damping(opening_{name}, film_{name}[1], film_{name}[2], "
         f"film_{name}[3]);",
-        f"  contact_force_{name} = if opening_{name} > 0 then 0 else {closed};",
+        f"  contact_force_{name} = if clear_{name} > 0 then 0 else {closed};",
         f"  total_{name} = contact_force_{name} + film_force_{name};",
     ]
     return ContactText(suffix=name, declarations=declared, equations=equations)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.exchange.modal_model import ModalModel, ModelContact
-from klack.exchange.model_folder import model_folder
-from klack.exchange.state_space import StateSpace, contact_kind, law_table, state_space
+from klack.exchange.model_folder import model_folder, named_apart
+from klack.exchange.state_space import FirstOrder, contact_kind, law_table, state_space
 
 __all__ = ["write_text"]
 
@@ -52,7 +52,7 @@ def write_text(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
     names: list[str] = []
     with model_folder(models, folder) as stage:
         for model in models:
-            names += _write_model(model, stage)
+            names += _write_model(named_apart(model), stage)
     return tuple(folder / name for name in names)
 
 
@@ -123,7 +123,7 @@ def _law_points(contact: ModelContact) -> NDArray[np.float64]:
     return np.column_stack([depth, contact.law.force(depth)])
 
 
-def _info(model: ModalModel, form: StateSpace) -> Iterable[str]:
+def _info(model: ModalModel, form: FirstOrder) -> Iterable[str]:
     origin = model.provenance
     what = "linear body" if model.kind == "body" else "bodies and their contacts"
     yield f"{model.name}: {what}"

@@ -3,7 +3,7 @@ function run = @NAME@_impact(u, duration, relative)
 %
 %   run = @NAME@_impact                      no outside force, duration of the case
 %   run = @NAME@_impact(u, duration)         u: outside forces [N], a vector or a function of t [s]
-%   run = @NAME@_impact(u, duration, 1e-10)  relative tolerance of the integrator; 1e-8 else
+%   run = @NAME@_impact(u, duration, 1e-11)  relative tolerance of the integrator; 1e-9 else
 %
 %   run.t [s], run.output (one row per time, columns as run.output_names: lift [m], velocity
 %   [m/s], gaps [m]), run.contact_force, run.film_force [N], run.peak_force [N].
@@ -17,7 +17,7 @@ if nargin < 2 || isempty(duration)
   duration = p.duration_s;
 end
 if nargin < 3
-  relative = 1e-8;
+  relative = 1e-9;
 end
 stiff = false;
 for k = 1:numel(p.contacts)

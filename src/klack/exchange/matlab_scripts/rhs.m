@@ -30,23 +30,23 @@ for k = 1:n
     continue
   end
   D = c.series_compliance_m_per_N;
-  h = gap(k) + (D > 0) * e;
-  if h <= 0
+  held = max(e, -D * c.film_suction_N);
+  h = gap(k) + held;
+  if h <= 0 && gap(k) <= 0
     contact(k) = law_force(-gap(k), c);
     de(k) = -e / p.relaxation_s;
     continue
   end
-  damping = c.film_cubic / (h + c.film_cut_off_m)^3 + c.film_linear / (h + c.film_cut_off_m);
+  film_gap = max(h, 0) + c.film_cut_off_m;
+  damping = c.film_cubic / film_gap^3 + c.film_linear / film_gap;
   rate = p.gap_shapes(:, k)' * v;
   if D == 0
     film(k) = max(-damping * rate, -c.film_suction_N);
     continue
   end
-  film(k) = max(e / D, -c.film_suction_N);
-  de(k) = -(e + D * damping * rate) / max(D * damping, p.relaxation_s);
-  if e <= -D * c.film_suction_N
-    de(k) = max(de(k), 0);
-  end
+  film(k) = held / D;
+  de(k) = -(held + D * damping * rate) / max(D * damping, p.relaxation_s) ...
+    + (held - e) / p.relaxation_s;
 end
 a = p.constant - p.omega.^2 .* q - 2 * p.damping .* p.omega .* v;
 a = a + p.force_shapes * u(:) + p.gap_shapes * (contact + film);
