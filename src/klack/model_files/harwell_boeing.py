@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.model_files.fortran_numbers import FixedFormat, fixed_numbers
+from klack.model_files.number_lines import numbers_in
 from klack.model_files.system_matrix import Role, SystemMatrix, symmetric_matrix
 
 __all__ = ["read_harwell_boeing"]
@@ -82,8 +83,12 @@ def _section(
 ) -> NDArray[np.float64]:
     if not 0 < count <= len(lines) - first:
         raise _damaged(path, f"{count} lines of {what}")
-    wide = form.per_line * form.width
-    values = fixed_numbers([line[:wide] for line in lines[first : first + count]], form.width)
+    section = lines[first : first + count]
+    # some writers announce another width than they take: blanks go first where they suffice
+    values = numbers_in(b" ".join(section))
+    if values is None or len(values) != numbers:
+        wide = form.per_line * form.width
+        values = fixed_numbers([line[:wide] for line in section], form.width)
     if values is None or len(values) != numbers:
         found = "other text" if values is None else f"{len(values)}"
         raise _damaged(path, f"{found} instead of {numbers} {what}")

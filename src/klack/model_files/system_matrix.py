@@ -138,13 +138,22 @@ def symmetric_matrix(
             hint="write the matrix again; do not join files of several steps.",
         )
     below, above = bool(np.any(row > column)), bool(np.any(row < column))
-    if below != above:
-        A = csr_array(A + A.T.tocsr())
-        A.setdiag(A.diagonal() / 2)
-        return A, (f"its {'lower' if below else 'upper'} triangle was stored",)
-    if not below:
+    if not (below or above):
         return A, ("it is diagonal",)
-    return _symmetrised(where, A)
+    if below and above and _has_both(row, column):
+        return _symmetrised(where, A)
+    # also a triangle in the order of another program, which is none in ours
+    A = csr_array(A + A.T.tocsr())
+    A.setdiag(A.diagonal() / 2)
+    return A, ("one triangle was stored",)
+
+
+def _has_both(row: NDArray[np.int64], column: NDArray[np.int64]) -> bool:
+    """True if any pair (i, j) is stored together with (j, i)."""
+    off = row != column
+    low, high = np.minimum(row[off], column[off]), np.maximum(row[off], column[off])
+    pairs = np.sort(low.astype(np.int64) * (int(high.max()) + 1) + high)
+    return bool(np.any(pairs[1:] == pairs[:-1]))
 
 
 def _symmetrised(where: str, A: csr_array) -> tuple[csr_array, tuple[str, ...]]:
