@@ -22,7 +22,7 @@ LARGEST_BYTES = 2_000_000_000
 
 _LONGEST_KEYWORD = 20_000  # bytes
 _LONGEST_LINE = 1_000_000
-_PIECE = 4_000_000
+_PIECE = 1_000_000
 _DEEPEST = 10
 _WITH_FILE = {"INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
 _NOT_BLANK = re.compile(rb"\S")
@@ -142,7 +142,8 @@ def _decoded(raw: bytes) -> str:
 
 
 def _fields(text: str) -> tuple[str, ...]:
-    found = _PART.findall(text) if '"' in text else text.split(",")
+    quoted = '"' in text and len(text) <= _LONGEST_KEYWORD
+    found = _PART.findall(text) if quoted else text.split(",")
     parts = [part.strip().strip('"') for part in found]
     while parts and not parts[-1]:
         parts.pop()

@@ -1,7 +1,7 @@
 """Node and element sets of keyword files: numbers, ranges, sets of sets."""
 
 from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,9 @@ __all__ = ["NamedSets", "read_members"]
 LARGEST_MEMBERS = 200_000_000
 """Most members of all node sets, or of all element sets, together."""
 
-_FEW = 1_000_000
-_MANY_PARTS = 50
+_MANY = 50
+_FEW = 100_000
+_PER_ARRAY = 20  # numbers that would take the memory of an empty array
 
 Integers = NDArray[np.int64]
 
@@ -58,7 +59,7 @@ class NamedSets:
         """Add members to a set, which is made if it is new."""
         self._count(place, len(rows))
         key = self.names.add(name, rows)
-        if len(self.names.parts(key)) > _MANY_PARTS:  # repetitions must not pile up
+        if len(self.names.parts(key)) > _MANY:  # repetitions must not pile up
             self.members(key)
 
     def adopt(self, place: str, instance: str, part: "NamedSets", first_row: int) -> None:
@@ -98,32 +99,42 @@ def read_members(
         rows = numbering.find(labels)
         if (rows >= 0).all():
             return rows
-    return _collected(_line_members(line, numbering, resolve) for line in keyword.lines())
+    return _collected(_mixed_members(keyword, numbering, resolve))
 
 
-def _line_members(
-    line: DataLine, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
-) -> Integers:
-    labels = array("q", [int(text) for text in line.fields if is_integer(text)])
-    rows = numbering.find(np.array(labels, dtype=np.int64))
-    parts = [rows[rows >= 0]]
-    numbers = iter(rows.tolist())
-    for text in line.fields:
-        if not is_integer(text) or next(numbers) < 0:
-            parts.append(resolve(line, text))
-    return np.concatenate(parts)
+def _mixed_members(
+    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
+) -> Iterator[Integers]:
+    """Rows of numbers, and of what is no known number: every name once."""
+    labels, names = array("q"), set()
+    for line in keyword.lines():
+        for text in line.fields:
+            if is_integer(text):
+                labels.append(int(text))
+            elif text not in names:
+                names.add(text)
+                yield resolve(line, text)
+    numbers = distinct(np.array(labels, dtype=np.int64))
+    rows = numbering.find(numbers)
+    yield rows[rows >= 0]
+    unknown = set(numbers[rows < 0].tolist())
+    for line in keyword.lines() if unknown else ():
+        for text in line.fields:
+            if is_integer(text) and int(text) in unknown:
+                unknown.remove(int(text))
+                yield resolve(line, text)
 
 
 def _collected(parts: Iterable[Integers]) -> Integers:
-    """All parts in one, without letting repetitions pile up."""
+    """All parts in one, without letting many of them, or repetitions, pile up."""
     found: list[Integers] = []
-    size = 0
+    size, limit = 0, _FEW
     for part in parts:
         found.append(part)
-        size += len(part)
-        if size > 2 * _FEW and len(found) > 1:
+        size += len(part) + _PER_ARRAY
+        if size > limit:
             found = [distinct(np.concatenate(found))]
-            size = min(len(found[0]), _FEW)
+            size, limit = 0, len(found[0]) + _FEW
     return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
 
 
