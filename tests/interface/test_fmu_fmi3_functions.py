@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack.exchange.fmu.build import build_fmu
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
 from klack.exchange.fmu.variables import fmu_variables
 
 fmpy = pytest.importorskip("fmpy")
@@ -186,7 +186,6 @@ def test_start_parameters_move_the_needle(pair):
 
     assert pair.value(fmu, "velocity") == pytest.approx(-0.25, rel=1e-12)
     assert pair.value(fmu, "gap") == pytest.approx(2e-6, rel=1e-9)
-    assert pair.value(fmu, "opening") > 0.0
     fmu.freeInstance()
 
 

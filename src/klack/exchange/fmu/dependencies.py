@@ -27,15 +27,15 @@ class Dependencies:
     running : mapping of output or derivative to states and inputs
     at_start : mapping of output, calculated state or derivative to parameters, inputs and states
         that are given before the start.
-    contacts : tuple of tuple of int
-        States that move the gap of each contact.
+    indicators : tuple of int
+        Event indicators: the gap of each contact.
     """
 
     outputs: tuple[int, ...]
     derivatives: tuple[int, ...]
     running: Mapping[int, tuple[int, ...]]
     at_start: Mapping[int, tuple[int, ...]]
-    contacts: tuple[tuple[int, ...], ...]
+    indicators: tuple[int, ...]
 
 
 def dependencies_of(model: ModalModel) -> Dependencies:
@@ -58,8 +58,10 @@ def dependencies_of(model: ModalModel) -> Dependencies:
     for output in model.outputs:
         rates = output.quantity == "velocity"
         running[next(rows)] = _picked(moving if rates else moved, output.shape)
+    indicators = []
     for c, contact in enumerate(model.contacts):
-        running[next(rows)] = contact_states[c]
+        indicators.append(next(rows))
+        running[indicators[c]] = contact_states[c]
         for _ in range(3 if contact.film is None else 4):
             running[next(rows)] = force_states[c]
     for i in range(m):
@@ -85,7 +87,7 @@ def dependencies_of(model: ModalModel) -> Dependencies:
         derivatives=derivatives,
         running=running,
         at_start=at_start,
-        contacts=contact_states,
+        indicators=tuple(indicators),
     )
 
 

@@ -2,8 +2,8 @@
 
 FMI 2.0 counts variables from 1 in its model structure, FMI 3.0 names them by value reference; both
 have the same variables with the same value references (:mod:`klack.exchange.fmu.variables`).
-Version 2 leaves the time out, as some importers of that version stumble over it; version 3 needs it
-and, for each contact, a variable that is the event indicator.
+Version 2 leaves the time out, as some importers of that version stumble over it; version 3 needs
+it.  The event indicator of a contact is its gap.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 
 from klack.exchange.fmu.dependencies import Dependencies, dependencies_of
 from klack.exchange.fmu.model_exchange import supports_model_exchange
-from klack.exchange.fmu.variables import UNITS, FmuVariable, contact_suffix, fmu_variables
+from klack.exchange.fmu.variables import UNITS, FmuVariable, fmu_variables
 from klack.exchange.modal_model import ModalModel
 
 __all__ = ["SOURCE_FILES", "communication_step", "model_description"]
@@ -65,7 +65,7 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
         _structure_2(root, variables, found, exchange)
     else:
         _variables_3(root, model, variables, exchange)
-        _structure_3(root, model, variables, found, exchange)
+        _structure_3(root, variables, found, exchange)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "unicode") + "\n"
 
@@ -215,18 +215,6 @@ def _variables_3(
         variability="continuous",
         unit="s",
     )
-    if exchange:
-        for i, contact in enumerate(model.contacts):
-            ET.SubElement(
-                listed,
-                "Float64",
-                name=f"opening{contact_suffix(model, i)}",
-                valueReference=str(len(variables) + 1 + i),
-                description=_text(f"Event indicator, above zero where {contact.name} is open"),
-                causality="local",
-                variability="continuous",
-                initial="calculated",
-            )
 
 
 # --------------------------------------------------------------------------- structure
@@ -267,7 +255,6 @@ def _structure_2(
 
 def _structure_3(
     root: ET.Element,
-    model: ModalModel,
     variables: Sequence[FmuVariable],
     found: Dependencies,
     exchange: bool,
@@ -290,8 +277,8 @@ def _structure_3(
     for r in _initial_unknowns(variables, found, exchange):
         unknown("InitialUnknown", r, found.at_start[r])
     if exchange:
-        for i in range(len(model.contacts)):
-            unknown("EventIndicator", len(variables) + 1 + i, found.contacts[i])
+        for r in found.indicators:
+            unknown("EventIndicator", r, found.running[r])
 
 
 # --------------------------------------------------------------------------- text

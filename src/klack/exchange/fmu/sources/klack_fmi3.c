@@ -1,7 +1,6 @@
 /* FMI 3.0 around the model: model exchange and co-simulation.
 
-   Value references from klack_variable_count() on belong to this file: the time, then one event
-   indicator per contact.                                                                      */
+   The time has the value reference klack_variable_count(); all others are those of the model.  */
 #include <stdlib.h>
 #include <string.h>
 
@@ -168,29 +167,17 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
 
 /* ---------------------------------------------------------------------------- values */
 
-static fmi3Status of_wrapper(const component *c, unsigned offset, double *value) {
-    double indicators[KLACK_EVENTS + 1];
-    if (offset == 0) {
-        *value = c->at.phase < RUNNING ? c->at.start : klack_get_time(c->model);
-        return fmi3OK;
-    }
-    if (offset > klack_event_count()) return failed(c, "fmi3GetFloat64: no such variable.");
-    if (klack_get_events(c->model, indicators)) return of_model(c, 1);
-    *value = indicators[offset - 1];
-    return fmi3OK;
-}
-
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
     component *c = (component *)instance;
-    unsigned count = klack_variable_count();
     size_t i;
     REQUIRE(nValues == nValueReferences, "fmi3GetFloat64: one value per reference.");
     for (i = 0; i < nValueReferences; i++) {
-        unsigned r = valueReferences[i];
-        fmi3Status status = r < count ? of_model(c, klack_get_real(c->model, r, &values[i]))
-                                      : of_wrapper(c, r - count, &values[i]);
-        if (status != fmi3OK) return status;
+        if (valueReferences[i] == klack_variable_count()) {
+            values[i] = c->at.phase < RUNNING ? c->at.start : klack_get_time(c->model);
+        } else if (klack_get_real(c->model, valueReferences[i], &values[i])) {
+            return of_model(c, 1);
+        }
     }
     return fmi3OK;
 }
