@@ -392,7 +392,30 @@ def test_damaged_files_are_refused_in_words(tmp_path, name, data, reader):
 
 
 def test_damaged_universal_files_are_refused_in_words(tmp_path):
-    data = written_by_pyuff(tmp_path / "rod.uff").read_bytes()
+    source = written_by_pyuff(tmp_path / "rod.uff")
+    pyuff = pytest.importorskip("pyuff")
+    x = np.linspace(1e3, 9e3, 5)
+    response = {"func_type": 4, "rsp_node": 3, "rsp_dir": 3, "ref_node": 8, "ref_dir": 3}
+    kinds = {"abscissa_spec_data_type": 18, "ordinate_spec_data_type": 8}
+    pyuff.UFF(str(source)).write_sets(
+        pyuff.prepare_58(
+            binary=0,
+            data=1e-9 * (x + 1j),
+            x=x,
+            id1="r",
+            rsp_ent_name="a",
+            ref_ent_name="a",
+            abscissa_spacing=1,
+            orddenom_spec_data_type=13,
+            **response,
+            **kinds,
+        ),
+        "add",
+    )
+    found = read_modal_data(source).responses[0]
+    assert (found.response, found.reference) == ("3 z", "8 z")
+    assert found.values == pytest.approx(1e-9 * (x + 1j), rel=1e-5)
+    data = source.read_bytes()
     path = tmp_path / "m.uff"
     refused = read = 0
     contents = damaged(data, 11)

@@ -16,6 +16,7 @@ from klack.case import load_case
 from klack.case.schema import Case
 from klack.contact.laws import LinearLaw
 from klack.elasticity.body import elastic_body
+from klack.errors import AccuracyWarning, InputError
 from klack.materials import Material
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
@@ -176,12 +177,11 @@ def test_another_realisation_of_python_control_is_the_same_body(tmp_path, needle
     assert back.mass == pytest.approx(needle.mass, rel=1e-6)
 
 
-def test_modal_analysis_in_a_universal_file(tmp_path, needle):
-    """Five decimals in frequencies and shapes: the force within 1e-4 of its peak."""
+def write_modes(path: Path, needle: ReducedBody) -> object:
+    """Three nodes at the tip, whose mean is the port, one at the top; mass-normalised in kg."""
     pyuff = pytest.importorskip("pyuff")
-    file = pyuff.UFF(str(tmp_path / "n.uff"))
+    file = pyuff.UFF(str(path))
     for i in range(needle.mode_count):
-        # three nodes at the tip, one at the top; mass-normalised in kg, as the case says
         tip, top = needle.port_shapes[i]
         file.write_sets(
             pyuff.prepare_55(
@@ -208,6 +208,44 @@ def test_modal_analysis_in_a_universal_file(tmp_path, needle):
             ),
             "add",
         )
+    return file
+
+
+def receptance(body: ReducedBody, frequency: np.ndarray, a: int, b: int) -> np.ndarray:
+    w = 2 * np.pi * frequency[:, None]
+    own = body.omega**2 - w**2 + 2j * body.damping * body.omega * w
+    modal = np.sum(body.port_shapes[:, a] * body.port_shapes[:, b] / own, axis=1)
+    return modal + body.residual_compliance[a, b]
+
+
+def write_response(file: object, nodes: tuple[int, int], x: np.ndarray, H: np.ndarray, kind: int):
+    """Dataset 58 of a displacement (8) or an acceleration (12) over a force."""
+    pyuff = pytest.importorskip("pyuff")
+    file.write_sets(
+        pyuff.prepare_58(
+            binary=0,
+            func_type=4,
+            rsp_node=nodes[0],
+            rsp_dir=3,
+            ref_node=nodes[1],
+            ref_dir=-3,  # pushed the other way
+            data=-H,
+            x=x,
+            id1="response",
+            rsp_ent_name="needle",
+            ref_ent_name="needle",
+            abscissa_spacing=1,
+            abscissa_spec_data_type=18,
+            ordinate_spec_data_type=kind,
+            orddenom_spec_data_type=13,
+        ),
+        "add",
+    )
+
+
+def test_modal_analysis_in_a_universal_file(tmp_path, needle):
+    """Five decimals in frequencies and shapes: the force within 1e-4 of its peak."""
+    write_modes(tmp_path / "n.uff", needle)
     text = case_text("kind: modal\n      file: n.uff\n      units: m kg s", "11 12 13 z", "20")
     case = case_of(tmp_path, text)
     back = reduced_from_file(case, "needle")
@@ -216,6 +254,34 @@ def test_modal_analysis_in_a_universal_file(tmp_path, needle):
     force = own_impact(needle, 0.0)
     study = run_impact(case, levels=["reduced"])
     assert np.abs(study.levels["reduced"].history.force - force).max() < 1e-4 * force.max()
+
+
+@pytest.mark.parametrize("kind", [8, 12])
+def test_responses_of_a_universal_file_give_what_the_modes_miss(tmp_path, needle, kind):
+    """Receptances or accelerances between the ports: the residual compliance within 1 %."""
+    file = write_modes(tmp_path / "n.uff", needle)
+    x = np.linspace(1e3, 1e6, 400)
+    for nodes, (a, b) in (((12, 12), (0, 0)), ((20, 12), (1, 0)), ((20, 20), (1, 1))):
+        H = receptance(needle, x, a, b) * (2j * np.pi * x) ** (2 if kind == 12 else 0)
+        write_response(file, nodes, x, H, kind)
+    text = case_text("kind: modal\n      file: n.uff\n      units: m kg s", "12 z", "20 z")
+    back = reduced_from_file(case_of(tmp_path, text), "needle")
+    assert np.diag(back.residual_compliance) == pytest.approx(
+        np.diag(needle.residual_compliance), rel=0.01
+    )
+    text = case_text("kind: modal\n      file: n.uff\n      units: m kg s", "11 12 13", "20")
+    case = case_of(tmp_path, text)
+    with pytest.warns(AccuracyWarning, match="no response of '11 z'"):
+        reduced_from_file(case, "needle")
+
+
+def test_responses_of_another_body_are_refused(tmp_path, needle):
+    file = write_modes(tmp_path / "n.uff", needle)
+    x = np.linspace(1e3, 1e6, 400)
+    write_response(file, (12, 12), x, 3 * receptance(needle, x, 0, 0), 8)
+    text = case_text("kind: modal\n      file: n.uff\n      units: m kg s", "12 z", "20 z")
+    with pytest.raises(InputError, match="differ from the modes by"):
+        reduced_from_file(case_of(tmp_path, text), "needle")
 
 
 def test_craig_bampton_matrices_of_the_needle(tmp_path, needle):

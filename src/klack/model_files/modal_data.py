@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.model_files.named_arrays import NamedArrays, read_named_arrays
 from klack.model_files.uff_modes import UffModes, read_uff_modes
+from klack.model_files.uff_responses import Receptance
 
 __all__ = ["FileModalData", "read_modal_data"]
 
@@ -55,6 +56,8 @@ class FileModalData:
         True where columns are nodes and directions.
     length, force : float or None [m], [N]
         Units that the file itself claims.
+    responses : tuple of Receptance
+        Between nodes; they tell what the modes miss.
     """
 
     path: Path
@@ -67,6 +70,7 @@ class FileModalData:
     by_node: bool = False
     length: float | None = None
     force: float | None = None
+    responses: tuple[Receptance, ...] = ()
 
 
 def read_modal_data(path: Path) -> FileModalData:
@@ -116,6 +120,7 @@ def _of_uff(path: Path, modes: UffModes) -> FileModalData:
         by_node=True,
         length=modes.length,
         force=modes.force,
+        responses=modes.responses,
     )
 
 

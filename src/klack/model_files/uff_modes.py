@@ -1,11 +1,10 @@
-"""Mode shapes of a universal file: datasets 55, with the units of a dataset 164.
+"""Mode shapes of a universal file: datasets 55, with units (164) and frequency responses (58).
 
 Dataset 55 holds one mode: five lines of text, a line of kinds, a line of whole numbers, a line of
 frequency, modal mass and damping, then two lines for each node (number; displacements).  Numbers
 have five decimals, so shapes are known to about 1e-5.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.model_files.uff_lines import uff_datasets, uff_numbers, uff_refusal, uff_whole
+from klack.model_files.uff_responses import DIRECTIONS, Receptance, read_response
 
 __all__ = ["UffModes", "read_uff_modes"]
 
@@ -21,7 +22,6 @@ Floats = NDArray[np.float64]
 _LARGEST = 256 << 20  # bytes
 _NORMAL_MODE, _COMPLEX_MODE = 2, 3
 _DISPLACEMENT = 8
-_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,6 +36,8 @@ class UffModes:
         ``"17 z"``: node and direction of each column.
     length, force : float or None [m], [N]
         Units of dataset 164.
+    responses : tuple of Receptance
+        Of datasets 58.
     """
 
     frequency: Floats
@@ -45,6 +47,7 @@ class UffModes:
     labels: tuple[str, ...]
     length: float | None
     force: float | None
+    responses: tuple[Receptance, ...]
 
 
 @dataclass(frozen=True)
@@ -76,12 +79,16 @@ def read_uff_modes(path: Path) -> UffModes:
         )
     lines = path.read_bytes().decode("latin-1").splitlines()
     modes: list[_Mode] = []
+    responses: list[Receptance] = []
     units: tuple[float, float] | None = None
     kinds: list[str] = []
-    for kind, first, last in _datasets(path, lines):
+    for kind, first, last in uff_datasets(path, lines):
         kinds.append(kind)
         if kind == "55":
             modes.append(_mode(path, lines, first, last))
+        elif kind == "58":
+            response = read_response(path, lines, first, last)
+            responses += [response] if response is not None else []
         elif kind == "164":
             units = _units(path, lines, first, last)
     if not modes:
@@ -94,87 +101,24 @@ def read_uff_modes(path: Path) -> UffModes:
         )
     if len({mode.nodes for mode in modes}) > 1 or len({m.shapes.shape for m in modes}) > 1:
         odd = next(mode for mode in modes if mode.nodes != modes[0].nodes or mode is modes[-1])
-        raise _refused(path, odd.line, "a mode of other nodes than the first", "the same nodes")
+        raise uff_refusal(path, odd.line, "a mode of other nodes than the first", "the same nodes")
     width = modes[0].shapes.shape[1]
     return UffModes(
         frequency=np.array([mode.frequency for mode in modes]),
         damping=np.array([mode.damping for mode in modes]),
         modal_mass=np.array([mode.mass for mode in modes]),
         shapes=np.array([mode.shapes.ravel() for mode in modes]),
-        labels=tuple(f"{n} {_DIRECTIONS[d]}" for n in modes[0].nodes for d in range(width)),
+        labels=tuple(f"{n} {DIRECTIONS[d]}" for n in modes[0].nodes for d in range(width)),
         length=units[0] if units else None,
         force=units[1] if units else None,
+        responses=tuple(responses),
     )
-
-
-def _refused(path: Path, line: int, got: str, expected: str) -> InputError:
-    return InputError(
-        f"{path}, line {line}",
-        got=got,
-        expected=expected,
-        hint="the file is cut off or damaged; export it again.",
-    )
-
-
-def _datasets(path: Path, lines: list[str]) -> Iterator[tuple[str, int, int]]:
-    """Kind, first line (from 0) and end of every dataset."""
-    i = 0
-    while i < len(lines):
-        if lines[i].strip() != "-1":
-            i += 1
-            continue
-        if i + 1 >= len(lines):
-            raise _refused(path, i + 1, "the start of a dataset at the end", "its number")
-        words = lines[i + 1].split()
-        kind = words[0].lower() if words else ""
-        end = i + 2
-        while end < len(lines) and lines[end].strip() != "-1":
-            end += 1
-        if end == len(lines):
-            raise _refused(path, len(lines), f"dataset {kind} without end", "-1")
-        yield kind, i + 2, end
-        i = end + 1
-
-
-def _fields(path: Path, lines: list[str], at: int, end: int, count: int) -> list[float]:
-    """Numbers from line ``at`` on, as many as asked for, over several lines if need be."""
-    values: list[float] = []
-    while len(values) < count:
-        if at >= end:
-            raise _refused(path, at, "the end of a dataset", f"{count} numbers")
-        line = lines[at].replace("D", "E").replace("d", "e")
-        words = line.split()
-        try:
-            values += [float(word) for word in words]
-        except ValueError:
-            values += _fixed(path, at, line)
-        if not words:
-            raise _refused(path, at + 1, "an empty line", "numbers")
-        at += 1
-    if not np.all(np.isfinite(values)):
-        raise _refused(path, at, "a number that is not finite", "finite numbers")
-    return values
-
-
-def _fixed(path: Path, at: int, line: str) -> list[float]:
-    """Fields of 13 characters that touch each other."""
-    try:
-        return [float(line[k : k + 13]) for k in range(0, len(line.rstrip()), 13)]
-    except ValueError:
-        raise _refused(path, at + 1, f"'{line.strip()[:60]}'", "numbers") from None
-
-
-def _whole(path: Path, lines: list[str], at: int, end: int, count: int) -> list[int]:
-    values = _fields(path, lines, at, end, count)
-    if any(value != round(value) or abs(value) > 1e9 for value in values):
-        raise _refused(path, at + 1, f"'{lines[at].strip()[:60]}'", f"{count} whole numbers")
-    return [int(value) for value in values]
 
 
 def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
     if end - first < 8:
-        raise _refused(path, first, "a short dataset 55", "a mode with its nodes")
-    head = _whole(path, lines, first + 5, end, 6)
+        raise uff_refusal(path, first, "a short dataset 55", "a mode with its nodes")
+    head = uff_whole(path, lines, first + 5, end, 6)
     _, analysis, _, quantity, number_type, width = head[:6]
     if analysis == _COMPLEX_MODE or number_type == 5:
         raise InputError(
@@ -184,25 +128,25 @@ def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
             hint="export normal modes; klack takes damping as a ratio beside the shape.",
         )
     if analysis != _NORMAL_MODE or quantity not in (0, _DISPLACEMENT) or not 1 <= width <= 6:
-        raise _refused(
+        raise uff_refusal(
             path,
             first + 6,
             f"analysis type {analysis}, quantity {quantity}, {width} values per node",
             "normal modes (2) of displacements (8), 1 to 6 values per node",
         )
-    about = _whole(path, lines, first + 6, end, 2)
-    reals = _fields(path, lines, first + 7, end, max(2, min(about[1], 6)))
+    about = uff_whole(path, lines, first + 6, end, 2)
+    reals = uff_numbers(path, lines, first + 7, end, max(2, min(about[1], 6)))
     nodes, shapes = [], []
     at = first + 8
     while at < end:
-        nodes.append(_whole(path, lines, at, end, 1)[0])
-        values = _fields(path, lines, at + 1, end, width)
+        nodes.append(uff_whole(path, lines, at, end, 1)[0])
+        values = uff_numbers(path, lines, at + 1, end, width)
         if len(values) != width:
-            raise _refused(path, at + 2, f"{len(values)} values", f"{width} of one node")
+            raise uff_refusal(path, at + 2, f"{len(values)} values", f"{width} of one node")
         shapes.append(values)
         at += 2
     if len(set(nodes)) != len(nodes) or not nodes:
-        raise _refused(path, first + 9, "a node twice, or none", "each node once")
+        raise uff_refusal(path, first + 9, "a node twice, or none", "each node once")
     viscous = reals[2] if len(reals) > 2 else 0.0
     hysteretic = reals[3] if len(reals) > 3 else 0.0
     return _Mode(
@@ -217,7 +161,7 @@ def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
 
 def _units(path: Path, lines: list[str], first: int, end: int) -> tuple[float, float]:
     """Unit of length [m] and of force [N]; the file gives their reciprocals."""
-    factors = _fields(path, lines, first + 1, end, 2)
+    factors = uff_numbers(path, lines, first + 1, end, 2)
     if not (factors[0] > 0 and factors[1] > 0):
-        raise _refused(path, first + 2, f"unit factors {factors[:2]}", "factors above 0")
+        raise uff_refusal(path, first + 2, f"unit factors {factors[:2]}", "factors above 0")
     return 1.0 / factors[0], 1.0 / factors[1]

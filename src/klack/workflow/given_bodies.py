@@ -1,5 +1,6 @@
 """Bodies that another program has assembled or reduced, as the case names them."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from klack.case.bodies import CaseFile
 from klack.case.foreign import ModelPort, ReducedModel
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.input.problem import nearest, one_of
 from klack.model_files.modal_data import FileModalData, read_modal_data
 from klack.model_files.reduced_matrices import read_reduced_matrices
@@ -17,7 +18,9 @@ from klack.reduction.damping import Damping
 from klack.reduction.from_craig_bampton import body_of_craig_bampton
 from klack.reduction.from_modal_data import body_of_modal_data
 from klack.reduction.from_state_space import body_of_state_space, state_space_in_si
+from klack.reduction.given_modes import RIGID_FREQUENCY
 from klack.reduction.reduced_body import ReducedBody, StateSpace
+from klack.reduction.residual_fit import fit_residual
 from klack.workflow.assembled_bodies import assembled_from_matrices
 from klack.workflow.damping_choice import damping_of
 
@@ -173,20 +176,66 @@ def _of_modal_data(name: str, model: ReducedModel) -> ReducedBody:
     held = read_modal_data(model.file)
     _check_units(model, held)
     weights = np.column_stack([_weights(model, port, held) for port in model.ports.values()])
+    count = len(held.frequency)
+    damping = np.zeros(count) if held.damping is None else held.damping
+    shapes = held.shapes / np.sqrt(held.modal_mass * model.units.mass)[:, None]
+    compliance = model.units.length / model.units.force
     residual = None
     if held.residual is not None:
-        residual = weights.T @ held.residual @ weights * (model.units.length / model.units.force)
-    count = len(held.frequency)
+        residual = weights.T @ held.residual @ weights * compliance
+    elif held.responses:
+        residual = _fitted(held, shapes, damping, weights, compliance)
     return body_of_modal_data(
         name,
         frequency=held.frequency,
-        damping=np.zeros(count) if held.damping is None else held.damping,
-        shapes=held.shapes @ weights / np.sqrt(held.modal_mass * model.units.mass)[:, None],
+        damping=damping,
+        shapes=shapes @ weights,
         port_names=tuple(model.ports),
         residual=residual,
         where=str(model.file),
         mass=model.mass,
     )
+
+
+def _fitted(
+    held: FileModalData,
+    shapes: NDArray[np.float64],
+    damping: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    compliance: float,
+) -> NDArray[np.float64] | None:
+    """Residual compliance between the ports [m/N]; None if a response is not there."""
+    found = {}
+    omega = np.where(held.frequency < RIGID_FREQUENCY, 0.0, 2.0 * np.pi * held.frequency)
+    used = [int(i) for i in np.flatnonzero(np.any(weights, axis=1))]
+    for item in held.responses:
+        if item.response not in held.labels or item.reference not in held.labels:
+            continue
+        a, b = held.labels.index(item.response), held.labels.index(item.reference)
+        if a in used and b in used:
+            found[a, b] = fit_residual(
+                f"{held.path}: response of '{item.response}' to '{item.reference}'",
+                item.frequency,
+                compliance * item.values,
+                omega=omega,
+                damping=damping,
+                product=shapes[:, a] * shapes[:, b],
+            )
+    matrix = np.zeros((len(held.labels),) * 2)
+    for a in used:
+        for b in used:
+            value = found.get((a, b), found.get((b, a)))
+            if value is None:
+                warnings.warn(
+                    f"{held.path.name} has no response of '{held.labels[a]}' to "
+                    f"'{held.labels[b]}': what its modes miss is left out. Try: export the "
+                    "responses (dataset 58) between all nodes of the ports.",
+                    AccuracyWarning,
+                    stacklevel=2,
+                )
+                return None
+            matrix[a, b] = value
+    return np.asarray(weights.T @ matrix @ weights)
 
 
 def _check_units(model: ReducedModel, held: FileModalData) -> None:
