@@ -45,6 +45,11 @@ H = H + s * two{6} * ((s^2 * two{1} + s * two{2} + two{3}) \ full(two{4})) + two
 G = p.C * ((s * eye(n) - p.A) \ p.B) + p.D;
 printf('%.3g\n', norm(H - G) / norm(G));
 disp(p.provenance.title);
+global SET
+rod_block('plant');
+for k = 1:2:9
+  printf('%s %s %d %d\n', SET{k:k+1}, size(eval(SET{k+1})));
+end
 """
 
 
@@ -58,6 +63,11 @@ def test_body_reads_steps_and_responds(octave, tmp_path):
     (tmp_path / "stand_in" / "mechss.m").write_text(
         "function sys = mechss(varargin)\nsys = struct('given', {{varargin{:}}});\nend\n"
     )
+    for name, head in (("add_block", "b"), ("get_param", "s"), ("set_param", "n")):
+        (tmp_path / "stand_in" / f"{name}.m").write_text(
+            f"function {head} = {name}(varargin)\nglobal SET\nb = 1; s = struct('X0', 1); n = 0;\n"
+            f"if strcmp('{name}', 'set_param')\n  SET = varargin(2:end);\nend\nend\n"
+        )
     script = BODY_SCRIPT.replace("STEP", repr(STEP)).replace("COUNT", str(COUNT))
     lines = octave(script).splitlines()
     found = np.array([line.split() for line in lines[:COUNT]], dtype=float)
@@ -82,6 +92,10 @@ def test_body_reads_steps_and_responds(octave, tmp_path):
     assert lines[COUNT + 2] == "klack:mechss"
     assert float(lines[COUNT + 3]) < 1e-10
     assert lines[COUNT + 4].strip() == origin.title
+    assert lines[COUNT + 5 :] == [
+        *("A klack_rod.A 18 18", "B klack_rod.B_block 18 3", "C klack_rod.C 4 18"),
+        *("D klack_rod.D_block 4 3", "X0 klack_rod.x0 18 1"),
+    ]
 
 
 LAWS_SCRIPT = """

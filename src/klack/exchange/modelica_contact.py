@@ -175,12 +175,13 @@ def _law_function(name: str, kind: ContactKind, rows: int, soft: bool) -> Iterab
         yield "  algorithm"
         yield "    force := max(closing, 0.0)*law[1]/(1 + series*law[1]);"
     elif kind == "power":
-        yield _POWER.strip("\n")
+        yield _POWER.strip("\n").replace("SEARCH", "    Real f;\n" if soft else "")
         if soft:
             yield _SOFT_POWER.strip("\n")
         yield "    force := law[1]*d^law[2];"
     else:
-        yield _TABLE.strip("\n").replace("ROWS", str(rows))
+        search = "    Real low;\n    Real high;\n    Real excess;\n" if soft else ""
+        yield _TABLE.strip("\n").replace("ROWS", str(rows)).replace("SEARCH", search)
         yield _SOFT_TABLE.strip("\n") if soft else "    s := rest;"
         yield "    force := law[row, 2] + s*(law[row, 3] + s*(law[row, 4] + s*law[row, 5]));"
     yield f"  end {name};"
@@ -189,8 +190,7 @@ def _law_function(name: str, kind: ContactKind, rows: int, soft: bool) -> Iterab
 _POWER = """
   protected
     Real d "Indentation";
-    Real f;
-  algorithm
+SEARCH  algorithm
     d := max(closing, 0.0);
 """
 
@@ -206,10 +206,7 @@ _TABLE = """
     Integer row;
     Real rest "Overlap that is left for the interval";
     Real s "Indentation from the start of the interval";
-    Real low;
-    Real high;
-    Real excess;
-  algorithm
+SEARCH  algorithm
     row := 1;
     for k in 2:ROWS loop
       row := if closing >= law[k, 1] + series*law[k, 2] then k else row;

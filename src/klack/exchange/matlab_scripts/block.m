@@ -15,7 +15,11 @@ p.B_block = [p.B, p.constant_rate];
 p.D_block = [p.D, p.output_offset];
 assignin('base', 'klack_@NAME@', p);
 block = add_block('simulink/Continuous/State-Space', [system '/@NAME@'], 'MakeNameUnique', 'on');
+start = 'InitialCondition';
+if ~isfield(get_param(block, 'ObjectParameters'), start)
+  start = 'X0';  % its name in older versions
+end
 set_param(block, 'A', 'klack_@NAME@.A', 'B', 'klack_@NAME@.B_block', 'C', 'klack_@NAME@.C', ...
-  'D', 'klack_@NAME@.D_block', 'X0', 'klack_@NAME@.x0', ...
-  'AbsoluteTolerance', '1e-12', 'Description', strjoin(p.about(:)', char(10)));
+  'D', 'klack_@NAME@.D_block', start, 'klack_@NAME@.x0', ...
+  'AbsoluteTolerance', '1e-14', 'Description', strjoin(p.about(:)', char(10)));
 end
