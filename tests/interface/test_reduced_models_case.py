@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scipy.io
 
-from klack.case import load_case
+from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
+from klack.case.valve_reader import load_any_case
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.elasticity.body import elastic_body
 from klack.errors import InputError
@@ -295,3 +296,17 @@ def test_problem_of_a_port_names_its_line(tmp_path):
         case_of(tmp_path, TEXT.replace("seat.face", "seat.fase"))
     assert "face" in caught.value.hint
     assert "case.yaml" in caught.value.where
+
+
+def test_whole_valve_needs_surfaces(tmp_path):
+    text = shipped_cases()["demo-stroke"].read_text()
+    begin = text.index("\n  needle:\n") + 1
+    NEEDLE.save(tmp_path / "needle.npz")
+    model = "{kind: klack, file: needle.npz, units: m kg s, ports: {tip: {input: bottom}}}"
+    lines = text[begin:].splitlines(keepends=True)
+    body = 1 + next(i for i, line in enumerate(lines[1:]) if not line.startswith("    "))
+    (tmp_path / "case.yaml").write_text(
+        text[:begin] + f"  needle:\n    reduced: {model}\n" + "".join(lines[body:])
+    )
+    with pytest.raises(InputError, match="a reduced model or nodes alone in a whole valve"):
+        load_any_case(tmp_path / "case.yaml")

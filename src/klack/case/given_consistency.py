@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 
 if TYPE_CHECKING:
-    from klack.case.bodies import CaseBody, SurfaceName
+    from klack.case.bodies import CaseBody, CaseFile, SurfaceName
     from klack.case.schema import Case
 
-__all__ = ["GIVEN_LEVELS", "check_given", "check_port"]
+__all__ = ["GIVEN_LEVELS", "check_given", "check_port", "require_surfaces"]
 
 GIVEN_LEVELS = ("lumped", "reduced")
 """Levels that need no surfaces."""
@@ -34,6 +34,21 @@ def check_port(key: Key, surface: "SurfaceName", body: "CaseBody") -> None:
             got=f"the unknown {what} '{surface.surface}' of {surface.body}",
             expected=f"one of: {one_of(known) or '(none)'}",
             hint=nearest(surface.surface, known, f"name a {what} of this body."),
+        )
+
+
+def require_surfaces(case: "CaseFile", name: str) -> None:
+    """Refuse a body without surfaces in a whole valve, whose stops solve their static contact."""
+    body = case.bodies[name]
+    if not body.has_surfaces:
+        kind = "reduced" if body.reduced is not None else "geometry"
+        raise CaseProblem(
+            ("bodies", name, kind),
+            got="a reduced model or nodes alone in a whole valve",
+            expected="a body with meshed surfaces",
+            hint="'klack impact' takes such bodies; for a stroke give the mesh, with its matrices "
+            "if you like.",
+            on_key=True,
         )
 
 

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from klack.case.consistency import check_body, check_surface, require_known
+from klack.case.given_consistency import require_surfaces
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.network.component import Component
@@ -16,6 +17,7 @@ __all__ = ["check_valve", "is_consistent"]
 def check_valve(case: "ValveCase") -> None:
     """Raise :class:`CaseProblem` for the first contradiction between sections."""
     for name in case.bodies:
+        require_surfaces(case, name)
         check_body(case, name)
         _check_ports(case, name)
     for name in case.reduction.modes:
