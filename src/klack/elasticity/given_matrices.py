@@ -129,7 +129,8 @@ def check_matrices(
     rigid = R.shape[1] if is_free else 0
     if rigid:
         K = without_rigid_strain(K, M, mesh)
-    frequency = first_frequency(where, K, M, mesh, free, rigid)
+    body = ElasticBody(name="given", mesh=mesh, K=K, M=M, fixed=np.sort(fixed))
+    frequency = first_frequency(where, body)
     rows = (
         ("degrees of freedom", f"{mesh.dof_count}, {len(fixed)} of them held"),
         ("left out in the files", f"{len(absent)} degrees of freedom, taken as held"),

@@ -12,7 +12,7 @@ __all__ = ["require_rigid_motions", "rigid_motions", "without_rigid_strain"]
 _LARGEST_FORCE = 1e-5
 _MOST_TIED = 0.5
 _NAMED = 4
-_QUIET = 0.01  # [Hz] rigid frequency that needs no cure
+_QUIET = 0.05  # [Hz] rigid frequency that needs no cure
 
 
 def rigid_motions(mesh: Mesh) -> NDArray[np.float64]:
