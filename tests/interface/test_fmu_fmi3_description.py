@@ -90,6 +90,10 @@ MODELS = {
         "pair", law=HuntCrossley(LinearLaw(STIFFNESS), dissipation=0.1)
     ),
     "pair for co-simulation only": small_model("pair", film=FILM, series=1e-9),
+    "damped pair for co-simulation only": small_model(
+        "pair", law=HuntCrossley(LinearLaw(STIFFNESS), dissipation=0.1), series=1e-9
+    ),
+    "pair with compliance": small_model("pair", series=1e-9),
 }
 
 
@@ -119,7 +123,8 @@ def test_description_is_valid(model, fmi, tmp_path):
     assert found.guid == GUID if fmi == 2 else found.instantiationToken == GUID
     assert found.coSimulation.canSerializeFMUstate
     assert found.coSimulation.canHandleVariableCommunicationStepSize
-    assert (found.modelExchange is None) == (model is MODELS["pair for co-simulation only"])
+    alone = [MODELS[name] for name in MODELS if name.endswith("co-simulation only")]
+    assert (found.modelExchange is None) == (model in alone)
     assert float(found.defaultExperiment.stopTime) == model.duration
     assert float(found.defaultExperiment.stepSize) == communication_step(model)
 

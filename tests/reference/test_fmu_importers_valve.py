@@ -1,6 +1,7 @@
 """Truth: klack's network solver runs bodies and end stops of a valve; fmpy runs their FMU.
 
-With the films taken out the same model has model exchange, and CVode of SUNDIALS runs it.
+Without films, or without series compliances, the same model has model exchange, and CVode of
+SUNDIALS runs it.
 """
 
 import shutil
@@ -11,6 +12,7 @@ import pytest
 
 from klack.case import find_case
 from klack.case.valve_reader import load_any_case
+from klack.contact.laws import HuntCrossley
 from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
 from klack.mechanics.force import ConstantForce
@@ -97,10 +99,26 @@ def test_films_in_series_leave_co_simulation_alone(pair, tmp_path, fmi):
     assert description.coSimulation is not None
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_dry_model_exchange_is_dry_co_simulation(pair, tmp_path, fmi):
-    dry = replace(pair, contacts=tuple(replace(c, film=None) for c in pair.contacts))
-    path = build_fmu(dry, tmp_path / "d.fmu", fmi=fmi, platforms=("linux64",))
+def dry(contact):
+    return replace(contact, film=None)
+
+
+def wet(contact):
+    return replace(contact, series_compliance=0.0)
+
+
+def damped(contact):
+    law = HuntCrossley(contact.law, dissipation=0.2)
+    return replace(contact, series_compliance=0.0, film=None, law=law)
+
+
+@pytest.mark.parametrize(
+    ("change", "fmi", "force", "way"),
+    [(dry, 2, 1e-5, 1e-6), (wet, 3, 1e-4, 3e-6), (damped, 3, 1e-4, 1e-6)],
+)
+def test_model_exchange_is_co_simulation(pair, tmp_path, change, fmi, force, way):
+    changed = replace(pair, contacts=tuple(change(contact) for contact in pair.contacts))
+    path = build_fmu(changed, tmp_path / "d.fmu", fmi=fmi, platforms=("linux64",))
     fine = by_fmu(
         path,
         "CoSimulation",
@@ -109,12 +127,13 @@ def test_dry_model_exchange_is_dry_co_simulation(pair, tmp_path, fmi):
         start_values={"internal_step": 1.25e-9},
     )
     exchanged = by_fmu(
-        path, "ModelExchange", solver="CVode", relative_tolerance=1e-9, output_interval=2e-8
+        path, "ModelExchange", solver="CVode", relative_tolerance=1e-8, output_interval=2e-8
     )
 
     assert validation.validate_fmu(str(path)) == []
     peak = fine["peak_contact_force_opening"].max()
     assert peak > 500.0
-    assert exchanged["contact_force_opening"].max() == pytest.approx(peak, rel=1e-4)
+    # a film and a damped law begin with a step of order 1; the peak falls between two outputs
+    assert exchanged["contact_force_opening"].max() == pytest.approx(peak, rel=force)
     lift = np.interp(fine["time"], exchanged["time"], exchanged["lift"])
-    np.testing.assert_allclose(lift, fine["lift"], rtol=0.0, atol=1e-6 * 1e-4)
+    np.testing.assert_allclose(lift, fine["lift"], rtol=0.0, atol=way * 1e-4)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.laws import HuntCrossley
+from klack.exchange.fmu.model_exchange import feels_speed
 from klack.exchange.fmu.variables import fmu_variables
-from klack.exchange.modal_model import ModalModel, ModelContact
+from klack.exchange.modal_model import ModalModel
 
 __all__ = ["Dependencies", "dependencies_of"]
 
@@ -50,7 +50,7 @@ def dependencies_of(model: ModalModel) -> Dependencies:
 
     contact_states = tuple(_picked(moved, contact.shape) for contact in model.contacts)
     force_states = tuple(
-        states + (_picked(moving, contact.shape) if _feels_speed(contact) else ())
+        states + (_picked(moving, contact.shape) if feels_speed(contact) else ())
         for states, contact in zip(contact_states, model.contacts, strict=True)
     )
     running: dict[int, tuple[int, ...]] = {}
@@ -93,7 +93,3 @@ def dependencies_of(model: ModalModel) -> Dependencies:
 
 def _picked(references: NDArray[np.int64], shape: NDArray[np.float64]) -> tuple[int, ...]:
     return tuple(int(r) for r in references[np.asarray(shape) != 0.0])
-
-
-def _feels_speed(contact: ModelContact) -> bool:
-    return contact.film is not None or isinstance(contact.law, HuntCrossley)
