@@ -24,6 +24,7 @@ COMPONENTS = (
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
     ("end-stop", "klack.mechanics.end_stop.EndStop"),
+    ("fmu", "klack.mechanics.imported_fmu.ImportedFmu"),
     # hydraulics
     ("chamber", "klack.hydraulics.chamber.Chamber"),
     ("pressure-source", "klack.hydraulics.pressure_source.PressureSource"),

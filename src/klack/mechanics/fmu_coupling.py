@@ -1,0 +1,137 @@
+r"""Coupling of an FMU to the time loop: exchange at communication points, and what it costs.
+
+The loop goes first.  At a communication point :math:`t_{k+1}` the FMU is led from :math:`t_k` over
+the same time, with the displacement of its end and the mean velocity of the interval, and gives the
+force :math:`f_{k+1}`.  Until the next point the loop feels
+
+.. math:: F(t) = f_{k+1} \quad\text{(hold)}, \qquad
+          F(t) = f_{k+1} + \frac{f_{k+1} - f_k}{t_{k+1} - t_k}\,(t - t_{k+1}) \quad\text{(linear)}
+
+The FMU itself did the work :math:`W_k = \tfrac12 (f_k + f_{k+1})(y_{k+1} - y_k)`, the loop got
+:math:`\int F\,\mathrm dy`.  The difference is energy that coupling loses (above zero) or makes
+(below), as the residual energy of Sadjina et al. (2017); it falls with the coupling step, once for
+``hold`` and twice for ``linear``.  Both stand in the books: the work as a supply, the difference as
+a loss, so that the ledger of the whole network still closes to round-off.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mechanics.fmu_slave import FmuSlave
+
+__all__ = ["STATES", "Extrapolation", "FmuCoupling"]
+
+Extrapolation = Literal["hold", "linear"]
+Vector = NDArray[np.float64]
+
+STATES = 6
+"""Exchanges so far, time and displacement of the last one, its force, slope, work felt since."""
+
+_ROUND_OFF = 1e-6  # of the coupling step
+
+
+class FmuCoupling:
+    """Step function of an imported FMU: two ports, :data:`STATES` states, two books.
+
+    Parameters
+    ----------
+    slave : FmuSlave
+    coupling_step : float [s]
+        Shortest time between two exchanges; rounded up to whole steps of the loop.
+    extrapolation : "hold" or "linear"
+    """
+
+    def __init__(self, slave: FmuSlave, coupling_step: float, extrapolation: Extrapolation) -> None:
+        self.slave, self.coupling_step = slave, coupling_step
+        self.linear = extrapolation == "linear"
+        self._ready = False  # in its initialisation
+        self._exchange: Vector = np.zeros(STATES)  # the last one
+        self._began_from = -1.0  # exchanges before the last one
+        self._loss = 0.0
+
+    def __call__(self, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
+        """One step; called again with a better end it does not exchange again."""
+        t, h, start, end = inp[0], inp[1], inp[2] - inp[4], inp[3] - inp[5]
+        out[:] = 0.0
+        out[2 : 2 + STATES] = state
+        if h == 0.0:  # only the stores are asked for, and there are none
+            return 0
+        if t < 0.0:  # on the way to the static start
+            out[0] = self._at_rest(start)
+            out[1] = -out[0]
+            return 0
+        if h > self.coupling_step * (1.0 + _ROUND_OFF):
+            raise self._too_long(h)
+        loss = 0.0
+        if self._is_due(state, t):
+            if not (self._began_from == state[0] and self._exchange[1] == t):
+                self._communicate(state, t, start, (end - start) / h)
+            state, loss = self._exchange, self._loss
+        force = state[3] + state[4] * (t + 0.5 * h - state[1])
+        work = force * (end - start)
+        out[0], out[1] = force, -force
+        out[2 : 2 + STATES] = (*state[:5], state[5] + work)
+        out[2 + STATES] = work + loss
+        out[3 + STATES] = loss
+        return 0
+
+    def _at_rest(self, displacement: float) -> float:
+        if not self._ready:
+            self.slave.begin()
+            self._ready, self._began_from = True, -1.0
+        return self.slave.force(displacement, 0.0)
+
+    def _is_due(self, state: Vector, t: float) -> bool:
+        return bool(state[0] == 0.0 or t - state[1] >= self.coupling_step * (1.0 - _ROUND_OFF))
+
+    def _communicate(self, state: Vector, t: float, y: float, speed: float) -> None:
+        """Lead the FMU to ``t``; sets the exchange and the energy lost since the one before."""
+        if state[0] == 0.0:
+            if not self._ready:
+                self.slave.begin()
+            force, slope, self._loss = self.slave.force(y, speed), 0.0, 0.0
+            self.slave.run()
+            self._ready = False
+        else:
+            if state[0] != self._exchange[0] or state[1] != self._exchange[1]:
+                raise _gone_on(self.slave)
+            step = t - state[1]
+            if not self.slave.fmu.variable_step and self._uneven(step):
+                raise self._not_whole(step)
+            force = self.slave.advance(state[1], step, y, (y - state[2]) / step)
+            slope = (force - state[3]) / step if self.linear else 0.0
+            before = state[3]
+            self._loss = 0.5 * (before + force) * (y - state[2]) - state[5]
+        self._began_from = float(state[0])
+        self._exchange = np.array([state[0] + 1.0, t, y, force, slope, 0.0])
+
+    def _uneven(self, step: float) -> bool:
+        return abs(step - self.coupling_step) > _ROUND_OFF * self.coupling_step
+
+    def _too_long(self, h: float) -> InputError:
+        return InputError(
+            f"{self.slave.fmu.path.name}: coupling_step",
+            got=f"{self.coupling_step:g} s, shorter than a step of {h:g} s",
+            expected="at least one step of the time loop",
+            hint="enlarge it to whole coarse steps, or switch those off: run: {coarse: 1}.",
+        )
+
+    def _not_whole(self, step: float) -> InputError:
+        return InputError(
+            f"{self.slave.fmu.path.name}: coupling_step",
+            got=f"{self.coupling_step:g} s, and an exchange after {step:g} s",
+            expected="whole steps of the time loop, for an FMU that takes even steps only",
+            hint="take a whole number of coarse steps (run.coarse times run.step).",
+        )
+
+
+def _gone_on(slave: FmuSlave) -> InputError:
+    return InputError(
+        slave.fmu.path.name,
+        got="a run that goes on from a stored state",
+        expected="a run from its start: the inner state of an FMU is not stored",
+        hint="compute the whole time in one run.",
+    )

@@ -1,0 +1,100 @@
+"""A small FMU that the tests of several folders need."""
+
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parent / "data" / "spring_damper.c"
+
+VARIABLES = (  # name, FMI 2 and 3 attributes, unit
+    ("time", 'causality="independent" variability="continuous"', ""),
+    ("x", 'causality="input" variability="continuous" start="0"', "{length}"),
+    ("v", 'causality="input" variability="continuous" start="0"', ""),
+    ("F", 'causality="output" variability="continuous"', "N"),
+    ("k", 'causality="parameter" variability="tunable" start="1000"', "N/m"),
+    ("c", 'causality="parameter" variability="tunable" start="0"', "N*s/m"),
+    ("steps", 'causality="local" variability="discrete"', ""),
+)
+
+HEAD = {
+    2: '<fmiModelDescription fmiVersion="2.0" modelName="spring_damper" guid="spring" '
+    'numberOfEventIndicators="0">\n<CoSimulation modelIdentifier="spring_damper" '
+    'canHandleVariableCommunicationStepSize="{variable}"/>\n',
+    3: '<fmiModelDescription fmiVersion="3.0" modelName="spring_damper" '
+    'instantiationToken="spring">\n<CoSimulation modelIdentifier="spring_damper" '
+    'canHandleVariableCommunicationStepSize="{variable}"/>\n',
+}
+
+
+def describe(version: int, length: str, variable: bool) -> str:
+    """Write the description of the FMU in ``tests/data/spring_damper.c``."""
+    lines = [HEAD[version].format(variable=str(variable).lower())]
+    units = "".join(f'<Unit name="{unit}"/>' for unit in {length, "N", "N/m", "N*s/m"} if unit)
+    lines.append(f"<UnitDefinitions>{units}</UnitDefinitions>\n<ModelVariables>\n")
+    for reference, (name, given, plain) in enumerate(VARIABLES):
+        text = plain.format(length=length)
+        unit = f' unit="{text}"' if text else ""
+        if version == 2:
+            inner = 'start="0"' if 'start="0"' in given else ""
+            inner = 'start="1000"' if "1000" in given else inner
+            outer = given.split(" start=")[0]
+            lines.append(
+                f'<ScalarVariable name="{name}" valueReference="{reference}" {outer}>'
+                f"<Real {inner}{unit}/></ScalarVariable>\n"
+            )
+        else:
+            lines.append(f'<Float64 name="{name}" valueReference="{reference}" {given}{unit}/>\n')
+    known = '<Outputs><Unknown index="4"/></Outputs>' if version == 2 else (
+        '<Output valueReference="3"/>'
+    )  # fmt: skip
+    lines.append(f"</ModelVariables>\n<ModelStructure>{known}</ModelStructure>\n")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + "".join(lines) + "</fmiModelDescription>\n"
+
+
+def functions(version: int) -> list[str]:
+    """Every function that a library of this version must have."""
+    from fmpy.fmi2 import FMU2Slave
+    from fmpy.fmi3 import FMU3Slave
+
+    kind = FMU2Slave if version == 2 else FMU3Slave
+    return [name for name in dir(kind) if name.startswith(f"fmi{version}")]
+
+
+@pytest.fixture(scope="session")
+def spring_damper_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Build an FMU with F = -k x - c v; it fails when a step is forgotten or done twice."""
+    fmpy = pytest.importorskip("fmpy")
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    folder = tmp_path_factory.mktemp("fmu")
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = SOURCE.read_text()
+
+    def build(version: int = 2, *, length: str = "m", variable: bool = True) -> Path:
+        path = folder / f"spring_{version}_{length}_{variable}.fmu"
+        if path.exists():
+            return path
+        library = folder / f"spring_damper_{version}.so"
+        if not library.exists():
+            missing = folder / f"missing_{version}.c"
+            missing.write_text(
+                "".join(
+                    f"int {name}(void) {{ return 3; }}\n"
+                    for name in functions(version)
+                    if f"{name}(" not in source
+                )
+            )
+            command = ["gcc", "-shared", "-fPIC", "-O1", f"-DFMI={version}", f"-I{headers}"]
+            files = [str(SOURCE), str(missing), "-o", str(library)]
+            subprocess.run([*command, *files, "-lm"], check=True)
+        place = fmpy.platform if version == 2 else fmpy.platform_tuple
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("modelDescription.xml", describe(version, length, variable))
+            archive.write(library, f"binaries/{place}/spring_damper{fmpy.sharedLibraryExtension}")
+        return path
+
+    return build
