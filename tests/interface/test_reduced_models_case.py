@@ -300,13 +300,11 @@ def test_problem_of_a_port_names_its_line(tmp_path):
 
 def test_whole_valve_needs_surfaces(tmp_path):
     text = shipped_cases()["demo-stroke"].read_text()
-    begin = text.index("\n  needle:\n") + 1
-    NEEDLE.save(tmp_path / "needle.npz")
+    begin, end = text.index("\n  needle:") + 1, text.index("\n  housing:") + 1
     model = "{kind: klack, file: needle.npz, units: m kg s, ports: {tip: {input: bottom}}}"
-    lines = text[begin:].splitlines(keepends=True)
-    body = 1 + next(i for i, line in enumerate(lines[1:]) if not line.startswith("    "))
+    NEEDLE.save(tmp_path / "needle.npz")
     (tmp_path / "case.yaml").write_text(
-        text[:begin] + f"  needle:\n    reduced: {model}\n" + "".join(lines[body:])
+        f"{text[:begin]}  needle:\n    reduced: {model}\n{text[end:]}"
     )
     with pytest.raises(InputError, match="a reduced model or nodes alone in a whole valve"):
         load_any_case(tmp_path / "case.yaml")
