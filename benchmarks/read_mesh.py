@@ -57,7 +57,9 @@ def write_boxes(path: Path, nodes: int) -> float:
             stream.write(f"*ELEMENT, TYPE={_TYPES[family]}, ELSET={family}\n")
             numbers = np.arange(1, len(block.connectivity) + 1) + element
             _write_records(stream, np.column_stack([numbers, block.connectivity + (node + 1)]))
-            stream.write(f"*ELSET, ELSET={family}_range, GENERATE\n{numbers[0]}, {numbers[-1]}\n")
+            stream.write(
+                f"*ELSET, ELSET={family}_range, GENERATE\n{numbers[0]}, {numbers[-1]}, 1\n"
+            )
             stream.write(f"*NSET, NSET={family}_list\n")
             _write_list(stream, labels[::3])
             stream.write(f"*SURFACE, NAME={family}_first\n{family}, S1\n")

@@ -189,3 +189,27 @@ def test_data_of_keywords_in_other_files(tmp_path):
 
     assert corner_volume(mesh) == pytest.approx(4.0, rel=1e-12)
     assert len(mesh.node_sets["all"]) == 20
+
+
+SYSTEMS = {
+    "shift": ("1., 2., 3.\n", [[1, 2, 3], [2, 2, 3], [1, 3, 3], [1, 2, 4]]),
+    # a point of the x axis above the plane z = 0: only its direction in the plane counts
+    "turn about z": ("1., 2., 3., 1., 7., 9.\n", [[1, 2, 3], [1, 3, 3], [0, 2, 3], [1, 2, 4]]),
+    # x along z, y in the plane of z and x; the point on that plane is not square to x
+    "three points": (
+        "1., 2., 3., 1., 2., 5.\n4., 2., 9.\n",
+        [[1, 2, 3], [1, 2, 4], [2, 2, 3], [1, 3, 3]],
+    ),
+    "none": ("", [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+}
+
+
+@pytest.mark.parametrize(("text", "expected"), SYSTEMS.values(), ids=SYSTEMS.keys())
+def test_nodes_in_a_frame(tmp_path, text, expected):
+    mesh = read(
+        tmp_path / "x.inp",
+        "*SYSTEM\n9., 9., 9.\n*SYSTEM\n" + text + "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n"
+        "*SYSTEM\n" + text + "*NODE\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n1, 1, 2, 3, 4\n",
+    )
+
+    np.testing.assert_allclose(mesh.points, expected, atol=1e-15)

@@ -53,6 +53,11 @@ FAULTS = {
     "surface type": (TET + "*SURFACE, NAME=s, TYPE=CUTTING\n1\n", "got TYPE=CUTTING"),
     "generated": (TET + "*NGEN\n1, 4\n", "x.inp:8: .NGEN: got a keyword that makes nodes"),
     "cylindrical": ("*NODE, SYSTEM=C\n1,1,1,1\n", "got SYSTEM=C"),
+    "frame without plane": (
+        "*SYSTEM\n0.,0.,0.,0.,0.,1.\n*NODE\n1,1,1,1\n",
+        "x.inp:1: .SYSTEM: got points on one line",
+    ),
+    "half a frame": ("*SYSTEM\n0.,0.,0.,0.\n", "x.inp:1: .SYSTEM: got data lines of 4 numbers"),
     "instance alone": (TET + "*INSTANCE, NAME=i\n", "x.inp:8: .INSTANCE: got no parameter PART"),
     "unknown part": (
         PART + "*INSTANCE, NAME=i, PART=b\n",

@@ -14,7 +14,7 @@ from klack.mesh.mesh_model import FileMaterial
 
 __all__ = ["Deck", "read_deck"]
 
-_GENERATING = {"NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM"}
+_GENERATING = {"NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY"}
 _IGNORED = {
     "TRANSFORM",
     *("TIE", "EQUATION", "MPC", "COUPLING", "KINEMATIC", "DISTRIBUTING", "RIGID BODY"),

@@ -12,6 +12,7 @@ from klack.mesh.abaqus_names import Names
 from klack.mesh.abaqus_numbering import Numbering
 from klack.mesh.abaqus_numbers import is_integer, node_records, number
 from klack.mesh.abaqus_sets import NamedSets, read_members
+from klack.mesh.abaqus_system import NodeSystem, read_system
 
 __all__ = ["Entities", "FaceSelection", "Instance", "Scope", "Section"]
 
@@ -88,6 +89,7 @@ class Scope:
     surfaces: Names[FaceSelection] = field(default_factory=lambda: Names("surface"))
     node_surfaces: NamedSets = field(default_factory=lambda: NamedSets(Names("surface")))
     instances: dict[str, Instance] = field(default_factory=dict)
+    system: NodeSystem | None = None  # of the nodes that follow
     waiting: list[Keyword] = field(default_factory=list)  # until all sets are known
 
     def copy(self) -> "Scope":
@@ -116,6 +118,8 @@ class Scope:
             case "ELSET":
                 self._take_set(keyword, "ELSET", self.elements)
                 self.listed.append(keyword.parameter("ELSET").upper())
+            case "SYSTEM":
+                self.system = read_system(keyword)
             case "SURFACE" | "SOLID SECTION":
                 self.waiting.append(keyword)
 
@@ -169,7 +173,7 @@ class Scope:
             _defined_twice(places[0 if known else 1], "node", label)
         self.nodes.numbering.add(labels, self.nodes.count)
         self.labels.append(labels)
-        self.points.append(points)
+        self.points.append(points if self.system is None else self.system.of(points))
         if "NSET" in keyword.parameters:
             rows = np.arange(self.nodes.count, self.nodes.count + len(labels))
             self.nodes.sets.add(keyword.place, keyword.parameter("NSET"), rows)
