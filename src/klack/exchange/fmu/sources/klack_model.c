@@ -24,16 +24,14 @@ void klack_reset(klack_model *m) {
 }
 
 int klack_check(klack_model *m) {
-    int c;
+    int c, wrong = !(m->internal_step >= LEAST_STEP);
     m->message[sizeof m->message - 1] = '\0';
     for (c = 0; c < C; c++) {
         const double *law = klack_law + klack_law_first[c];
         int last = klack_law_kind[c] == KLACK_TABLE ? (int)law[0] - 1 : 0;
-        if (m->contacts[c].hint < 0 || m->contacts[c].hint > last) {
-            return failed(m, "the saved state is not one of this model");
-        }
+        wrong = wrong || m->contacts[c].hint < 0 || m->contacts[c].hint > last;
     }
-    return 0;
+    return wrong ? failed(m, "the saved state is not one of this model") : 0;
 }
 
 /* ------------------------------------------------------------- forces of a state */
@@ -106,7 +104,7 @@ static int parameter(klack_model *m, unsigned which, double value) {
     double *known = which == 1 ? &m->start_velocity : &m->start_rise;
     int i;
     if (which == 0) {
-        if (!(value > 0.0)) return failed(m, "internal_step has to be above zero");
+        if (!(value >= LEAST_STEP)) return failed(m, "internal_step has to be 1e-12 s or more");
         m->internal_step = value;
         return 0;
     }
