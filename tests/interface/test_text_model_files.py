@@ -1,6 +1,5 @@
 """Text and MATLAB files of models are read back: bare matrices, named blocks, laws, names."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from klack.exchange.modal_model import Provenance, body_model, pair_model
 from klack.exchange.modelica import modelica_text, write_modelica
 from klack.exchange.state_space import state_space
 from klack.exchange.text_model import write_text
+from klack.model_files.modal_data import read_modal_data
 from klack.model_files.state_space import read_state_space
 from klack.reduction.from_state_space import body_of_state_space
 from klack.reduction.reduced_body import StateSpace
@@ -110,12 +110,11 @@ def test_bare_matrices_are_exact_in_csv_and_columns(tmp_path):
         assert np.array_equal(np.loadtxt(paths[f"rod_{key}.txt"], ndmin=2), expected)
     residual = np.loadtxt(paths["rod_D_with_residual_compliance.txt"], ndmin=2)
     assert np.array_equal(residual, form.residual_feedthrough)
-    with paths["rod_modes.csv"].open() as file:
-        rows = list(csv.DictReader(file))
-    found = np.array([float(row["frequency_Hz"]) for row in rows])
-    assert np.array_equal(found, _rod().omega / (2 * np.pi))
-    found = np.array([float(row["displacement_top_per_sqrt_kg"]) for row in rows])
-    assert np.array_equal(found, _rod().port_shapes[:, 1])
+    modes = read_modal_data(paths["rod_modes.csv"])
+    assert np.array_equal(modes.frequency, _rod().omega / (2 * np.pi))
+    assert np.array_equal(modes.damping, _rod().damping)
+    assert modes.labels == ("bottom", "top")
+    assert np.array_equal(modes.shapes, _rod().port_shapes)
     info = paths["rod_info.txt"].read_text(encoding="utf-8")
     assert "input 2: force_top [N]" in info
     assert "output 3: velocity_bottom [m/s]" in info

@@ -28,9 +28,9 @@ def write_text(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
     ``NAME_A.csv``, ``_B``, ``_C``, ``_D`` hold bare numbers, one row per line, and ``NAME_A.txt``
     and so on the same with blanks.  ``NAME_state_space.csv`` has all four with their names in one
     file, as :func:`klack.model_files.state_space.read_state_space` reads it.  ``NAME_modes.csv``
-    has frequency, damping and shapes; ``NAME_law.csv`` (``NAME_CONTACT_law.csv`` where there are
-    several contacts) indentation and force; ``NAME_info.txt`` says what is what.  A body has a D
-    with its residual compliance as well, ``NAME_D_with_residual_compliance``.
+    has frequency, damping and shapes [1/sqrt(kg)]; ``NAME_law.csv`` (``NAME_CONTACT_law.csv`` where
+    there are several contacts) indentation and force; ``NAME_info.txt`` says what is what.  A body
+    has a D with its residual compliance as well, ``NAME_D_with_residual_compliance``.
 
     Parameters
     ----------
@@ -93,16 +93,19 @@ def _write_table(path: Path, heads: Sequence[str], rows: NDArray[np.float64]) ->
 
 
 def _modes(model: ModalModel) -> tuple[list[str], NDArray[np.float64]]:
-    """One row per mode: frequency, damping ratio, shape of each input, output and gap."""
-    heads, columns = ["frequency_Hz", "damping_ratio"], [model.frequencies, model.damping]
-    for item in model.inputs:
-        heads.append(f"{item.name}_per_sqrt_kg")
-        columns.append(np.asarray(item.shape))
-    for output in model.outputs:
-        heads.append(f"{output.name}_per_sqrt_kg")
-        columns.append(np.asarray(output.shape))
+    """One row per mode; a body has a column for each port, as klack's reader of modes wants it."""
+    heads, columns = ["frequency [Hz]", "damping"], [model.frequencies, model.damping]
+    if model.kind == "body":
+        for output in model.outputs:
+            if output.quantity == "displacement":
+                heads.append(output.name.removeprefix("displacement_"))
+                columns.append(np.asarray(output.shape))
+    else:
+        for item in model.inputs:
+            heads.append(item.name)
+            columns.append(np.asarray(item.shape))
     for contact in model.contacts:
-        heads.append(f"gap_{contact.name}_per_sqrt_kg")
+        heads.append(f"gap_{contact.name}")
         columns.append(np.asarray(contact.shape))
     return heads, np.column_stack(columns)
 
@@ -134,6 +137,7 @@ def _info(model: ModalModel, form: FirstOrder) -> Iterable[str]:
     yield ""
     yield "x' = A x + B u + xc, y = C x + D u + y0; SI units; + is along +z (opening)"
     yield f"{len(form.start)} states: modal displacements [m.kg^(1/2)], then modal velocities"
+    yield f"{model.name}_modes.csv: frequency, damping ratio, mass-normalised shapes [1/sqrt(kg)]"
     yield f"modes up to {model.frequencies.max():.6g} Hz; step of klack {model.step:.6g} s"
     yield ""
     yield from _listed("input", form.input_names, form.input_units)
