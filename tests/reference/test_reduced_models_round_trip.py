@@ -178,11 +178,11 @@ def test_another_realisation_of_python_control_is_the_same_body(tmp_path, needle
 
 
 def write_modes(path: Path, needle: ReducedBody) -> object:
-    """Three nodes at the tip, whose mean is the port, one at the top; mass-normalised in kg."""
+    """Three nodes at the tip, whose mean is the port, one at the top; modal masses of 2 kg."""
     pyuff = pytest.importorskip("pyuff")
     file = pyuff.UFF(str(path))
     for i in range(needle.mode_count):
-        tip, top = needle.port_shapes[i]
+        tip, top = np.sqrt(2.0) * needle.port_shapes[i]
         file.write_sets(
             pyuff.prepare_55(
                 model_type=1,
@@ -198,7 +198,7 @@ def write_modes(path: Path, needle: ReducedBody) -> object:
                 load_case=1,
                 mode_n=i + 1,
                 freq=float(needle.frequencies[i]),
-                modal_m=1.0,
+                modal_m=2.0,
                 modal_damp_vis=float(needle.damping[i]),
                 modal_damp_his=0.0,
                 node_nums=np.array([11, 12, 13, 20]),
