@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Literal
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import NDArray
 
 from klack.contact.laws import ContactLaw, HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.exchange.fmu.model_description import communication_step
@@ -78,8 +80,25 @@ def _page(model: ModalModel) -> str:
             for item, d in zip(model.inputs, model.residual_compliance.diagonal(), strict=True)
         ],
         step=f"{1e6 * communication_step(model):g} µs",
-        top=f"{1e-3 * model.frequencies.max():.4g} kHz",
+        top=f"{1e-3 * _top_frequency(model):.4g} kHz",
+        damping=_range(model.damping[model.omega > 0.0]),
     )
+
+
+def _top_frequency(model: ModalModel) -> float:
+    """Frequency [Hz] up to which every body has modes: the lowest of their highest ones."""
+    highest: dict[str, float] = {}
+    for name, frequency in zip(model.mode_names, model.frequencies, strict=True):
+        body = name.rpartition("_")[0]
+        highest[body] = max(highest.get(body, 0.0), float(frequency))
+    return min(highest.values(), default=0.0)
+
+
+def _range(ratios: NDArray[np.float64]) -> str:
+    if ratios.size == 0 or ratios.max() == 0.0:
+        return "none"
+    low, high = 100.0 * ratios.min(), 100.0 * ratios.max()
+    return f"{high:.3g} %" if low == high else f"{low:.3g} to {high:.3g} %"
 
 
 def _contact_words(contact: ModelContact) -> _ContactWords:
