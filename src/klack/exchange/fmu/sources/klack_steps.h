@@ -18,7 +18,7 @@
 
 /* versions of the pass for several processors, chosen when the library is loaded */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
-#define FOR_PROCESSORS __attribute__((target_clones("avx512f", "avx2", "default")))
+#define FOR_PROCESSORS __attribute__((target_clones("avx2", "default")))
 #else
 #define FOR_PROCESSORS
 #endif
