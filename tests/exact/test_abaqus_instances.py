@@ -133,6 +133,7 @@ def test_every_instance_stands_where_the_assembly_puts_it(model):
     np.testing.assert_allclose(
         sorted_points(mesh.points), sorted_points(MM * np.vstack([box, right, tip]))
     )
+    np.testing.assert_allclose(mesh.points[[0, 8, 16]], MM * np.array([box[0], right[0], tip[0]]))
     assert corner_volume(mesh) == pytest.approx((6 + 6 + 1 / 6) * MM**3, rel=1e-12)
 
 

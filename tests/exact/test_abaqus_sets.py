@@ -76,6 +76,8 @@ SURFACES = {
     "set and number": ("row, S1\n400, S4\n", 5, [1, 0, -4]),
     "set whole": ("row,\n", 18, [0, 0, 0]),
     "set in part": ("first,\n", 5, [-1, 0, 0]),
+    # all corners of the cube between belong to the set, its faces do not
+    "set with a gap": ("odd,\n", 9, [-1, 0, 0]),
     "number whole": ("400\n", 5, [1, 0, 0]),
     "twice the same": ("100, S6\nfirst, S6\n", 1, [-1, 0, 0]),
 }
@@ -83,7 +85,7 @@ SURFACES = {
 
 @pytest.mark.parametrize(("text", "count", "area"), SURFACES.values(), ids=SURFACES.keys())
 def test_surfaces(tmp_path, text, count, area):
-    sets = "*ELSET, ELSET=first\n100\n"
+    sets = "*ELSET, ELSET=first\n100\n*ELSET, ELSET=odd\n100, 300\n"
     mesh = read(tmp_path / "x.inp", ROW + sets + "*SURFACE, NAME=s\n" + text)
     surface = mesh.surface("s")
 

@@ -120,6 +120,7 @@ FAULTS = {
     ),
     "empty field": (NODES + "5, , 1, 2\n", "x.inp:6: got '', expected a finite number"),
     "two in one field": (NODES + "5, 0, 1 2, 2\n", "x.inp:6: got '1 2'"),
+    "one too few and one too many": (NODES + "5, , 1 2, 2\n", "x.inp:6: got '', expected a finite"),
     "huge label": (f"*NODE\n{10**30}, 0, 0, 0\n", "x.inp:2: got '10000"),
     "thousands": ("*NODE\n1, 1_000, 0, 0\n", "x.inp:2: got '1_000'"),
     "infinite": ("*NODE\n1, 1e999, 0, 0\n", "x.inp:2: got '1e999'"),
