@@ -5,7 +5,7 @@ Every reader hands over what its file holds, in the numbers of the file and in t
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,9 @@ from klack.mesh.quality import require_positive_jacobians
 __all__ = ["FileElements", "FileMesh", "mesh_model", "require_unit"]
 
 Ints = NDArray[np.int64]
+
+_CHUNK = 50_000
+_FARTHEST = 1e4  # [m] of a node from the origin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,6 +110,7 @@ def mesh_model(
     new = np.cumsum(used) - 1
     new[~used] = -1
     points = raw.points[nodes.order][used, :dimension] * unit_length
+    _require_near(path, points, nodes.sorted[used])
     blocks = tuple(
         _turned(points, ElementBlock(b.family, new[b.connectivity], b.solid)) for b in blocks
     )
@@ -120,7 +124,7 @@ def mesh_model(
     )
     mesh = Mesh(points=points, blocks=blocks, surfaces=surfaces, node_sets={**inner, **sets})
     _require_right_of_axis(path, mesh, nodes.sorted[used])
-    require_positive_jacobians(str(path), mesh, numbers=numbers)
+    _require_positive_jacobians(path, mesh, numbers)
     return MeshModel(
         mesh=mesh,
         node_numbers=nodes.sorted[used],
@@ -265,6 +269,18 @@ def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:
     return ElementBlock(block.family, nodes, block.solid)
 
 
+def _require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None:
+    far = np.abs(points).max(axis=1) > _FARTHEST
+    if far.any():
+        at = int(np.argmax(far))
+        raise InputError(
+            f"{path}: node {numbers[at]}",
+            got=f"a coordinate of {np.abs(points[at]).max():.3g} m",
+            expected=f"coordinates within {_FARTHEST:g} m",
+            hint="check the unit, and the columns of this node.",
+        )
+
+
 def _require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
     if mesh.dimension != 2:
         return
@@ -276,6 +292,18 @@ def _require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
             expected="r >= 0: the axis of an axisymmetric mesh is x = 0",
             hint="draw the half of the section that lies at positive x.",
         )
+
+
+def _require_positive_jacobians(path: Path, mesh: Mesh, numbers: tuple[Ints, ...]) -> None:
+    """Check the shape of some elements at a time, which bounds the memory."""
+    blocks, labels = [], []
+    for block, own in zip(mesh.blocks, numbers, strict=True):
+        for begin in range(0, len(own), _CHUNK):
+            part = slice(begin, begin + _CHUNK)
+            blocks.append(ElementBlock(block.family, block.connectivity[part], block.solid))
+            labels.append(own[part])
+    parts = replace(mesh, blocks=tuple(blocks))
+    require_positive_jacobians(str(path), parts, numbers=labels)
 
 
 def require_unit(path: Path, unit_length: float | None) -> float:

@@ -101,13 +101,7 @@ class _TextStream:
         return values
 
     def whole(self, count: int) -> Ints:
-        values = self.real(count)
-        if len(values) and (np.abs(values) > 2**53).any():
-            _refuse(self._place, "a number of more than 15 digits", "numbers of nodes and elements")
-        whole = values.astype(np.int64)
-        if not np.array_equal(whole, values):
-            _refuse(self._place, "a number with a fraction", "whole numbers")
-        return whole
+        return _whole_of(self._place, self.real(count))
 
     sizes = whole
 
@@ -144,6 +138,12 @@ class _BinaryStream:
         if not np.isfinite(values).all():
             _refuse(self._place, "what is no finite number", "finite numbers")
         return values
+
+
+def _whole_of(place: str, values: NDArray[np.float64]) -> Ints:
+    if (np.abs(values) > 2**53).any() or (values != np.rint(values)).any():
+        _refuse(place, "a number with a fraction, or a huge one", "whole numbers")
+    return values.astype(np.int64)
 
 
 def _refuse(place: str, got: str, expected: str) -> None:
@@ -262,7 +262,7 @@ class _Reader:
                 case "Nodes", True:
                     count = int(text.sizes(1)[0])
                     table = text.real(4 * count).reshape(-1, 4)
-                    self._take_nodes(place, table[:, 0].astype(np.int64), table[:, 1:])
+                    self._take_nodes(place, _whole_of(place, table[:, 0]), table[:, 1:])
                 case "Elements", True:
                     self._old_elements(place, text)
                 case _:

@@ -89,11 +89,7 @@ def read_nastran(
     raw = FileMesh(
         numbers=numbers,
         points=points,
-        solids=tuple(
-            part
-            for name, (linear, quadratic, order) in _SOLIDS.items()
-            for part in _solids(bulk, name, linear, quadratic, order, given)
-        ),
+        solids=_solids(bulk, given),
         faces=tuple(
             part for name, family in _SHELLS.items() for part in _shells(bulk, name, family, given)
         ),
@@ -197,14 +193,25 @@ def _in_basic(
     return basic
 
 
-def _solids(
+def _solids(bulk: BulkData, given: dict[int, str]) -> tuple[FileElements, ...]:
+    """Solids in the order of their property numbers."""
+    parts = [
+        part
+        for name, (linear, quadratic, order) in _SOLIDS.items()
+        for part in _solids_of(bulk, name, linear, quadratic, order, given)
+    ]
+    return tuple(part for _, part in sorted(parts, key=lambda item: item[0]))
+
+
+def _solids_of(
     bulk: BulkData,
     name: str,
     linear: str,
     quadratic: str,
     order: tuple[int, ...],
     given: dict[int, str],
-) -> list[FileElements]:
+) -> list[tuple[int, FileElements]]:
+    """Elements of one card with their property numbers."""
     corners, most = FAMILIES[linear].nodes, FAMILIES[quadratic].nodes
     parts = []
     for rows, cells in bulk.tables(name, 2 + most):
@@ -225,14 +232,13 @@ def _solids(
             for label in np.unique(table[full, 1]).tolist():
                 here = full & (table[:, 1] == label)
                 own = nodes[here]
-                parts.append(
-                    FileElements(
-                        family=family,
-                        name=_named(given, "psolid", label),
-                        numbers=table[here, 0],
-                        nodes=own[:, list(order)] if family == quadratic else own[:, :corners],
-                    )
+                part = FileElements(
+                    family=family,
+                    name=_named(given, "psolid", label),
+                    numbers=table[here, 0],
+                    nodes=own[:, list(order)] if family == quadratic else own[:, :corners],
                 )
+                parts.append((label, part))
     return parts
 
 

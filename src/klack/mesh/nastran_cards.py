@@ -227,7 +227,8 @@ class BulkData:
                 expected=f"at most {_WIDEST}",
                 hint="the file may be damaged: write it again from the preprocessor.",
             )
-        table = np.array(words, dtype=f"S{max(longest, 1)}")
+        raw = [[word.encode("latin-1") for word in fields] for fields in words]
+        table = np.array(raw, dtype=f"S{max(longest, 1)}")
         cells = table.view(np.uint8).reshape(len(words), count, -1)
         return np.where(cells == 0, np.uint8(ord(" ")), cells)
 
@@ -330,9 +331,11 @@ def _require_marks_in_order(
 def _names(cells: NDArray[np.uint8]) -> NDArray[np.bytes_]:
     """Word in the first field, in capitals."""
     small = (cells >= ord("a")) & (cells <= ord("z"))
-    cells = np.where(small, cells - 32, cells)
-    stop = np.cumsum((cells == ord(",")) | (cells == ord("\t")), axis=1) > 0
-    cells = np.where(stop, ord(" "), cells).astype(np.uint8)
+    cells = cells - np.uint8(32) * small.astype(np.uint8)
+    stop = np.zeros(len(cells), dtype=bool)
+    for column in cells.T:
+        stop |= (column == ord(",")) | (column == ord("\t"))
+        column[stop] = ord(" ")
     words = np.ascontiguousarray(cells).view("S8").ravel()
     return np.char.strip(words)
 

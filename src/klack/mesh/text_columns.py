@@ -96,12 +96,27 @@ class TextLines:
         last = max(len(self.text) - 1, 0)
         for begin in range(0, len(rows), _CHUNK):
             part = rows[begin : begin + _CHUNK]
+            even = self._evenly_spaced(part, first + count * width)
+            if even is not None:
+                out[begin : begin + _CHUNK] = even[:, first : first + count * width]
+                continue
             place = self.start[part, None] + column
             inside = place < self.end[part, None]
             out[begin : begin + _CHUNK] = np.where(
                 inside, self.text[np.minimum(place, last)], ord(" ")
             )
         return out.reshape(len(rows), count, width)
+
+    def _evenly_spaced(self, rows: NDArray[np.int64], length: int) -> Cells | None:
+        """Table of lines that follow at equal distance and are long enough; None for others."""
+        start = self.start[rows]
+        step = int(start[1] - start[0]) if len(rows) > 1 else 0
+        stop = int(start[0]) + step * len(rows) if len(rows) else 0
+        if step <= 0 or stop > len(self.text) or (np.diff(start) != step).any():
+            return None
+        if (self.end[rows] - start < length).any():
+            return None
+        return self.text[int(start[0]) : stop].reshape(len(rows), step)
 
     def whole(
         self, rows: NDArray[np.int64], width: int, count: int, what: str
@@ -160,21 +175,22 @@ def integers(cells: Cells) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     good : bool array, shape (...)
         False where a field is no whole number (of at most 18 digits).
     """
-    filled = cells != ord(" ")
-    digit = (cells - np.uint8(ord("0"))) < 10
-    sign = (cells == ord("-")) | (cells == ord("+"))
+    columns = np.ascontiguousarray(np.moveaxis(cells, -1, 0))  # short axes are slow at the end
+    filled = columns != ord(" ")
+    digit = (columns - np.uint8(ord("0"))) < 10
+    minus = columns == ord("-")
     begins = filled.copy()
-    begins[..., 1:] &= ~filled[..., :-1]
-    good = (filled == (digit | (sign & begins))).all(axis=-1)
-    good &= begins.sum(axis=-1) <= 1
-    count = digit.sum(axis=-1)
-    good &= (count <= 18) & ((count > 0) | ~filled.any(axis=-1))
+    begins[1:] &= ~filled[:-1]
+    good = (filled == (digit | ((minus | (columns == ord("+"))) & begins))).all(axis=0)
+    good &= begins.sum(axis=0, dtype=np.uint8) <= 1
+    count = digit.sum(axis=0, dtype=np.uint8)
+    good &= (count <= 18) & ((count > 0) | ~filled.any(axis=0))
     values = np.zeros(cells.shape[:-1], dtype=np.int64)
-    for column in range(cells.shape[-1]):
-        here = digit[..., column] & good
-        np.copyto(values, values * 10 + cells[..., column] - ord("0"), where=here)
-    negative = (cells == ord("-")).any(axis=-1)
-    return np.where(negative, -values, values), good
+    for column, here in zip(columns, digit, strict=True):
+        np.copyto(values, values * 10 + (column - np.uint8(ord("0"))), where=here)
+    np.negative(values, out=values, where=minus.any(axis=0))
+    values[~good] = 0
+    return values, good
 
 
 _REAL = np.zeros(256, dtype=np.uint8)  # 0: not allowed in a number
@@ -194,10 +210,10 @@ def reals(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """
     shape, width = cells.shape[:-1], cells.shape[-1]
     text = _REAL[cells.reshape(-1, width)]
-    good = (text != 0).all(axis=1)
+    good = np.ascontiguousarray(text.T != 0).all(axis=0)
     text[~good] = ord(" ")
     text = _with_exponent_letter(text)
-    text[(text == ord(" ")).all(axis=1), 0] = ord("0")
+    text[np.ascontiguousarray(text.T == ord(" ")).all(axis=0), 0] = ord("0")
     words = np.ascontiguousarray(text).view(f"S{text.shape[1]}").ravel()
     try:
         values = words.astype(np.float64)
@@ -214,7 +230,7 @@ def _with_exponent_letter(text: Cells) -> Cells:
     figure = ((text - np.uint8(ord("0"))) < 10) | (text == ord("."))
     bare = np.zeros(text.shape, dtype=bool)
     bare[:, 1:] = sign[:, 1:] & figure[:, :-1]
-    rows = np.flatnonzero(bare.any(axis=1))
+    rows = np.flatnonzero(np.ascontiguousarray(bare.T).any(axis=0))
     if not len(rows):
         return text
     wider = np.full((len(text), text.shape[1] + 1), ord(" "), dtype=np.uint8)

@@ -195,20 +195,23 @@ def _is_flag(name: str, values: Ints) -> bool:
     """True for an array of 0 and 1 that is no ghost mark of VTK."""
     if name.startswith("vtk") or not len(values):
         return False
-    return bool(values.min() >= 0 and values.max() == 1)
+    return bool(values.min() == 0 and values.max() == 1)
 
 
 def _by_value(
     parts: list[FileElements], grid: VtkGrid, array: str, label: str, single: str
 ) -> Iterator[FileElements]:
     """Cells by the value of an array; one part called ``single`` without an array."""
-    for part in parts:
-        if not array:
+    if not array:
+        for part in parts:
             yield _named(part, single, np.ones(len(part.numbers), dtype=bool))
-            continue
-        values = grid.cell_data[array][part.numbers - 1]
-        for value in np.unique(values).tolist():
-            yield _named(part, f"{label.replace(':', '_')}_{value}", values == value)
+        return
+    values = grid.cell_data[array]
+    known = [np.unique(values[part.numbers - 1]) for part in parts]
+    for value in np.unique(np.concatenate([*known, np.empty(0, dtype=np.int64)])).tolist():
+        name = f"{label.replace(':', '_')}_{value}"
+        for part in parts:
+            yield _named(part, name, values[part.numbers - 1] == value)
 
 
 def _flagged(

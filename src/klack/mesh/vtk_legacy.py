@@ -191,7 +191,14 @@ class _Reader:
             case "GLOBAL_IDS" | "PEDIGREE_IDS":
                 self._array(words, 2, count)
             case "COLOR_SCALARS":
-                self._numbers("unsigned_char" if self._binary else "float", self._count(words, 2))
+                # VTK writes bytes so; in ASCII as a fraction of 255
+                columns = self._count(words, 2)
+                if self._binary:
+                    values = self._numbers("unsigned_char", columns * count)
+                else:
+                    part = self._numbers("float", columns * count)
+                    values = np.rint(255 * np.clip(part, 0, 1)).astype(np.int64)
+                self._keep(kind, label, values, columns)
             case "LOOKUP_TABLE":
                 columns = 4 * self._count(words, 2)
                 self._numbers("unsigned_char" if self._binary else "float", columns)
