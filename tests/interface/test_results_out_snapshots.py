@@ -24,7 +24,7 @@ def test_looking_changes_nothing_and_shows_the_run():
 
     plain = impact(None)
     watched = impact(
-        Snapshots(interval=8, receive=lambda time, motion: seen.append((time, motion)))
+        Snapshots(steps=range(0, 41, 8), receive=lambda time, motion: seen.append((time, motion)))
     )
 
     np.testing.assert_array_equal(watched.history.force, plain.history.force)
@@ -39,6 +39,6 @@ def test_looking_changes_nothing_and_shows_the_run():
     np.testing.assert_array_equal(last.displacement, plain.fields[0].end_displacement)
     # every step is seen, so that mean velocities add up to the way
     every: list[MotionOfBody] = []
-    impact(Snapshots(interval=1, receive=lambda _, motion: every.append(motion[0])))
+    impact(Snapshots(steps=range(41), receive=lambda _, motion: every.append(motion[0])))
     way = STEP * np.sum([body.velocity for body in every[1:]], axis=0)
     np.testing.assert_allclose(way, last.displacement - first.displacement, rtol=0, atol=1e-18)

@@ -37,9 +37,10 @@ def test_both_bodies_are_there_at_every_instant(films: dict[str, Film]):
     for film in films.values():
         assert list(film) == ["needle", "housing"]
         times = [time for time, _ in film["needle"]]
-        assert FRAMES - 1 <= len(times) <= FRAMES
+        assert len(times) == FRAMES
         assert [time for time, _ in film["housing"]] == times
-        np.testing.assert_allclose(np.diff(times), np.diff(times)[0], rtol=1e-6)
+        # within half a step of 80 ns
+        np.testing.assert_allclose(times, np.linspace(0.0, times[-1], FRAMES), atol=41e-9)
         for _, grid in (*film["needle"], *film["housing"]):
             assert set(grid.point_data) == {"displacement", "velocity", "stress", "von_mises"}
 
@@ -53,21 +54,28 @@ def test_a_film_begins_with_free_flight(films: dict[str, Film]):
 
 @pytest.mark.parametrize("body", ["needle", "housing"])
 def test_recovered_fields_resemble_those_of_the_full_order(films: dict[str, Film], body: str):
-    """Both films have slightly different instants; compared at the highest stress.
+    """At every instant of contact with noticeable stress; the instants differ by up to 50 ns.
 
-    Displacement within 1 %, equivalent stress within 3 % of its norm, its peak within 3 %: with the
-    static rest of the modes.  Without it the peak stress is wrong by more than half.
+    Within 3 %: displacement and von Mises stress (norm over all nodes, which the contact rules) and
+    the highest stress.  Measured on 50 frames: 2.7 %, 2.5 %, 1.5 %.  With the contact area of the
+    peak force all the time the stress is wrong by half at a fifth of that force.
     """
     full, reduced = films["full"][body], films["reduced"][body]
-    k = max(range(len(full)), key=lambda i: full[i][1].point_data["von_mises"].max())
-    j = min(range(len(reduced)), key=lambda i: abs(reduced[i][0] - full[k][0]))
-    expected, found = full[k][1].point_data, reduced[j][1].point_data
-
-    for field, allowed in (("displacement", 0.01), ("von_mises", 0.03)):
-        difference = np.linalg.norm(found[field] - expected[field])
-        assert difference < allowed * np.linalg.norm(expected[field])
-    assert found["von_mises"].max() == pytest.approx(expected["von_mises"].max(), rel=0.03)
-    assert expected["von_mises"].max() > 5e8  # the contact is in the picture
+    highest = max(grid.point_data["von_mises"].max() for _, grid in full)
+    compared = 0
+    for time, grid in full:
+        expected = grid.point_data
+        if expected["von_mises"].max() < 0.4 * highest:
+            continue
+        found = min(reduced, key=lambda item: abs(item[0] - time))[1].point_data
+        for field, allowed in (("displacement", 0.03), ("von_mises", 0.03)):
+            difference = np.linalg.norm(found[field] - expected[field])
+            assert difference < allowed * np.linalg.norm(expected[field])
+        peak = expected["von_mises"].max()
+        assert found["von_mises"].max() == pytest.approx(peak, rel=0.03)
+        compared += 1
+    assert compared >= 5
+    assert highest > 5e8  # the contact is in the picture
 
 
 def test_one_frame_makes_no_film(tmp_path: Path):

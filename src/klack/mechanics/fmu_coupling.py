@@ -48,34 +48,31 @@ class FmuCoupling:
         self.slave, self.coupling_step = slave, coupling_step
         self.linear = extrapolation == "linear"
         self._ready = False  # in its initialisation
-        self._exchange: Vector = np.zeros(STATES)  # the last one
+        self._exchange = [0.0] * STATES  # the last one
         self._began_from = -1.0  # exchanges before the last one
         self._loss = 0.0
 
     def __call__(self, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
         """One step; called again with a better end it does not exchange again."""
-        t, h, start, end = inp[0], inp[1], inp[2] - inp[4], inp[3] - inp[5]
-        out[:] = 0.0
-        out[2 : 2 + STATES] = state
-        if h == 0.0:  # only the stores are asked for, and there are none
-            return 0
-        if t < 0.0:  # on the way to the static start
-            out[0] = self._at_rest(start)
-            out[1] = -out[0]
+        t, h, y0, y1, base0, base1 = inp.tolist()  # plain numbers are faster one by one
+        start, end = y0 - base0, y1 - base1
+        now = state.tolist()
+        if h == 0.0 or t < 0.0:  # the stores, of which there are none; the static start
+            force = 0.0 if h == 0.0 else self._at_rest(start)
+            out[:] = (force, -force, *now, 0.0, 0.0)
             return 0
         if h > self.coupling_step * (1.0 + _ROUND_OFF):
             raise self._too_long(h)
         loss = 0.0
-        if self._is_due(state, t):
-            if not (self._began_from == state[0] and self._exchange[1] == t):
-                self._communicate(state, t, start, (end - start) / h)
-            state, loss = self._exchange, self._loss
-        force = state[3] + state[4] * (t + 0.5 * h - state[1])
+        if self._is_due(now, t):
+            if not (self._began_from == now[0] and self._exchange[1] == t):
+                self._communicate(now, t, start, (end - start) / h)
+            now, loss = self._exchange, self._loss
+        count, time, place, at_point, slope, felt = now
+        force = at_point + slope * (t + 0.5 * h - time)
         work = force * (end - start)
-        out[0], out[1] = force, -force
-        out[2 : 2 + STATES] = (*state[:5], state[5] + work)
-        out[2 + STATES] = work + loss
-        out[3 + STATES] = loss
+        after = (count, time, place, at_point, slope, felt + work)
+        out[:] = (force, -force, *after, work + loss, loss)
         return 0
 
     def _at_rest(self, displacement: float) -> float:
@@ -84,10 +81,10 @@ class FmuCoupling:
             self._ready, self._began_from = True, -1.0
         return self.slave.force(displacement, 0.0)
 
-    def _is_due(self, state: Vector, t: float) -> bool:
-        return bool(state[0] == 0.0 or t - state[1] >= self.coupling_step * (1.0 - _ROUND_OFF))
+    def _is_due(self, state: list[float], t: float) -> bool:
+        return state[0] == 0.0 or t - state[1] >= self.coupling_step * (1.0 - _ROUND_OFF)
 
-    def _communicate(self, state: Vector, t: float, y: float, speed: float) -> None:
+    def _communicate(self, state: list[float], t: float, y: float, speed: float) -> None:
         """Lead the FMU to ``t``; sets the exchange and the energy lost since the one before."""
         if state[0] == 0.0:
             if not self._ready:
@@ -105,8 +102,8 @@ class FmuCoupling:
             slope = (force - state[3]) / step if self.linear else 0.0
             before = state[3]
             self._loss = 0.5 * (before + force) * (y - state[2]) - state[5]
-        self._began_from = float(state[0])
-        self._exchange = np.array([state[0] + 1.0, t, y, force, slope, 0.0])
+        self._began_from = state[0]
+        self._exchange = [state[0] + 1.0, t, y, force, slope, 0.0]
 
     def _uneven(self, step: float) -> bool:
         return abs(step - self.coupling_step) > _ROUND_OFF * self.coupling_step

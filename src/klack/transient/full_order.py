@@ -608,7 +608,7 @@ class _Show:
 
     def __call__(self) -> None:
         run = self.run
-        if run.steps % self.snapshots.interval == 0:
+        if run.steps in self.snapshots.steps:
             motion = tuple(
                 MotionOfBody(
                     name=body.name,

@@ -1,6 +1,6 @@
 """What a full-order impact leaves behind."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,13 +99,13 @@ class Snapshots:
 
     Parameters
     ----------
-    interval : int
-        Steps from one instant to the next; the first is the start.
+    steps : collection of int
+        Numbers of the steps after which to look; 0 is the start.
     receive : callable
         Called with the time [s] and a tuple of :class:`MotionOfBody`, body a first.
     """
 
-    interval: int
+    steps: Collection[int]
     receive: Callable[[float, tuple[MotionOfBody, ...]], None]
 
 

@@ -3,16 +3,14 @@ r"""An impact as a film for ParaView: displacement, velocity and stress of both 
 At the full level the fields are those of the run, node by node.  At the reduced level they are
 recovered from the modes,
 
-.. math:: u = \Phi q + F r, \qquad r = K^+ p - \Phi_e \Omega_e^{-2} \Phi_e^T p
+.. math:: u = \Phi q + F \left( K^+ p(F) - \Phi_e \Omega_e^{-2} \Phi_e^T p_0 \right)
 
-with the contact force ``F``, its pressure pattern ``p`` (taken at the peak force) and the rest
-``r`` of the static deflection that the kept modes miss (mode acceleration; Craig & Kurdila 2006,
-ch. 17).  Without ``r`` the stress at the contact would be missing.  The contact area is that of the
-peak force all the time, so at lower forces the picture right at the contact is too smooth; the
-velocity is that of the modes alone.
+with the contact force ``F``, the pressure pattern ``p(F)`` of the static contact at that force and
+the pattern ``p_0`` of the reduced model: the modes carry the waves, the static solution the
+contact (mode acceleration; Craig & Kurdila 2006, ch. 17).  The velocity is that of the modes alone.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
@@ -23,11 +21,14 @@ from numpy.typing import NDArray
 
 from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.exchange.results.naming import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.exchange.results.whole_file import whole_files
+from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
 from klack.simulation.impact import simulate
 from klack.transient.full_order import simulate_full_order
@@ -44,6 +45,9 @@ from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 
 __all__ = ["write_impact_series"]
+
+_LEAST = 1e-3
+"""Smallest share of the largest static force whose pressure pattern is asked for."""
 
 _Frame = tuple[float, tuple[MotionOfBody, ...]]
 
@@ -70,7 +74,7 @@ def write_impact_series(
         What stands there under the same names is replaced when everything is complete.
     level : "full" or "reduced"
     frames : int
-        Instants at most, evenly spaced over ``run.duration``.
+        Instants, evenly spaced over ``run.duration``; fewer if the run has fewer steps.
     progress : callable
     threads : int, optional
 
@@ -106,6 +110,7 @@ def write_impact_series(
         else:
             for frame in _reduced_frames(problem, frames, progress):
                 film.add(*frame)
+            problem.close()
         write_pvd(stage / f"{name}.pvd", film.files)
     return folder / f"{name}.pvd"
 
@@ -174,14 +179,15 @@ def _run_full(
         threads=threads or 2,
         progress=lambda fraction: progress("full order", fraction),
         snapshots=Snapshots(
-            interval=_stride(case.run.duration, case.run.full_step, frames), receive=film.add
+            steps=_instants(case.run.duration, case.run.full_step, frames), receive=film.add
         ),
     )
 
 
-def _stride(duration: float, step: float, frames: int) -> int:
-    """Steps from one frame to the next."""
-    return ceil(duration / step / (frames - 1) * (1.0 - 1e-9))
+def _instants(duration: float, step: float, frames: int) -> tuple[int, ...]:
+    """Steps at which the frames are, as even as whole steps allow."""
+    last = ceil(duration / step * (1.0 - 1e-9))
+    return tuple(dict.fromkeys(round(k * last / (frames - 1)) for k in range(frames)))
 
 
 # --------------------------------------------------------------------------- reduced level
@@ -189,74 +195,95 @@ def _stride(duration: float, step: float, frames: int) -> int:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Recovered:
-    """From modal coordinates and contact force to the displacement of all nodes."""
+    """From modal coordinates and contact force to the displacement of all nodes.
+
+    ``missing`` [m/N] is what the modes already hold of the static deflection, with a minus; None
+    where attachment modes or nothing at all stand for the rest.
+    """
 
     name: str
     shapes: NDArray[np.float64]
-    rest: NDArray[np.float64]
+    flexibility: Flexibility
+    missing: NDArray[np.float64] | None
 
-    def motion(self, q: NDArray[np.float64], v: NDArray[np.float64], force: float) -> MotionOfBody:
-        return MotionOfBody(
-            name=self.name,
-            displacement=self.shapes @ q + force * self.rest,
-            velocity=self.shapes @ v,
-        )
+    def motion(
+        self,
+        q: NDArray[np.float64],
+        v: NDArray[np.float64],
+        force: float,
+        load: NDArray[np.float64],
+    ) -> MotionOfBody:
+        """Fields under a contact force [N] with its load pattern, shape (n_dof,)."""
+        u = self.shapes @ q
+        if self.missing is not None and force > 0.0:
+            u = u + force * (self.flexibility.solve(load[:, None])[:, 0] + self.missing)
+        return MotionOfBody(name=self.name, displacement=u, velocity=self.shapes @ v)
+
+
+def _recovered(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    elastic: ElasticBody,
+    flexibility: Flexibility,
+    port: Port,
+    sign: float,
+) -> _Recovered:
+    case = problem.case
+    body = reduce_body(
+        elastic,
+        [port],
+        modes=selection_of(case.reduction.choice(elastic.name)),
+        correction=case.reduction.correction,
+        damping=damping_of(case.bodies[elastic.name].damping),
+        modes_pool=pools[elastic.name],
+        flexibility=flexibility,
+        recovery_nodes=np.arange(elastic.mesh.node_count),
+    )
+    shapes = np.zeros((elastic.dof_count, 0)) if body.recovery is None else body.recovery.shapes
+    missing = None
+    if body.correction == "consistent":
+        own = slice(body.rigid_count, None)
+        missing = -sign * shapes[:, own] @ (body.port_shapes[own, 0] / body.omega[own] ** 2)
+    return _Recovered(name=elastic.name, shapes=shapes, flexibility=flexibility, missing=missing)
 
 
 def _reduced_frames(problem: ContactProblem, frames: int, progress: Progress) -> Iterator[_Frame]:
     """Every instant from a run of its own: a run takes milliseconds, a record of modes memory."""
-    case = problem.case
+    case, both = problem.case, problem.pair
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)
     pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
-    flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
-    parts = []
-    for i, (elastic, flexibility, port) in enumerate(
-        zip((problem.pair.upper, problem.pair.lower), flexibilities, pair.ports, strict=True)
-    ):
-        body = reduce_body(
-            elastic,
-            [port],
-            modes=selection_of(case.reduction.choice(elastic.name)),
-            correction=case.reduction.correction,
-            damping=damping_of(case.bodies[elastic.name].damping),
-            modes_pool=pools[elastic.name],
-            flexibility=flexibility,
-            recovery_nodes=np.arange(elastic.mesh.node_count),
-        )
-        shapes = np.zeros((elastic.dof_count, 0)) if body.recovery is None else body.recovery.shapes
-        rest = np.zeros(elastic.dof_count)
-        if body.correction == "consistent":
-            own = slice(body.rigid_count, None)
-            share = body.port_shapes[own, 0] / body.omega[own] ** 2
-            rest = flexibility.solve(port.pattern[:, None])[:, 0] - shapes[:, own] @ share
-        # the force pushes the upper body up and the lower one down
-        parts.append(_Recovered(name=elastic.name, shapes=shapes, rest=rest if i == 0 else -rest))
-    problem.close()
-    system = impact_system(case, pair.upper, pair.lower, pair.law)
-    start = np.zeros(pair.upper.mode_count)
-    start[: pair.upper.rigid_count] = -case.motion.speed * pair.upper.rigid_axial
-    rest = np.zeros(pair.lower.mode_count)
-    yield (
-        0.0,
-        (parts[0].motion(0.0 * start, start, 0.0), parts[1].motion(rest, rest, 0.0)),
+    # the force pushes the upper body up and the lower one down
+    parts = (
+        _recovered(problem, pools, both.upper, problem.flexibility_upper, pair.ports[0], 1.0),
+        _recovered(problem, pools, both.lower, problem.flexibility_lower, pair.ports[1], -1.0),
     )
+    system = impact_system(case, pair.upper, pair.lower, pair.law)
+    thrown = np.zeros(pair.upper.mode_count)
+    thrown[: pair.upper.rigid_count] = -case.motion.speed * pair.upper.rigid_axial
+    still = np.zeros(pair.lower.mode_count)
+    q: tuple[NDArray[np.float64], ...] = (0.0 * thrown, still)
+    v: tuple[NDArray[np.float64], ...] = (thrown, still)
     step = case.run.reduced_step
-    stride = _stride(case.run.duration, step, frames)
-    last = ceil(case.run.duration / step * (1.0 - 1e-9)) // stride
-    for k in range(1, last + 1):
-        time = k * stride * step
-        record = simulate(
-            system, velocities={pair.upper.name: -case.motion.speed}, step=step, duration=time
+    instants = _instants(case.run.duration, step, frames)
+    force = 0.0
+    for k, steps in enumerate(instants):
+        if steps > 0:
+            record = simulate(
+                system,
+                velocities={pair.upper.name: -case.motion.speed},
+                step=step,
+                duration=steps * step,
+            )
+            q, v, force = record.final_position, record.final_velocity, float(record.force[-1, 0])
+        loads = problem.static.load_patterns(
+            float(np.clip(force, _LEAST * problem.static.max_force, problem.static.max_force))
         )
-        force = float(record.force[-1, 0])
         yield (
-            time,
+            steps * step,
             tuple(
-                part.motion(q, v, force)
-                for part, q, v in zip(
-                    parts, record.final_position, record.final_velocity, strict=True
-                )
+                part.motion(own_q, own_v, force, load)
+                for part, own_q, own_v, load in zip(parts, q, v, loads, strict=True)
             ),
         )
-        progress("reduced", k / last)
+        progress("reduced", (k + 1) / len(instants))
