@@ -7,6 +7,7 @@ import io
 import random
 import shutil
 import subprocess
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -389,6 +390,17 @@ def test_damaged_files_are_refused_in_words(tmp_path, name, data, reader):
             assert numbers.size <= 4 * max(len(content), 64)
     assert refused + read == len(contents)  # each refusal names the file
     assert refused > 15
+
+
+def test_short_lines_take_no_multiple_of_their_file(tmp_path):
+    """One number per line: the text, the numbers and the matrices, nothing per line."""
+    path = tmp_path / "m.csv"
+    path.write_text("A\n" + "1\n" * 300**2 + "B\n" + "1\n" * 300 + "C\n" + "1\n" * 300)
+    tracemalloc.start()
+    found = read_state_space(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 4 * path.stat().st_size + 3 * found.A.nbytes
 
 
 def test_damaged_universal_files_are_refused_in_words(tmp_path):

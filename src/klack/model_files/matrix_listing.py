@@ -15,8 +15,10 @@ from their numbers.  The layout of the dense file is not laid down by its maker,
 a title when it has one such letter alone, with or without the word matrix.
 """
 
+import io
 import re
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,7 +30,7 @@ from klack.errors import InputError
 __all__ = ["read_listing"]
 
 _LARGEST = 256 << 20  # bytes of text
-_LARGEST_MATRIX = 1 << 30  # bytes
+_LARGEST_MATRIX = 1 << 28  # bytes: 5800 states
 _MEMORY_PER_BYTE = 4
 _KNOWN = ("A", "B", "C", "D", "K", "M")
 _NAME = re.compile(
@@ -64,7 +66,24 @@ class _Block:
     market: bool = False
     symmetric: bool = False
     coordinate: bool = False
-    rows: list[NDArray[np.float64]] = field(default_factory=list)
+    values: "array[float]" = field(default_factory=lambda: array("d"))
+    first: int = 0
+    rows: int = 0
+    widths: set[int] = field(default_factory=set)
+
+    def add(self, numbers: Sequence[float]) -> None:
+        """Take one line of numbers."""
+        if self.rows == 0:
+            self.first = len(numbers)
+        else:
+            self.widths.add(len(numbers))
+        self.values.extend(numbers)
+        self.rows += 1
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """All numbers, line by line."""
+        return np.frombuffer(self.values, dtype=np.float64)
 
 
 def read_listing(path: Path) -> tuple[Arrays, Texts]:
@@ -92,25 +111,27 @@ def read_listing(path: Path) -> tuple[Arrays, Texts]:
     data = path.read_bytes()
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _refused(path, 0, "a binary file", "text")
-    text = _decoded(data)
-    if re.search(r"^\s*(MODELDEF|SML)\b", text[:4000], re.IGNORECASE | re.MULTILINE):
+    if re.search(rb"^\s*(MODELDEF|SML)\b", data[:4000], re.IGNORECASE | re.MULTILINE):
         raise InputError(
             str(path),
             got="a model in the SML language",
             expected="dense numbers or Matrix Market form",
             hint="write it with the file format 0 or 1 of SPMWRITE.",
         )
-    blocks, texts = _blocks(path, text)
+    # line by line: a list of short lines would take many times the size of the file
+    with io.TextIOWrapper(io.BytesIO(data), encoding=_encoding(data), newline=None) as text:
+        blocks, texts = _blocks(path, text)
     return _finished(path, blocks, size), texts
 
 
-def _decoded(data: bytes) -> str:
-    for encoding in ("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig",):
-        try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
-            break
-    return data.decode("latin-1")
+def _encoding(data: bytes) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
 
 
 def _refused(path: Path, line: int, got: str, expected: str) -> InputError:
@@ -122,14 +143,19 @@ def _refused(path: Path, line: int, got: str, expected: str) -> InputError:
     )
 
 
-def _blocks(path: Path, text: str) -> tuple[list[_Block], Texts]:
+def _blocks(path: Path, text: Iterable[str]) -> tuple[list[_Block], Texts]:
     blocks: list[_Block] = []
     texts: Texts = {}
     open_block: _Block | None = None
     pending = ""  # name of a matrix that a comment gave before a Matrix Market block
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text, 1):
         plain = line.strip()
-        if not plain:
+        values = _numbers(plain)
+        if values is not None:
+            if values and open_block is None:
+                raise _refused(path, number, "numbers before any name", "the name of a matrix")
+            if values and open_block is not None:
+                open_block.add(values)
             continue
         if plain.lower().startswith(_MARKET):
             name = pending or (open_block.name if open_block and not open_block.rows else "")
@@ -155,21 +181,16 @@ def _blocks(path: Path, text: str) -> tuple[list[_Block], Texts]:
             kind = labels["kind"].lower().rstrip("s") + "s"
             texts[kind] = tuple(word for word in words if word)
             continue
-        values = _numbers(plain)
-        if values is None:
-            if plain[0] in "!*#%/\"'" or open_block is None:
-                continue  # a comment, or a title
-            raise _refused(path, number, f"'{plain[:40]}'", f"numbers of matrix {open_block.name}")
-        if open_block is None:
-            raise _refused(path, number, "numbers before any name", "the name of a matrix")
-        open_block.rows.append(values)
+        if plain[0] in "!*#%/\"'" or open_block is None:
+            continue  # a comment, or a title
+        raise _refused(path, number, f"'{plain[:40]}'", f"numbers of matrix {open_block.name}")
     return blocks, texts
 
 
 def _title(line: str) -> tuple[str, tuple[int, ...]] | None:
     """Name and sizes of the matrix that a line announces."""
     named = _NAME.match(line)
-    if named and _numbers(_SPLIT.split(line)[0]) is None:
+    if named:
         sizes = re.findall(r"\d+", named["sizes"])[:2]
         return named["name"].upper(), tuple(int(n) for n in sizes)
     letters = _LETTER.findall(line)
@@ -179,15 +200,15 @@ def _title(line: str) -> tuple[str, tuple[int, ...]] | None:
     return None
 
 
-def _numbers(line: str) -> NDArray[np.float64] | None:
+def _numbers(line: str) -> list[float] | None:
     words = [word for word in _SPLIT.split(line.strip().strip("[]();,")) if word]
     try:
-        return np.array([float(word) for word in words], dtype=np.float64)
+        return [float(word) for word in words]
     except ValueError:
         pass
     try:
         plain = [_NO_LETTER.sub("e", _FORTRAN.sub("e", word.strip("[]()\"'"))) for word in words]
-        return np.array([float(word) for word in plain if word], dtype=np.float64)
+        return [float(word) for word in plain if word]
     except ValueError:
         return None
 
@@ -227,7 +248,8 @@ def _finished(path: Path, blocks: Sequence[_Block], size: int) -> Arrays:
 
 
 def _from_market(path: Path, block: _Block, size: int) -> NDArray[np.float64]:
-    head = block.rows[0]
+    numbers = block.numbers
+    head, numbers = numbers[: block.first], numbers[block.first :]
     expected = 3 if block.coordinate else 2
     whole = np.all(np.isfinite(head)) and np.all(head == np.round(head)) and np.all(head >= 0)
     if len(head) != expected or not whole:
@@ -239,7 +261,7 @@ def _from_market(path: Path, block: _Block, size: int) -> NDArray[np.float64]:
         raise _refused(path, block.line + 1, f"{rows} x {columns} numbers", "a reduced matrix")
     matrix = np.zeros((rows, columns))
     if not block.coordinate:
-        values = np.concatenate([np.empty(0), *block.rows[1:]])
+        values = numbers
         where = np.tril_indices(rows) if block.symmetric and rows == columns else None
         if where is not None and len(values) == len(where[0]):
             order = np.lexsort((where[0], where[1]))
@@ -250,12 +272,10 @@ def _from_market(path: Path, block: _Block, size: int) -> NDArray[np.float64]:
                 path, block.line, f"{len(values)} numbers of {block.name}", f"{rows * columns}"
             )
         return values.reshape((rows, columns), order="F")
-    entries = [row for row in block.rows[1:] if len(row) == 3]
-    if len(entries) != len(block.rows) - 1 or len(entries) != int(head[2]):
-        raise _refused(
-            path, block.line, f"{len(block.rows) - 1} entries of {block.name}", f"{int(head[2])}"
-        )
-    table = np.array(entries).reshape(-1, 3)
+    count = block.rows - 1
+    if not block.widths <= {3} or count != int(head[2]):
+        raise _refused(path, block.line, f"{count} entries of {block.name}", f"{int(head[2])}")
+    table = numbers.reshape(-1, 3)
     index = table[:, :2]
     inside = (index >= 1) & (index <= [rows, columns]) & (index == np.round(index))
     if not np.all(inside):
@@ -269,7 +289,7 @@ def _from_market(path: Path, block: _Block, size: int) -> NDArray[np.float64]:
 
 
 def _dense(path: Path, block: _Block, known: Arrays) -> NDArray[np.float64]:
-    values = np.concatenate(block.rows)
+    values = block.numbers.copy()
     shape = block.sizes if len(block.sizes) == 2 else _shape(block, len(values), known)
     if shape is None or shape[0] * shape[1] != len(values):
         expected = f"{shape[0]} x {shape[1]}" if shape else "whole rows of equal length"
@@ -289,5 +309,5 @@ def _shape(block: _Block, count: int, known: Arrays) -> tuple[int, int] | None:
         return (count // n, n) if count % n == 0 else None
     if block.name == "D" and "B" in known and "C" in known:
         return len(known["C"]), known["B"].shape[1]
-    widths = {len(row) for row in block.rows}
-    return (len(block.rows), widths.pop()) if len(widths) == 1 else None
+    widths = {block.first, *block.widths}
+    return (block.rows, block.first) if len(widths) == 1 else None
