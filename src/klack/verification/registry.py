@@ -28,6 +28,7 @@ GROUPS = (
     "magnetics",
     "drivers",
     "network",
+    "exchange",
 )
 """Module names in this package; each has ``checks() -> list[Check]``."""
 
