@@ -9,7 +9,7 @@ beside the time.
 
 import argparse
 import json
-import resource
+import re
 import subprocess
 import sys
 import tempfile
@@ -93,7 +93,9 @@ def mesh_bytes(mesh: Mesh) -> int:
 
 
 def _peak_bytes() -> int:
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    """Largest memory of this process so far (Linux); getrusage counts its parent's as well."""
+    (line,) = re.findall(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
+    return 1024 * int(line)
 
 
 def _read(path: Path) -> None:
