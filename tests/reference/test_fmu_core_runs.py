@@ -98,6 +98,10 @@ class Unit:
         self.references = {v.name: i for i, v in enumerate(fmu_variables(model))}
         self.fmu = FMU2Slave(guid="guid", unzipDirectory=folder, modelIdentifier=model.name)
         self.fmu.instantiate()
+        self.restart(**start)
+
+    def restart(self, **start):
+        self.fmu.reset()
         self.fmu.setupExperiment()
         self.set(**start)
         self.fmu.enterInitializationMode()
@@ -166,17 +170,17 @@ def test_co_simulation_repeats_the_impact_kernel(name, tmp_path):
     assert differ(own[:, 3], system.contacts[0].gap + y) < ROUND_OFF
 
 
-@pytest.mark.parametrize("per_step", [1, 3, 100, 3000])
-def test_communication_step_changes_nothing(per_step, tmp_path):
+def test_communication_step_changes_nothing(tmp_path):
     """Without forces from outside every division of the time gives the same motion."""
     system, total = on_seat(needle(), TABLE, series=1e-9), 3000
     native = simulate(system, velocities={"needle": -0.4}, step=STEP, duration=total * STEP)
     unit = Unit(model_of(system, speed=-0.4), tmp_path)
 
-    own = unit.run(total // per_step, per_step * STEP, "peak_contact_force", "velocity")
-
-    assert own[:, 0].max() == pytest.approx(native.peak_force.max(), rel=ROUND_OFF)
-    assert own[-1, 1] == pytest.approx(native.velocity[-1, 0], rel=ROUND_OFF)
+    for per_step in (1, 3, 100, 3000):
+        unit.restart()
+        own = unit.run(total // per_step, per_step * STEP, "peak_contact_force", "velocity")
+        assert own[:, 0].max() == pytest.approx(native.peak_force.max(), rel=ROUND_OFF)
+        assert own[-1, 1] == pytest.approx(native.velocity[-1, 0], rel=ROUND_OFF)
 
 
 def between_two(law, gaps, series=(0.0, 0.0), **more):
