@@ -205,12 +205,14 @@ class _Block:
         """Lines in front of the end mark -1, which may also be in the command behind."""
         first = self._lines.cells(rows, 0, width)[:, 0]
         text = np.char.strip(np.ascontiguousarray(first).view(f"S{width}").ravel())
-        marks = np.flatnonzero((text == b"-1") | (text == b""))
+        marks = np.flatnonzero(text == b"-1")
         if len(marks):
             return rows[: marks[0]]
         end = int(rows[-1]) + 1 if len(rows) else self._row + 2
         if end >= len(self._lines):
             self._cut_off(end, "the end of the file", "the end mark -1 of the block")
+        filled = np.flatnonzero(text != b"")
+        rows = rows[: filled[-1] + 1] if len(filled) else rows[:0]
         return rows
 
     def _cut_off(self, row: int, got: str, expected: str) -> None:

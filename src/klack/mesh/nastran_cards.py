@@ -404,7 +404,7 @@ def _with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], ...]]
             add(data[done : match.start()], file.name, number + 1)
             number += data.count(b"\n", done, match.start())
             place = f"{file.name}:{number + 1}"
-            name = match[1].decode("utf-8", "replace").strip()
+            name = match[1].decode("utf-8", "replace").strip().replace("\\", "/")
             included = _below(place, folder, name, len(above), seen)
             seen.add(included)
             read(included, (*above, file))
