@@ -219,6 +219,19 @@ def test_netcdf_is_read_by_the_library_of_unidata(table: ResultTable, tmp_path: 
                 np.testing.assert_equal(float(np.ma.getdata(read[scalar.name][...])), scalar.value)
 
 
+def test_netcdf_takes_long_texts_and_none(tables: dict[str, ResultTable], tmp_path: Path):
+    netcdf = pytest.importorskip("netCDF4")
+    table = tables["stroke"]
+    about = {**table.about, "title": "", "warnings": "µ" * 100_000}
+    odd = replace(table, about=about, case_text="ä: 1\n" * 50_000, runs=(
+        replace(table.runs[0], label="", solver=""),
+    ))  # fmt: skip
+
+    with netcdf.Dataset(write_netcdf(odd, tmp_path / "result.nc")) as file:
+        assert str(file["case_text"][...]) == odd.case_text
+        assert set(file.warnings) == {"µ"}
+
+
 def test_netcdf_dump_shows_units(tables: dict[str, ResultTable], tmp_path: Path):
     """``ncdump`` is the reader in C; it is not everywhere."""
     if shutil.which("ncdump") is None:

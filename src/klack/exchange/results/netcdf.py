@@ -19,6 +19,9 @@ __all__ = ["write_netcdf"]
 _PLACES = {"title": "title", "description": "comment", "created": "date_created"}
 """Lines of the table that have a name of their own in the conventions."""
 
+_LONGEST = 15_000
+"""Characters of an attribute: HDF5 holds 64 KiB, and a character takes up to four bytes."""
+
 
 def write_netcdf(table: ResultTable, path: Path) -> Path:
     """Write a file that netCDF4, xarray, MATLAB, ParaView and ``ncdump`` open.
@@ -54,7 +57,7 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
         file.attrs["kind"] = table.kind
         lines = {key: text for key, text in table.about.items() if text}
         for name, text in zip(identifiers(list(lines)), lines.items(), strict=True):
-            file.attrs[_PLACES.get(text[0], name)] = text[1]
+            file.attrs[_PLACES.get(text[0], name)] = text[1][:_LONGEST]
         _text(file, "case_text", table.case_text, "case file as it was read")
         names = identifiers([run.name for run in table.runs], ["case_text"])
         for name, run in zip(names, table.runs, strict=True):
@@ -101,7 +104,7 @@ def _variable(group: Any, name: str, dimensions: tuple[str, ...], values: Any) -
 def _text(file: Any, name: str, text: str, meaning: str) -> None:
     import h5py
 
-    # an attribute may hold 64 KiB, a case file with a profile may be longer
+    # no attribute: a case file with a profile may be long
     variable = file.create_variable(name, (), dtype=h5py.string_dtype("utf-8"))
     variable[...] = text
     variable.attrs["long_name"] = meaning
