@@ -225,9 +225,10 @@ def test_two_dry_contacts_repeat_the_impact_kernel(series, tmp_path):
         (TABLE, 0.0, FILM),
         (TABLE, 2e-9, FILM),
         (LinearLaw(1e9), 1e-9, FilmRow(cubic=4e-18, linear=0.0, cut_off=0.6e-6, suction=0.2)),
+        (LinearLaw(1e9), 1e-12, FILM),
         (None, 1e-9, FILM),
     ],
-    ids=["parallel", "in series", "thin film", "film alone"],
+    ids=["parallel", "in series", "thin film", "stiff series", "film alone"],
 )
 def test_film_repeats_the_interface_step(law, series, film, tmp_path):
     upper, lower, steps = needle(), held("seat"), 6000
