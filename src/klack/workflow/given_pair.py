@@ -1,5 +1,6 @@
 """Two bodies that meet at one port each: reduced models, nodes with matrices, meshes."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from klack.case.schema import Case, HertzLocalLaw, LinearLocalLaw
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.reduction.ports import Port, node_set_port, surface_port
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -130,6 +131,7 @@ def _side(case: Case, surface: SurfaceName, threads: int | None) -> tuple[Reduce
     given = case.bodies[surface.body]
     if given.reduced is not None:
         reduced = reduced_from_file(case, surface.body)
+        _note_missing(given, reduced)
         return reduced, _summary(given, reduced, surface.surface)
     body, port = _elastic(case, surface)
     flexibility = Flexibility(body, threads=threads)
@@ -160,6 +162,19 @@ def _elastic(case: Case, surface: SurfaceName) -> tuple[ElasticBody, Port]:
     mesh = mesh_body(given, surface.body, ())
     body = assemble_body(case, surface.body, mesh)
     return body, surface_port(mesh, surface.surface, "z", name=surface.surface)
+
+
+def _note_missing(given: CaseBody, reduced: ReducedBody) -> None:
+    """Say that nothing stands for the modes left out; boundary coordinates need no such thing."""
+    kind = given.reduced.kind if given.reduced is not None else ""
+    if kind in ("state-space", "modal") and reduced.correction == "none":
+        warnings.warn(
+            f"the model of '{reduced.name}' has no compliance beside its modes: what they miss has "
+            "to be in the local law, or the contact is too stiff. Try: export D, or the responses "
+            "(dataset 58) of the port.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
 
 
 _KINDS = {
