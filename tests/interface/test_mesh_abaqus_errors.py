@@ -183,3 +183,20 @@ def test_size_of_all_files_is_limited(tmp_path, monkeypatch):
 
     with pytest.raises(InputError, match="with all includes"):
         read_abaqus(tmp_path / "x.inp", 1.0)
+
+
+def test_members_of_all_sets_are_limited(tmp_path, monkeypatch):
+    monkeypatch.setattr("klack.mesh.abaqus_sets.LARGEST_MEMBERS", 5)
+    (tmp_path / "x.inp").write_text(TET + "*NSET, NSET=a\n1, 2\n*NSET, NSET=b, ELSET=body\n")
+
+    with pytest.raises(InputError, match=r"x.inp:10: got sets of 6 members"):
+        read_abaqus(tmp_path / "x.inp", 1.0)
+
+
+def test_nodes_of_all_instances_are_limited(tmp_path, monkeypatch):
+    monkeypatch.setattr("klack.mesh.abaqus_instances.LARGEST_NODES", 7)
+    again = INSTANCE.replace("NAME=i", "NAME=j")
+    (tmp_path / "x.inp").write_text(PART + INSTANCE + again)
+
+    with pytest.raises(InputError, match=r"x.inp:12: .INSTANCE: got 8 nodes with this"):
+        read_abaqus(tmp_path / "x.inp", 1.0)

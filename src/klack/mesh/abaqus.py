@@ -1,6 +1,6 @@
 """Meshes from Abaqus and CalculiX input files (.inp).
 
-Read are nodes, solid and axisymmetric elements, node and element sets, surfaces, and, as extra
+Read are nodes, solid and axisymmetric elements, sets, surfaces, instances of parts, and, as extra
 information, elastic materials and sections.  Steps, loads and constraints are passed over.  A set
 of surface elements (membranes, shells, plane elements: what gmsh and most preprocessors write for
 a named surface) becomes a surface, provided that every one of them lies on a solid element.
@@ -47,13 +47,20 @@ def read_abaqus(
     Mesh
         Of dimension 3 (C3D elements), or 2 (CAX elements: x is r, y is z).  The solids are called
         after the element sets of *SOLID SECTION; without sections after the sets of *ELEMENT, or
-        after the *ELSET that is made of whole such sets (a physical group of gmsh).
+        after the *ELSET that is made of whole such sets (a physical group of gmsh).  Where there
+        are several instances of parts, sets and surfaces are called ``instance.set``, and ``set``
+        too if that is unique; solids have the shorter name.
 
     Raises
     ------
     InputError
         With file and line, if the file is cut off, uses what is not supported, or names nodes,
         elements or sets that it does not define.
+
+    Warns
+    -----
+    AccuracyWarning
+        Once, if constraints between nodes (*TIE, *EQUATION, ...) or *TRANSFORM are passed over.
     """
     return read_abaqus_model(path, unit_length, solids=solids).mesh
 
@@ -61,7 +68,11 @@ def read_abaqus(
 def read_abaqus_model(
     path: str | Path, unit_length: float, *, solids: Sequence[str] | None = None
 ) -> MeshModel:
-    """Read mesh, materials and sections; see :func:`read_abaqus`."""
+    """Read mesh, materials and sections; see :func:`read_abaqus`.
+
+    Numbers of nodes and elements are those of the file.  Where instances repeat them, they are
+    counted on through the file from 1.
+    """
     require_positive("read_abaqus: unit_length", unit_length, "m")
     path = Path(path)
     return _build(path, read_deck(path), unit_length, solids)
