@@ -79,6 +79,7 @@ class Op4Strings:
     data: NDArray[np.uint8]
     order: str = "<"
     word: int = 4
+    columns: list[tuple[str, int, int, int, int]] = field(default_factory=list)
     column: list[int] = field(default_factory=list)
     row: list[int] = field(default_factory=list)
     first: list[int] = field(default_factory=list)
@@ -90,20 +91,23 @@ class Op4Strings:
         return 8 if self.header.double else self.word
 
     def add_column(self, where: str, column: int, row: int, first: int, words: int) -> None:
-        """Take a column of ``words`` words from byte ``first``; ``row`` is 0 for strings."""
+        """Remember a column of ``words`` words from byte ``first``; ``row`` is 0 for strings."""
+        self.columns.append((where, column, row, first, words))
+
+    def _cut_into_strings(self, where: str, column: int, row: int, first: int, words: int) -> None:
         per_value = self.item // self.word
         if row > 0:
             self._add(where, column, row, first, words, per_value)
             return
         end = first + words * self.word
-        heads = self.data[first:end].view(f"{self.order}i{self.word}")
+        heads = self.data[first:end].view(f"{self.order}i{self.word}").tolist()
         at = 0
         while at < words:
             if self.header.big:
-                length, row = int(heads[at]) - 1, int(heads[at + 1]) if at + 1 < words else 0
+                length, row = heads[at] - 1, heads[at + 1] if at + 1 < words else 0
                 at += 2
             else:
-                packed = int(heads[at])
+                packed = heads[at]
                 length = (packed >> 16) - 1
                 row = packed - ((length + 1) << 16)
                 at += 1
@@ -125,6 +129,9 @@ class Op4Strings:
         self, where: str
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Row, column (from zero) and value of all non-zeros."""
+        for record in self.columns:
+            self._cut_into_strings(*record)
+        self.columns.clear()
         count = np.array(self.count, dtype=np.int64)
         within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         row = np.repeat(np.array(self.row, dtype=np.int64) - 1, count) + within
@@ -135,11 +142,11 @@ class Op4Strings:
 
     def _values(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
         kind = np.dtype(f"{self.order}f{self.item}")
-        parts = [
-            self.data[first : first + n * self.item].view(kind)
-            for first, n in zip(self.first, count.tolist(), strict=True)
-        ]
-        return np.concatenate(parts).astype(np.float64) if parts else np.empty(0)
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        # records do not start at multiples of the size of a number, but at those of a word
+        start = np.repeat(np.array(self.first, dtype=np.int64), count) + self.item * within
+        words = np.lib.stride_tricks.sliding_window_view(self.data, self.item)
+        return np.ascontiguousarray(words[start]).view(kind)[:, 0].astype(np.float64)
 
 
 def _damaged(where: str) -> InputError:

@@ -38,14 +38,15 @@ def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemM
     InputError
         For complex or rectangular matrices, and for lines that cannot be understood.
     """
-    found = _read(path)
-    chosen = choose_matrix(str(path), found, name, role)
+    data = path.read_bytes()
+    chosen = choose_matrix(str(path), _names(data), name, role)
+    found = _read(path, data, chosen)
     where = f"{path}: {chosen}"
     words = found[chosen].words
     values = numbers_in(b" ".join(words))
     if values is None or len(values) != len(words):
         # 1.25+3 stands for 1.25E+3
-        values = numbers_in(b" ".join(_with_letter(word) for word in words))
+        values = numbers_in(b" ".join(_with_letter(word.strip()) for word in words))
     if values is None or len(values) != len(words) or not words:
         hint = "the file is damaged or cut off; write it again."
         raise InputError(where, got="entries that are no numbers", expected="numbers", hint=hint)
@@ -58,12 +59,35 @@ def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemM
     return SystemMatrix(path=path, name=chosen, matrix=matrix, rows=rows, notes=notes)
 
 
-def _read(path: Path) -> dict[str, _Punched]:
+def _names(data: bytes) -> list[str]:
+    """Names of the matrices, from their headings."""
+    result = []
+    at = -1
+    while (at := data.find(b"DMIG", at + 1)) >= 0:
+        if at and data[at - 1 : at] not in (b"\n", b"\r"):
+            continue
+        end = data.find(b"\n", at)
+        words = [word.strip() for word in _fields(data[at : end if end >= 0 else len(data)])[1:3]]
+        if len(words) == 2 and words[1] == b"0":
+            result.append(words[0].decode("ascii", "replace"))
+    return result
+
+
+def _read(path: Path, data: bytes, chosen: str) -> dict[str, _Punched]:
+    """Entries of the chosen matrix; those of the others are gone past."""
     found: dict[str, _Punched] = {}
     open_matrix: _Punched | None = None
     column: tuple[bytes, bytes] | None = None
     fields: list[bytes]
-    for number, line in enumerate(path.read_bytes().splitlines(), start=1):
+    wanted = False
+    for number, line in enumerate(data.splitlines(), start=1):
+        if open_matrix is not None and column is not None and line[:8] == b"*       ":
+            if not wanted:
+                continue
+            if len(line) > 40 and not line[56:72].strip() and b"," not in line:
+                # anything else than three numbers changes their count
+                open_matrix.words += (line[8:24], line[24:40], *column, line[40:56])
+                continue
         if line[:1] in (b"*", b"+", b" ") and open_matrix is not None and column is not None:
             fields = _fields(line)[1:]
             _append(f"{path}:{number}", open_matrix, column, fields)
@@ -77,10 +101,12 @@ def _read(path: Path) -> dict[str, _Punched]:
         if len(words) > 1 and words[1] == b"0":
             _check(f"{path}:{number}", name, name in found, words)
             open_matrix, column = found.setdefault(name, _Punched(int(words[2]))), None
+            wanted = name == chosen
             continue
         if name not in found or len(words) < 3:
             raise _wrong(f"{path}:{number}", line)
         open_matrix, column = found[name], (words[1], words[2] or b"0")
+        wanted = name == chosen
         _append(f"{path}:{number}", open_matrix, column, fields[5:])
     return found
 
