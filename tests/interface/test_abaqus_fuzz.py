@@ -102,7 +102,7 @@ def test_damaged_files(
     tmp_path: Path, raw: bytes, damage: Callable[[bytes, Generator], bytes]
 ) -> None:
     random = np.random.default_rng(len(raw))
-    for _ in range(40):
+    for _ in range(25):
         (tmp_path / "x.inp").write_bytes(damage(raw, random))
         read(tmp_path / "x.inp")
 
