@@ -241,6 +241,21 @@ def test_what_cannot_be_done_is_refused_with_a_reason(units, action, words):
     fmu.doStep(0.0, H)  # and nothing is broken
 
 
+def test_after_a_motion_without_end_only_a_reset_helps(units):
+    unit = units["dry"]
+    fmu = unit.started(force=1e308)
+    for words in ("not finite", "at this stage"):
+        with pytest.raises(Exception, match="fmi2DoStep"):
+            fmu.doStep(0.0, 1e-3)
+        assert words in unit.said[-1]
+    fmu.reset()
+    fmu.setupExperiment()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, H)
+    assert np.all(np.isfinite(unit.get(fmu, *NAMES)))
+
+
 def test_wrong_guid_and_missing_model_exchange(units):
     unit = units["film in series"]
     with pytest.raises(Exception, match="nstantiate"):

@@ -366,10 +366,12 @@ VECTOR(fmi2GetNominalsOfContinuousStates, x_nominal, klack_state_count, klack_ge
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
+    int failure;
     NEED(STEPPING, "fmi2DoStep");
     (void)noSetFMUStatePriorToCurrentPoint;
-    return of_model(c, "fmi2DoStep",
-                    klack_do_step(c->model, currentCommunicationPoint, communicationStepSize));
+    failure = klack_do_step(c->model, currentCommunicationPoint, communicationStepSize);
+    if (failure > 1) c->at.now = BROKEN;
+    return of_model(c, "fmi2DoStep", failure);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component instance) {

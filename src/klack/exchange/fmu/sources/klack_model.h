@@ -69,7 +69,8 @@ int klack_complete_step(klack_model *m);                 /* an accepted step of 
 
 /* co-simulation: inputs are held over the step; exact propagation of all modes, contact forces
    by discrete gradients, in equal internal steps no longer than internal_step; time is where the
-   last step ended, and a step of 0 changes nothing                                           */
+   last step ended, and a step of 0 changes nothing.  Returns 1 for a step that cannot be asked
+   for, and 2 when the motion is lost: only klack_reset helps then                            */
 int klack_do_step(klack_model *m, double time, double step);
 
 /* derivative of the output or rate unknown with respect to the state or input known */

@@ -281,7 +281,8 @@ int klack_do_step(klack_model *m, double time, double step) {
         pending = 0;
         if (near) {
             if (settle(m, free, f, F)) {
-                return failed(m, "the contact forces do not settle; try a smaller internal_step");
+                failed(m, "the contact forces do not settle; try a smaller internal_step");
+                return 2;
             }
         } else {
             for (c = 0; c < C; c++) f[c].contact = f[c].film = f[c].e = F[c] = 0.0;
@@ -298,7 +299,10 @@ int klack_do_step(klack_model *m, double time, double step) {
     m->time = time + step;
     m->held = 1;
     for (c = 0; c < M; c++) {
-        if (!(fabs(m->v[c]) <= 1.7e308)) return failed(m, "the motion is not finite");
+        if (!(fabs(m->v[c]) <= 1.7e308)) {
+            failed(m, "the motion is not finite");
+            return 2;
+        }
     }
     return 0;
 }
