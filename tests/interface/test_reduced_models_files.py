@@ -228,6 +228,23 @@ def test_matrices_of_craig_and_bampton(tmp_path):
     np.testing.assert_array_equal(read_reduced_matrices(tmp_path / "cb.csv").M, M)
 
 
+def test_superelement_of_nastran(tmp_path):
+    """KAA and MAA by columns in OUTPUT4 text, as the format's manual lays it down."""
+    K = np.array([[2e6, -1e6, 0.0], [-1e6, 2e6, -5e5], [0.0, -5e5, 3e6]])
+    M = np.diag([1e-3, 2e-3, 1.0])
+    text = ""
+    for name, matrix in (("KAA", K), ("MAA", M)):
+        text += f"{3:8d}{3:8d}{6:8d}{2:8d}{name:8s}1P,3E23.16\n"
+        for j in range(3):
+            numbers = "".join(f"{value:23.16E}" for value in matrix[:, j])
+            text += f"{j + 1:8d}{1:8d}{3:8d}\n{numbers}\n"
+        text += f"{4:8d}{1:8d}{1:8d}\n{1.0:23.16E}\n"
+    (tmp_path / "super.op4").write_text(text)
+    found = read_reduced_matrices(tmp_path / "super.op4")
+    np.testing.assert_array_equal(found.K, K)
+    np.testing.assert_array_equal(found.M, M)
+
+
 # --------------------------------------------------------------------------- modal data
 
 

@@ -7,9 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.model_files.matrices import read_matrix
 from klack.model_files.named_arrays import read_named_arrays
 
 __all__ = ["FileReducedMatrices", "read_reduced_matrices"]
+
+_NASTRAN = ".op4"
+_MOST_ROWS = 5000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,13 +41,15 @@ def read_reduced_matrices(path: Path) -> FileReducedMatrices:
     Parameters
     ----------
     path : Path
-        ``.mat``, ``.npz`` or text with the blocks K and M.
+        ``.mat``, ``.npz``, text with the blocks K and M, or Nastran ``.op4``.
 
     Raises
     ------
     InputError
         If one is missing, or they are not square, of one size and finite.
     """
+    if path.suffix.lower() == _NASTRAN:
+        return _of_nastran(path)
     held = read_named_arrays(path)
     stiffness = ("K", "Kr", "KAA", "Kcb", "K_red", "stiffness")
     mass = ("M", "Mr", "MAA", "Mcb", "M_red", "mass")
@@ -61,3 +67,17 @@ def read_reduced_matrices(path: Path) -> FileReducedMatrices:
         )
     names = held.find_text("names", "dofs", "labels", "input_names", group=group)
     return FileReducedMatrices(path=path, K=K, M=M, names=names if len(names) == len(K) else ())
+
+
+def _of_nastran(path: Path) -> FileReducedMatrices:
+    """KAA and MAA of a superelement; such files number their rows and do not name them."""
+    K, M = (read_matrix(path, role=role) for role in ("stiffness", "mass"))
+    rows = K.matrix.shape[0]
+    if rows > _MOST_ROWS or M.matrix.shape != K.matrix.shape:
+        raise InputError(
+            str(path),
+            got=f"{rows} rows of stiffness and {M.matrix.shape[0]} of mass",
+            expected=f"as many of both, {_MOST_ROWS} at most",
+            hint="full matrices go into 'matrices'; this is for reduced ones.",
+        )
+    return FileReducedMatrices(path=path, K=K.matrix.toarray(), M=M.matrix.toarray())
