@@ -195,6 +195,7 @@ def _checked_mass(where: str, axial: Floats, rank: int, mass: float | None) -> f
             f"{where}: mass",
             got=f"{found:.6g} kg from the rigid motion of the model",
             expected=f"{mass:.6g} kg, as the case says, within 1 %",
-            hint="check 'units', and that force and displacement belong to the same port.",
+            hint="check 'units', and that the port lies on the axis: beside it a body turns as "
+            "well and seems lighter.",
         )
     return found if mass is None or rank == 1 else float(mass)
