@@ -1,17 +1,10 @@
-r"""An impact as a film for ParaView: displacement, velocity and stress of both bodies over time.
+"""An impact as a film for ParaView: displacement, velocity and stress of both bodies over time.
 
-At the full level the fields are those of the run, node by node.  At the reduced level they are
-recovered from the modes,
-
-.. math:: u = \Phi q + F \left( K^+ p(F) - \Phi_e \Omega_e^{-2} \Phi_e^T p_0 \right)
-
-with the contact force ``F``, the pressure pattern ``p(F)`` of the static contact at that force and
-the pattern ``p_0`` of the reduced model: the modes carry the waves, the static solution the
-contact (mode acceleration; Craig & Kurdila 2006, ch. 17).  The velocity is that of the modes alone.
+At the full level the fields are those of the run, node by node; at the reduced level
+:mod:`klack.exchange.results.recovered_motion` recovers them from the modes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
 from typing import Literal
@@ -21,35 +14,18 @@ from numpy.typing import NDArray
 
 from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.exchange.results.naming import file_stems
+from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.exchange.results.whole_file import whole_files
-from klack.reduction.ports import Port
-from klack.reduction.reduce import reduce_body
-from klack.simulation.impact import simulate
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import MotionOfBody, Snapshots
-from klack.workflow.levels import (
-    damping_of,
-    first_stiffness,
-    impact_system,
-    mode_pools,
-    own_pair,
-    selection_of,
-)
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 
 __all__ = ["write_impact_series"]
-
-_LEAST = 1e-3
-"""Smallest share of the largest static force whose pressure pattern is asked for."""
-
-_Frame = tuple[float, tuple[MotionOfBody, ...]]
 
 
 def write_impact_series(
@@ -108,8 +84,9 @@ def write_impact_series(
         if level == "full":
             _run_full(problem, film, frames, progress, threads)
         else:
-            for frame in _reduced_frames(problem, frames, progress):
-                film.add(*frame)
+            instants = _instants(case.run.duration, case.run.reduced_step, frames)
+            for time, motion in recovered_motion(problem, instants, progress):
+                film.add(time, motion)
             problem.close()
         write_pvd(stage / f"{name}.pvd", film.files)
     return folder / f"{name}.pvd"
@@ -188,102 +165,3 @@ def _instants(duration: float, step: float, frames: int) -> tuple[int, ...]:
     """Steps at which the frames are, as even as whole steps allow."""
     last = ceil(duration / step * (1.0 - 1e-9))
     return tuple(dict.fromkeys(round(k * last / (frames - 1)) for k in range(frames)))
-
-
-# --------------------------------------------------------------------------- reduced level
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Recovered:
-    """From modal coordinates and contact force to the displacement of all nodes.
-
-    ``missing`` [m/N] is what the modes already hold of the static deflection, with a minus; None
-    where attachment modes or nothing at all stand for the rest.
-    """
-
-    name: str
-    shapes: NDArray[np.float64]
-    flexibility: Flexibility
-    missing: NDArray[np.float64] | None
-
-    def motion(
-        self,
-        q: NDArray[np.float64],
-        v: NDArray[np.float64],
-        force: float,
-        load: NDArray[np.float64],
-    ) -> MotionOfBody:
-        """Fields under a contact force [N] with its load pattern, shape (n_dof,)."""
-        u = self.shapes @ q
-        if self.missing is not None and force > 0.0:
-            u = u + force * (self.flexibility.solve(load[:, None])[:, 0] + self.missing)
-        return MotionOfBody(name=self.name, displacement=u, velocity=self.shapes @ v)
-
-
-def _recovered(
-    problem: ContactProblem,
-    pools: Mapping[str, Modes],
-    elastic: ElasticBody,
-    flexibility: Flexibility,
-    port: Port,
-    sign: float,
-) -> _Recovered:
-    case = problem.case
-    body = reduce_body(
-        elastic,
-        [port],
-        modes=selection_of(case.reduction.choice(elastic.name)),
-        correction=case.reduction.correction,
-        damping=damping_of(case.bodies[elastic.name].damping),
-        modes_pool=pools[elastic.name],
-        flexibility=flexibility,
-        recovery_nodes=np.arange(elastic.mesh.node_count),
-    )
-    shapes = np.zeros((elastic.dof_count, 0)) if body.recovery is None else body.recovery.shapes
-    missing = None
-    if body.correction == "consistent":
-        own = slice(body.rigid_count, None)
-        missing = -sign * shapes[:, own] @ (body.port_shapes[own, 0] / body.omega[own] ** 2)
-    return _Recovered(name=elastic.name, shapes=shapes, flexibility=flexibility, missing=missing)
-
-
-def _reduced_frames(problem: ContactProblem, frames: int, progress: Progress) -> Iterator[_Frame]:
-    """Every instant from a run of its own: a run takes milliseconds, a record of modes memory."""
-    case, both = problem.case, problem.pair
-    pools = mode_pools(problem, at_least=1, progress=progress)
-    progress("reduced", 0.0)
-    pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
-    # the force pushes the upper body up and the lower one down
-    parts = (
-        _recovered(problem, pools, both.upper, problem.flexibility_upper, pair.ports[0], 1.0),
-        _recovered(problem, pools, both.lower, problem.flexibility_lower, pair.ports[1], -1.0),
-    )
-    system = impact_system(case, pair.upper, pair.lower, pair.law)
-    thrown = np.zeros(pair.upper.mode_count)
-    thrown[: pair.upper.rigid_count] = -case.motion.speed * pair.upper.rigid_axial
-    still = np.zeros(pair.lower.mode_count)
-    q: tuple[NDArray[np.float64], ...] = (0.0 * thrown, still)
-    v: tuple[NDArray[np.float64], ...] = (thrown, still)
-    step = case.run.reduced_step
-    instants = _instants(case.run.duration, step, frames)
-    force = 0.0
-    for k, steps in enumerate(instants):
-        if steps > 0:
-            record = simulate(
-                system,
-                velocities={pair.upper.name: -case.motion.speed},
-                step=step,
-                duration=steps * step,
-            )
-            q, v, force = record.final_position, record.final_velocity, float(record.force[-1, 0])
-        loads = problem.static.load_patterns(
-            float(np.clip(force, _LEAST * problem.static.max_force, problem.static.max_force))
-        )
-        yield (
-            steps * step,
-            tuple(
-                part.motion(own_q, own_v, force, load)
-                for part, own_q, own_v, load in zip(parts, q, v, loads, strict=True)
-            ),
-        )
-        progress("reduced", (k + 1) / len(instants))
