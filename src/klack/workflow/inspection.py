@@ -59,12 +59,12 @@ def _mesh_rows(model: MeshModel) -> Iterator[Row]:
         yield "surface", name, f"{surface.face_count} faces, {_around(mesh, surface.nodes)}"
     for name, nodes in mesh.node_sets.items():
         yield "node set", name, f"{len(nodes)} nodes, {_around(mesh, nodes)}"
-    for name, material in model.materials.items():
-        density = "none" if material.density is None else f"{material.density:.6g}"
+    for name, given in model.materials.items():
+        density = "none" if given.density is None else f"{given.density:.6g}"
         yield (
             "material",
             name,
-            f"E {material.young:.6g}, nu {material.poisson:.4g}, density {density} "
+            f"E {given.young:.6g}, nu {given.poisson:.4g}, density {density} "
             "(units of the file)",
         )
 
