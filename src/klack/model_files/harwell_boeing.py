@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.model_files.fortran_numbers import FixedFormat, fixed_numbers
-from klack.model_files.number_lines import numbers_in
+from klack.model_files.fortran_numbers import FixedFormat, fixed_numbers, free_numbers
 from klack.model_files.system_matrix import Role, SystemMatrix, symmetric_matrix
 
 __all__ = ["read_harwell_boeing"]
@@ -85,7 +84,7 @@ def _section(
         raise _damaged(path, f"{count} lines of {what}")
     section = lines[first : first + count]
     # some writers announce another width than they take: blanks go first where they suffice
-    values = numbers_in(b" ".join(section))
+    values = free_numbers(section)
     if values is None or len(values) != numbers:
         wide = form.per_line * form.width
         values = fixed_numbers([line[:wide] for line in section], form.width)

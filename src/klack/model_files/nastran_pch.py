@@ -20,6 +20,7 @@ __all__ = ["read_nastran_pch"]
 
 _REAL = (1, 2)
 _SQUARE, _SYMMETRIC = 1, 6
+_MOST_WORDS = 200_000
 
 
 @dataclass
@@ -28,6 +29,20 @@ class _Punched:
 
     kind: int
     words: list[bytes] = field(default_factory=list)
+    parts: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def flush(self, where: str) -> None:
+        """Make numbers of the words."""
+        if not self.words:
+            return
+        values = numbers_in(b" ".join(self.words))
+        if values is None or len(values) != len(self.words):
+            # 1.25+3 stands for 1.25E+3
+            values = numbers_in(b" ".join(_with_letter(word.strip()) for word in self.words))
+        if values is None or len(values) != len(self.words):
+            raise _no_numbers(where)
+        self.parts.append(values.reshape(-1, 5))
+        self.words.clear()
 
 
 def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
@@ -42,15 +57,11 @@ def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemM
     chosen = choose_matrix(str(path), _names(data), name, role)
     found = _read(path, data, chosen)
     where = f"{path}: {chosen}"
-    words = found[chosen].words
-    values = numbers_in(b" ".join(words))
-    if values is None or len(values) != len(words):
-        # 1.25+3 stands for 1.25E+3
-        values = numbers_in(b" ".join(_with_letter(word.strip()) for word in words))
-    if values is None or len(values) != len(words) or not words:
-        hint = "the file is damaged or cut off; write it again."
-        raise InputError(where, got="entries that are no numbers", expected="numbers", hint=hint)
-    table: NDArray[np.float64] = values.reshape(-1, 5)
+    punched = found[chosen]
+    punched.flush(where)
+    if not punched.parts:
+        raise _no_numbers(where)
+    table = np.concatenate(punched.parts)
     nodes = whole_numbers(where, table[:, [0, 2]], "a grid")
     ways = whole_numbers(where, table[:, [1, 3]], "a component")
     rows, row, column = places_of_entries(where, nodes, ways)
@@ -87,6 +98,8 @@ def _read(path: Path, data: bytes, chosen: str) -> dict[str, _Punched]:
             if len(line) > 40 and not line[56:72].strip() and b"," not in line:
                 # anything else than three numbers changes their count
                 open_matrix.words += (line[8:24], line[24:40], *column, line[40:56])
+                if len(open_matrix.words) > _MOST_WORDS:
+                    open_matrix.flush(f"{path}:{number}")
                 continue
         if line[:1] in (b"*", b"+", b" ") and open_matrix is not None and column is not None:
             fields = _fields(line)[1:]
@@ -147,6 +160,11 @@ def _check(place: str, name: str, again: bool, words: list[bytes]) -> None:
             expected="each matrix once, of form 1 or 6 (square, symmetric) and type 1 or 2 (real)",
             hint="write K and M of a model without damping.",
         )
+
+
+def _no_numbers(where: str) -> InputError:
+    hint = "the file is damaged or cut off; write it again."
+    return InputError(where, got="entries that are no numbers", expected="numbers", hint=hint)
 
 
 def _with_letter(word: bytes) -> bytes:
