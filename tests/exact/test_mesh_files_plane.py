@@ -191,3 +191,39 @@ def test_element_components_are_solids(
     counts = {b.solid: len(b.connectivity) for b in mesh.blocks}
     assert counts == solids
     assert components.keys() - counts.keys() <= mesh.node_sets.keys()
+
+
+MATERIALS = {
+    "MP,EX,1,2.1e5\nMP,PRXY,1,0.3\nMP,DENS,1,7.85e-9\t! t mm^-3": (2.1e5, 0.3, 7.85e-9),
+    "mp,ex,1,2.1e5\nmp,ex,1,2.1e5\nmp,nuxy,1,0.25": (2.1e5, 0.25, None),
+    "MPDATA,EX,1,1,2.1e5,2.1e5\nMPDATA,NUXY,1,1,0.3": (2.1e5, 0.3, None),
+    "MPDATA,R5.0,2,EX,1,1,2.1e5,1.9e5\nMP,PRXY,1,0.3": None,  # depends on temperature
+}
+
+
+@pytest.mark.parametrize("commands", MATERIALS)
+def test_materials_of_ansys(commands: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.cdb"
+    row_of_bricks(path, {}, [1])
+    path.write_text(path.read_text() + commands + "\n")
+    model = read_mesh_file(path, MM)
+    truth = MATERIALS[commands]
+    if truth is None:
+        assert not model.materials
+        return
+    found = model.materials[model.sections["material_1"]]
+    assert (found.young, found.poisson, found.density) == truth
+
+
+def test_names_in_comments_of_nastran(tmp_path: Path) -> None:
+    lines = ["GRID,1,,0.,0.,0.", "GRID,2,,1.,0.,0.", "GRID,3,,0.,1.,0.", "GRID,4,,0.,0.,1."]
+    lines += ["CTETRA,1,3,1,2,3,4", "CTRIA3,2,4,1,2,3", "PSOLID,3,6", "MAT1,6,2.1+5,,.3"]
+    lines += ['$HMNAME PROP                   3"needle" 4', "$ANSA_NAME_COMMENT;4;PSHELL;seat;"]
+    lines += ["$ Femap Material 6 : steel 1.4125"]
+    path = tmp_path / "a.bdf"
+    path.write_text("\n".join(lines))
+    model = read_mesh_file(path, 1.0)
+    assert model.mesh.solids == ("needle",)
+    assert set(model.mesh.surfaces) == {"seat"}
+    assert model.sections == {"needle": "steel 1.4125"}
+    assert model.materials["steel 1.4125"].young == 2.1e5

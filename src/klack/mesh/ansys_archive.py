@@ -271,8 +271,8 @@ def _materials(archive: Archive) -> dict[str, FileMaterial]:
             continue
         numbers = [_real(archive, row, text) for text in values if text]
         own = found.setdefault(_whole(archive, row, label), {})
-        constant = len(set(numbers)) == 1 and what not in own
-        own[what] = numbers[0] if constant else None
+        values_so_far = {*numbers, own.get(what, numbers[0])} if numbers else {None}
+        own[what] = values_so_far.pop() if len(values_so_far) == 1 else None
     materials = {}
     for number, own in found.items():
         young, poisson = own.get("EX"), own.get("PRXY", own.get("NUXY"))

@@ -38,9 +38,9 @@ class FileMaterial:
         if self.density is None:
             raise InputError(
                 f"material '{self.name}'",
-                got="no *DENSITY",
+                got="no density",
                 expected="Young's modulus, Poisson's ratio and density",
-                hint="add *DENSITY to the file, or name a material in the case.",
+                hint="add the density to the file, or name a material in the case.",
             )
         return Material(
             name=self.name,
