@@ -127,10 +127,22 @@ def fingerprint(bodies: Iterable[CaseBody], parts: Iterable[bytes]) -> str:
     for part in parts:
         digest.update(part + b"\0")
     for body in bodies:
-        for source in (body.geometry.mesh, body.geometry.step):
-            if source is not None:
-                digest.update(source.file.read_bytes() + b"\0")
+        for file in _files_of(body):
+            digest.update(file.read_bytes() + b"\0")
     # klack itself, as it is on this machine
     for file in sorted(Path(klack.__file__).parent.rglob("*.py")):
         digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def _files_of(body: CaseBody) -> list[Path]:
+    """Files that decide what a body is."""
+    geometry, matrices = body.geometry, body.matrices
+    files = [part.file for part in (geometry.mesh, geometry.step, geometry.nodes) if part]
+    if geometry.nodes is not None:
+        files += [nodes for nodes in geometry.nodes.sets.values() if isinstance(nodes, Path)]
+    if matrices is not None:
+        files += [matrices.stiffness, matrices.mass, *([matrices.dofs] if matrices.dofs else [])]
+    if body.reduced is not None:
+        files.append(body.reduced.file)
+    return files
