@@ -126,7 +126,6 @@ def differ(a, b):
 
 
 CASES = {
-    "linear": on_seat(needle(), LinearLaw(1e9)),
     "pressed, damped modes": on_seat(
         needle(damping=0.01), LinearLaw(1e9), forces=(AxialForce(body="needle", force=-40.0),)
     ),
@@ -135,7 +134,6 @@ CASES = {
         LinearLaw(1e9),
         springs=(ReturnSpring(body="needle", port="top", stiffness=2e4, preload=15.0),),
     ),
-    "Hertz": on_seat(needle(), HertzLaw(1.5e12)),
     "table": on_seat(needle(), TABLE),
     "in series": on_seat(needle(), TABLE, series=1e-9),
     "Hunt-Crossley": on_seat(
