@@ -60,7 +60,7 @@ def test_cut_off_files(files):
     data = files.stiffness.read_bytes()
     K = read_matrix(files.stiffness, role="stiffness").matrix
 
-    for cut in np.unique(np.linspace(0, len(data) - 1, 20).astype(int)).tolist():
+    for cut in np.unique(np.linspace(0, len(data) - 1, 14).astype(int)).tolist():
         found = try_to_read(files, data[:cut])
         # a list of entries may end anywhere; it must not invent any
         assert found is None or found.nnz <= K.nnz
@@ -69,7 +69,7 @@ def test_cut_off_files(files):
 def test_flipped_bytes(files):
     data = np.frombuffer(files.stiffness.read_bytes(), np.uint8)
     rng = np.random.default_rng(8)
-    for _ in range(25):
+    for _ in range(18):
         changed = data.copy()
         at = rng.integers(0, len(data), rng.integers(1, 4))
         changed[at] ^= rng.integers(1, 256, len(at)).astype(np.uint8)
