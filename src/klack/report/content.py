@@ -7,6 +7,7 @@ the text of the case come from the user.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -479,7 +480,10 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
             "Resolution",
             f"The elements across the contact are {study.contact.size_ratio:.2g} half widths long; "
             "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: agreement "
-            "between them says nothing about the error of the meshes themselves.",
+            "between them says nothing about the error of the meshes themselves."
+            if isfinite(study.contact.size_ratio)
+            else "The bodies meet at ports, without contact points: neither their models nor the "
+            "local law are checked against a mesh.",
         ),
     ]
     if tops:
