@@ -1,16 +1,15 @@
 """Sections of a Gmsh file (.msh 2 and 4.1, ASCII and binary): nodes, elements, physical groups."""
 
 import re
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.mesh.gmsh_streams import BinaryStream, Stream, TextStream, refuse, whole_of
 from klack.mesh.text_columns import read_bytes
 
 __all__ = ["NODE_COUNTS", "GmshContent", "GmshElements", "read_content"]
@@ -66,90 +65,6 @@ class GmshContent:
     def points(self) -> NDArray[np.float64]:
         """Coordinates, shape (n, 3)."""
         return np.concatenate([np.empty((0, 3)), *self.point_parts])
-
-
-class _Stream(Protocol):
-    """Numbers of a section, one after the other."""
-
-    def whole(self, count: int) -> Ints: ...
-    def sizes(self, count: int) -> Ints: ...
-    def real(self, count: int) -> NDArray[np.float64]: ...
-
-
-class _TextStream:
-    def __init__(self, place: str, text: bytes) -> None:
-        self._place = place
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            try:
-                self._values = np.fromstring(text.decode("latin-1"), dtype=np.float64, sep=" ")
-            except (ValueError, DeprecationWarning):
-                _refuse(place, "what is no number", "numbers between blanks")
-        self._at = 0
-
-    @property
-    def left(self) -> int:
-        return len(self._values) - self._at
-
-    def real(self, count: int) -> NDArray[np.float64]:
-        if not 0 <= count <= self.left:
-            _refuse(self._place, f"{self.left} numbers more", f"{count}, as its counts say")
-        self._at += count
-        values = self._values[self._at - count : self._at]
-        if not np.isfinite(values).all():
-            _refuse(self._place, "what is no finite number", "finite numbers")
-        return values
-
-    def whole(self, count: int) -> Ints:
-        return _whole_of(self._place, self.real(count))
-
-    sizes = whole
-
-
-class _BinaryStream:
-    def __init__(self, place: str, data: bytes, at: int, order: str, size: int) -> None:
-        self._place, self._data, self.at = place, data, at
-        self._whole = np.dtype(f"{order}i4")
-        self._size = np.dtype(f"{order}u{size}")
-        self._real = np.dtype(f"{order}f8")
-
-    def take(self, kind: np.dtype, count: int) -> np.ndarray:
-        left = len(self._data) - self.at
-        if not 0 <= count * kind.itemsize <= left:
-            _refuse(self._place, f"{left} bytes more", f"{count} items, as its counts say")
-        values = np.frombuffer(self._data, dtype=kind, count=count, offset=self.at)
-        self.at += count * kind.itemsize
-        return values
-
-    def record(self, columns: int) -> np.dtype:
-        return np.dtype([("number", self._whole), ("x", self._real, (columns,))])
-
-    def whole(self, count: int) -> Ints:
-        return self.take(self._whole, count).astype(np.int64)
-
-    def sizes(self, count: int) -> Ints:
-        values = self.take(self._size, count)
-        if len(values) and values.max() > 2**53:
-            _refuse(self._place, f"the number {values.max()}", "numbers of nodes and elements")
-        return values.astype(np.int64)
-
-    def real(self, count: int) -> NDArray[np.float64]:
-        values = self.take(self._real, count).astype(np.float64)
-        if not np.isfinite(values).all():
-            _refuse(self._place, "what is no finite number", "finite numbers")
-        return values
-
-
-def _whole_of(place: str, values: NDArray[np.float64]) -> Ints:
-    if (np.abs(values) > 2**53).any() or (values != np.rint(values)).any():
-        _refuse(place, "a number with a fraction, or a huge one", "whole numbers")
-    return values.astype(np.int64)
-
-
-def _refuse(place: str, got: str, expected: str) -> None:
-    raise InputError(
-        place, got=got, expected=expected, hint="the file may be cut off: save it again from Gmsh."
-    )
 
 
 def read_content(path: Path) -> GmshContent:
@@ -213,14 +128,14 @@ class _Reader:
             start = self._numbers(name, place, start)
         end = self._data.find(b"$End" + name.encode("latin-1"), start)
         if end < 0:
-            _refuse(place, "the end of the file", f"$End{name}")
+            refuse(place, "the end of the file", f"$End{name}")
         line = self._data.find(b"\n", end)
         return len(self._data) if line < 0 else line + 1
 
     def _format(self, place: str, start: int) -> int:
         match = _FORMAT.match(self._data, start, start + 80)
         if not match:
-            _refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
+            refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
         assert match is not None
         version = match[1].decode()
         if version not in ("2", "2.1", "2.2", "4", "4.1"):
@@ -236,7 +151,7 @@ class _Reader:
             return match.end()
         one = self._data[match.end() : match.end() + 4]
         if one not in (b"\1\0\0\0", b"\0\0\0\1"):
-            _refuse(place, "binary data without the number 1 in front", "the number 1")
+            refuse(place, "binary data without the number 1 in front", "the number 1")
         self._order = "<" if one == b"\1\0\0\0" else ">"
         return match.end() + 4
 
@@ -248,7 +163,7 @@ class _Reader:
             if match:
                 self._content.names[int(match[1]), int(match[2])] = match[3]
             elif line.strip():
-                _refuse(place, repr(line[:40]), 'dimension, number and "name"')
+                refuse(place, repr(line[:40]), 'dimension, number and "name"')
 
     def _numbers(self, name: str, place: str, start: int) -> int:
         """Read a section of numbers; give the byte behind them."""
@@ -256,26 +171,26 @@ class _Reader:
         if not self._binary:
             end = self._data.find(f"$End{name}".encode(), start)
             if end < 0:
-                _refuse(place, "the end of the file", f"$End{name}")
-            text = _TextStream(place, self._data[start:end])
+                refuse(place, "the end of the file", f"$End{name}")
+            text = TextStream(place, self._data[start:end])
             match name, old:
                 case "Nodes", True:
                     count = int(text.sizes(1)[0])
                     table = text.real(4 * count).reshape(-1, 4)
-                    self._take_nodes(place, _whole_of(place, table[:, 0]), table[:, 1:])
+                    self._take_nodes(place, whole_of(place, table[:, 0]), table[:, 1:])
                 case "Elements", True:
                     self._old_elements(place, text)
                 case _:
                     self._new(name, place, text)
             return end
         line = self._data.find(b"\n", start) + 1 if old else start
-        stream = _BinaryStream(place, self._data, line, self._order, self._size)
+        stream = BinaryStream(place, self._data, line, self._order, self._size)
         if not old:
             self._new(name, place, stream)
             return stream.at
         count_text = self._data[start : max(line, start)][:20].strip()
         if not count_text.isdigit():
-            _refuse(place, repr(count_text), "the number of items")
+            refuse(place, repr(count_text), "the number of items")
         if name == "Nodes":
             records = stream.take(stream.record(3), int(count_text))
             self._take_nodes(place, records["number"].astype(np.int64), records["x"])
@@ -285,7 +200,7 @@ class _Reader:
 
     def _take_nodes(self, place: str, numbers: Ints, points: NDArray[np.float64]) -> None:
         if not np.isfinite(points).all():
-            _refuse(place, "what is no finite number", "coordinates")
+            refuse(place, "what is no finite number", "coordinates")
         self._content.node_parts.append(numbers)
         self._content.point_parts.append(points)
 
@@ -303,32 +218,32 @@ class _Reader:
             )
         return NODE_COUNTS[kind]
 
-    def _old_elements(self, place: str, text: _TextStream) -> None:
+    def _old_elements(self, place: str, text: TextStream) -> None:
         """Rows of number, type, number of tags, tags, nodes; neighbours mostly alike."""
         left = int(text.sizes(1)[0])
         values = text.whole(text.left)
         at = 0
         while left > 0:
             if len(values) - at < 3:
-                _refuse(place, "the end of the section", f"{left} elements more")
+                refuse(place, "the end of the section", f"{left} elements more")
             kind, tags = int(values[at + 1]), int(values[at + 2])
             nodes = self._node_count(place, kind)
             width = 3 + tags + nodes
             most = min(left, (len(values) - at) // width) if 0 <= tags <= 10_000 else 0
             if most == 0:
-                _refuse(place, f"an element with {tags} tags", "a whole element")
+                refuse(place, f"an element with {tags} tags", "a whole element")
             count = _alike(values[at:], width, most)
             rows = values[at : at + count * width].reshape(count, width)
             self._take_tagged(place, kind, tags, rows[:, [0, *range(3, width)]])
             at += count * width
             left -= count
 
-    def _old_binary_elements(self, place: str, stream: _BinaryStream, left: int) -> None:
+    def _old_binary_elements(self, place: str, stream: BinaryStream, left: int) -> None:
         while left > 0:
             kind, count, tags = stream.whole(3).tolist()
             width = 1 + tags + self._node_count(place, kind)
             if not (0 < count <= left and 0 <= tags <= 10_000):
-                _refuse(place, f"{count} elements with {tags} tags", f"at most {left} elements")
+                refuse(place, f"{count} elements with {tags} tags", f"at most {left} elements")
             rows = stream.whole(count * width).reshape(count, width)
             self._take_tagged(place, kind, tags, rows)
             left -= count
@@ -341,7 +256,7 @@ class _Reader:
             groups = (abs(label),) if label else ()
             self._take(place, kind, groups, np.delete(own, np.s_[1 : 1 + tags], axis=1))
 
-    def _new(self, name: str, place: str, stream: _Stream) -> None:
+    def _new(self, name: str, place: str, stream: Stream) -> None:
         if name == "Entities":
             for dimension, count in enumerate(stream.sizes(4).tolist()):
                 for _ in range(count):
@@ -352,7 +267,7 @@ class _Reader:
             first, second, third = stream.whole(3).tolist()
             count = int(stream.sizes(1)[0])
             if not 0 <= (first if name == "Nodes" else 0) <= 3:
-                _refuse(place, f"an entity of dimension {first}", "dimension 0 to 3")
+                refuse(place, f"an entity of dimension {first}", "dimension 0 to 3")
             if name == "Nodes":
                 numbers = stream.sizes(count)
                 columns = 3 + (first if third else 0)
@@ -364,7 +279,7 @@ class _Reader:
                 groups = self._content.groups.get((first, second), ())
                 self._take(place, third, groups, rows)
 
-    def _entity(self, dimension: int, stream: _Stream) -> None:
+    def _entity(self, dimension: int, stream: Stream) -> None:
         tag = int(stream.whole(1)[0])
         stream.real(3 if dimension == 0 else 6)
         groups = stream.whole(int(stream.sizes(1)[0]))
