@@ -135,10 +135,10 @@ def compile_library(
         If the compiler fails; its words are in the text.
     """
     command = [*_command(platform), *_OPTIONS]
-    if PLATFORMS[platform].suffix == ".dll":
-        command += ["-static-libgcc"]
-    else:
+    if PLATFORMS[platform].suffix != ".dll":
         command += ["-fPIC"]
+    elif "ziglang" not in command:  # which links no library of gcc
+        command += ["-static-libgcc"]
     command += [f"-I{folder}" for folder in include] + [str(source) for source in sources]
     command += ["-o", str(library), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)

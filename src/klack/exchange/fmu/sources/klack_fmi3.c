@@ -501,6 +501,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     failure = klack_do_step(c->model, currentCommunicationPoint, communicationStepSize);
     *lastSuccessfulTime = klack_get_time(c->model);
+    if (failure > 1) c->at.phase = TERMINATED; /* the motion is lost: only a reset helps */
     return of_model(c, failure);
 }
 
