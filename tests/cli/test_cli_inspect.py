@@ -2,8 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
+import pytest
+import scipy.io
+from scipy.sparse import coo_array
+
 from klack.case import find_case
 from klack.cli.main import main
+from klack.errors import InputError
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.modal_model import Provenance, body_model
+from klack.simulation.bodies import rod_body
 
 NEEDLE = find_case("needle-from-inp").parent / "needle.inp"
 
@@ -27,3 +36,38 @@ def test_other_files_are_refused_with_what_is_read(tmp_path: Path, capsys):
 
     assert main(["inspect", str(tmp_path / "notes.txt")]) == 2
     assert ".inp" in capsys.readouterr().err
+
+
+def test_a_matrix_shows_its_size_and_what_its_rows_are(tmp_path: Path, capsys):
+    scipy.io.mmwrite(tmp_path / "k.mtx", coo_array(np.diag([1.0, 2.0, 3.0])))
+
+    assert main(["inspect", str(tmp_path / "k.mtx")]) == 0
+
+    shown = capsys.readouterr().out
+    assert "3 rows, 3 entries" in shown
+    assert "dofs" in shown
+
+
+def test_one_of_several_matrices(tmp_path: Path, capsys):
+    scipy.io.savemat(tmp_path / "two.mat", {"A": np.eye(3), "B": 2 * np.eye(3)})
+
+    assert main(["inspect", str(tmp_path / "two.mat")]) == 2
+    assert "'A', 'B'" in capsys.readouterr().err
+    assert main(["inspect", str(tmp_path / "two.mat"), "--matrix", "B"]) == 0
+    assert "2 to 2" in capsys.readouterr().out
+
+
+def test_an_fmu_shows_its_inputs_and_outputs(tmp_path: Path, capsys):
+    pytest.importorskip("fmpy")
+    rod = rod_body("rod", length=0.03, area=1e-5, young=2.1e11, density=7850.0, elastic_modes=3)
+    made = Provenance(case="rod", title="Rod", version="1", created="2026-01-01T00:00:00")
+    try:
+        build_fmu(body_model(rod, provenance=made, step=1e-8), tmp_path / "rod.fmu", fmi=2)
+    except InputError:
+        pytest.skip("no C compiler")
+
+    assert main(["inspect", str(tmp_path / "rod.fmu")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "input force_top N" in shown
+    assert "output displacement_bottom m" in shown

@@ -1,6 +1,7 @@
 """Writers of meshes of quadratic tetrahedra in millimetres: meshio, own ones for two programs."""
 
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -86,13 +87,15 @@ def _fortran(value: float) -> str:
     return f"{mantissa}E{int(exponent):+04d}".rjust(21)
 
 
-MESH_WRITERS: Mapping[str, _Writer] = {
-    "Abaqus .inp": _by_meshio(".inp", "abaqus"),
-    "ANSYS .cdb": _ansys,
-    "Nastran .bdf": _nastran,
-    "Gmsh .msh 2": _by_meshio(".msh", "gmsh22"),
-    "Gmsh .msh 4": _by_meshio(".msh", "gmsh"),
-    "VTK .vtk": _by_meshio(".vtk", "vtk"),
-    "VTK .vtu": _by_meshio(".vtu", "vtu"),
-}
-"""Form: its writer."""
+MESH_WRITERS: Mapping[str, _Writer] = {"ANSYS .cdb": _ansys, "Nastran .bdf": _nastran}
+"""Form: its writer; those of meshio only where it is installed."""
+
+if find_spec("meshio") is not None:
+    MESH_WRITERS = {
+        **MESH_WRITERS,
+        "Abaqus .inp": _by_meshio(".inp", "abaqus"),
+        "Gmsh .msh 2": _by_meshio(".msh", "gmsh22"),
+        "Gmsh .msh 4": _by_meshio(".msh", "gmsh"),
+        "VTK .vtk": _by_meshio(".vtk", "vtk"),
+        "VTK .vtu": _by_meshio(".vtu", "vtu"),
+    }

@@ -182,12 +182,12 @@ def _ring(place: tuple[float, ...]) -> tuple[float, ...]:
 
 def _require_dimension(file: Path, mesh: Mesh, dimension: int) -> None:
     if mesh.dimension != dimension:
-        kind = {2: "axisymmetric (CAX)", 3: "three-dimensional (C3D)"}
+        kind = {2: "axisymmetric", 3: "three-dimensional"}
         raise InputError(
             str(file),
             got=f"{kind[mesh.dimension]} elements",
             expected=f"{kind[dimension]} elements",
-            hint="say 'model: axisymmetric' in the geometry of a CAX mesh.",
+            hint="say 'model: axisymmetric' in the geometry of a mesh of the half section.",
         )
 
 

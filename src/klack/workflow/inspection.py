@@ -5,37 +5,60 @@ from pathlib import Path
 
 import numpy as np
 
+from klack.errors import InputError
+from klack.mechanics.fmu_file import FmuDescription, describe_fmu
 from klack.mesh.mesh import Mesh
 from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
 from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
+from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
+from klack.model_files.system_matrix import SystemMatrix
 
-__all__ = ["Row", "inspect_mesh", "is_mesh"]
+__all__ = ["INSPECTED", "Row", "inspect_file"]
 
 Row = tuple[str, str, str]
 """What, its name, its numbers in words."""
 
 
-def is_mesh(path: Path) -> bool:
-    """True for the ending of a mesh file that klack reads."""
-    return path.suffix.lower() in MESH_FORMATS
+INSPECTED = (*MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
+"""Endings of the files that :func:`inspect_file` knows."""
 
 
-def inspect_mesh(path: Path, unit_length: float | None) -> tuple[Row, ...]:
-    """Nodes, elements, size, solids, surfaces, node sets and materials of a mesh file.
+def inspect_file(
+    path: Path, unit_length: float | None = None, matrix: str | None = None
+) -> tuple[Row, ...]:
+    """What a mesh, a matrix or an FMU holds.
 
     Parameters
     ----------
     path : Path
+        With one of the endings of :data:`INSPECTED`.
     unit_length : float [m] or None
-        None where the file names its unit.
+        Of a mesh whose file does not name it.
+    matrix : str or None
+        Name of a matrix in a file of several.
 
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or is of another kind.
     """
-    return tuple(_mesh_rows(read_mesh_file(path, unit_length)))
+    ending = path.suffix.lower()
+    if not path.is_file():
+        hint = "check the spelling and the folder."
+        raise InputError(str(path), got="no such file", expected="a file", hint=hint)
+    if ending in MESH_FORMATS:
+        return tuple(_mesh_rows(read_mesh_file(path, unit_length)))
+    if ending in MATRIX_FORMATS:
+        return tuple(_matrix_rows(read_matrix(path, name=matrix)))
+    if ending == ".fmu":
+        return tuple(_fmu_rows(describe_fmu(path)))
+    raise InputError(
+        str(path),
+        got=f"a file that ends in '{path.suffix}'",
+        expected=f"one of: {', '.join(dict.fromkeys(INSPECTED))}",
+        hint="klack inspect reads meshes, matrices and FMUs.",
+    )
 
 
 def _mesh_rows(model: MeshModel) -> Iterator[Row]:
@@ -64,9 +87,37 @@ def _mesh_rows(model: MeshModel) -> Iterator[Row]:
         yield (
             "material",
             name,
-            f"E {given.young:.6g}, nu {given.poisson:.4g}, density {density} "
-            "(units of the file)",
+            f"E {given.young:.6g}, nu {given.poisson:.4g}, density {density} (units of the file)",
         )
+
+
+def _matrix_rows(found: SystemMatrix) -> Iterator[Row]:
+    A = found.matrix
+    yield "matrix", found.name, f"{A.shape[0]} rows, {A.nnz} entries, both triangles"
+    diagonal = A.diagonal()
+    yield "diagonal", "", f"{diagonal.min():.6g} to {diagonal.max():.6g} (units of the file)"
+    if found.rows is None:
+        yield "rows", "", "the file does not say which: give 'dofs', or x, y, z node after node"
+    else:
+        nodes = found.rows.node
+        numbers = f"{len(np.unique(nodes))} nodes, {nodes.min()} to {nodes.max()}"
+        ways = ", ".join(_WAYS.get(int(d), str(d)) for d in np.unique(found.rows.direction))
+        yield "rows", numbers, f"directions {ways}"
+    if found.held is not None and found.held.node.size:
+        yield "held", "", f"{found.held.node.size} constrained rows are left out of the file"
+    for note in found.notes:
+        yield "note", "", note
+
+
+_WAYS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}
+
+
+def _fmu_rows(fmu: FmuDescription) -> Iterator[Row]:
+    yield "FMU", fmu.identifier, f"co-simulation, FMI {fmu.version}.0"
+    for causality in ("input", "output", "parameter"):
+        for name, variable in fmu.variables.items():
+            if variable.causality == causality:
+                yield causality, name, variable.unit or "no unit"
 
 
 def _around(mesh: Mesh, nodes: np.ndarray) -> str:
