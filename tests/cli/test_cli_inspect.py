@@ -71,3 +71,11 @@ def test_an_fmu_shows_its_inputs_and_outputs(tmp_path: Path, capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert "input force_top N" in shown
     assert "output displacement_bottom m" in shown
+
+
+def test_a_case_shows_the_bodies_of_other_programs(capsys):
+    assert main(["inspect", "from-other-tools"]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "mass 3.94584 g" in shown  # as that case says, and as the drawn rod weighs
+    assert "port tip elastic compliance" in shown

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from klack.case import load_case
+from klack.cli.main import main
 from klack.elasticity.body import elastic_body
 from klack.errors import AccuracyWarning, InputError
 from klack.materials import Material
@@ -119,6 +120,16 @@ def test_the_case_of_the_page_gives_the_impact_of_klacks_own_matrices(folder):
     needle = given.bodies[0]
     assert "needle.sti" in needle.material
     assert "7854 kg/m^3" in needle.material  # straight edges
+
+
+def test_inspecting_the_case_shows_what_the_checks_found(folder, capsys):
+    load(folder, page_case())
+
+    assert main(["inspect", str(folder / "case.yaml")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "rigid" in shown
+    assert "kg/m^3" in shown
 
 
 def test_a_leaning_body_takes_its_matrices_along(folder):

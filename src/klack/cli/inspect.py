@@ -1,4 +1,4 @@
-"""``klack inspect``: what is in a file of another program."""
+"""``klack inspect``: what is in the files of other programs, before anything runs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,9 +9,17 @@ from klack.cli.tables import print_table
 
 __all__ = ["inspect"]
 
+_COLUMNS = ("what", "name", "content")
+
 
 def inspect(
-    file: Annotated[Path, Parameter(name="FILE", help="Mesh, matrix or FMU of another program.")],
+    file: Annotated[
+        Path,
+        Parameter(
+            name="FILE",
+            help="Mesh, matrix or FMU of another program; or a case: its bodies are checked.",
+        ),
+    ],
     /,
     *,
     unit: Annotated[
@@ -22,11 +30,21 @@ def inspect(
         str | None, Parameter(name="--matrix", help="Name of a matrix in a file of several.")
     ] = None,
 ) -> int:
-    """Show solids, surfaces and sets of a mesh, rows of a matrix, inputs and outputs of an FMU."""
-    from klack.units import LENGTH, parse_quantity
-    from klack.workflow.inspection import inspect_file
+    """Show solids, surfaces and sets of a mesh, rows of a matrix, inputs and outputs of an FMU.
 
+    Of a case: the bodies that come from other programs, checked as a run checks them.
+    """
+    from klack.case.shipped import find_case, shipped_cases
+    from klack.units import LENGTH, parse_quantity
+    from klack.workflow.inspection import inspect_case, inspect_file
+
+    is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()
+    if is_case or (not file.exists() and str(file) in shipped_cases()):
+        from klack.case.valve_reader import load_any_case
+
+        for name, rows in inspect_case(load_any_case(find_case(file))):
+            print_table(name, _COLUMNS, rows, left=3)
+        return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
-    rows = inspect_file(file, length, matrix)
-    print_table(file.name, ("what", "name", "content"), rows, left=3)
+    print_table(file.name, _COLUMNS, inspect_file(file, length, matrix), left=3)
     return 0

@@ -134,12 +134,13 @@ def check_matrices(
     rows = (
         ("degrees of freedom", f"{mesh.dof_count}, {len(fixed)} of them held"),
         ("left out in the files", f"{len(absent)} degrees of freedom, taken as held"),
-        ("mass", f"{format_si(mass, 'kg', 6)}" + (" without held nodes" if len(absent) else "")),
-        ("centre of mass", ", ".join(f"{1e3 * x:.6g}" for x in centre) + " mm"),
+        ("mass", f"{1e3 * mass:.6g} g" + (" without held nodes" if len(absent) else "")),
+        ("centre of mass", ", ".join(f"{round(1e3 * x, 9) + 0.0:.6g}" for x in centre) + " mm"),
         ("density", material.density_in_words),
         ("modulus lambda + 2 mu", material.modulus_in_words),
         ("wave speed", f"{material.wave_speed:.4g} m/s"),
         ("rigid motions", f"{rigid}; they cause {strain:.1g} of the forces that cancel"),
+        ("definiteness", "mass positive, stiffness positive beside rigid motions"),
         ("first eigenfrequency", format_si(frequency, "Hz", 6)),
     )
     return MatrixReport(

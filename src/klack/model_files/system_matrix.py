@@ -94,7 +94,9 @@ def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Ro
         where,
         got=f"no matrix '{wanted}'" if wanted else f"{len(known)} matrices",
         expected=f"one of: {listed}" if known else "a matrix",
-        hint=f"say which one with {key} (klack inspect: --matrix)." if known else "check what was written to this file.",
+        hint=f"say which one with {key} (klack inspect: --matrix)."
+        if known
+        else "check what was written to this file.",
     )
 
 

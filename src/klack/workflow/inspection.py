@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from klack.case.bodies import CaseFile
 from klack.errors import InputError
 from klack.mechanics.fmu_file import FmuDescription, describe_fmu
 from klack.mesh.mesh import Mesh
@@ -13,8 +14,11 @@ from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.model_files.system_matrix import SystemMatrix
+from klack.reduction.reduced_body import ReducedBody
+from klack.workflow.assembled_bodies import assembled_body
+from klack.workflow.given_bodies import reduced_from_file
 
-__all__ = ["INSPECTED", "Row", "inspect_file"]
+__all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
 
 Row = tuple[str, str, str]
 """What, its name, its numbers in words."""
@@ -59,6 +63,51 @@ def inspect_file(
         expected=f"one of: {', '.join(dict.fromkeys(INSPECTED))}",
         hint="klack inspect reads meshes, matrices and FMUs.",
     )
+
+
+def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
+    """What other programs gave for the bodies of a case, checked as a run checks it.
+
+    Yields the name of each body and its rows.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read, and for matrices and models that no body has.
+    """
+    for name, body in case.bodies.items():
+        if body.reduced is not None:
+            yield name, tuple(_reduced_rows(reduced_from_file(case, name)))
+        elif body.matrices is not None:
+            yield name, assembled_body(case, name).rows()
+        elif body.geometry.mesh is not None:
+            mesh = body.geometry.mesh
+            yield name, tuple(_mesh_rows(read_mesh_file(mesh.file, mesh.unit)))
+        else:
+            yield name, (("geometry", "", "meshed by klack when the case runs"),)
+
+
+def _reduced_rows(body: ReducedBody) -> Iterator[Row]:
+    elastic = body.frequencies[body.rigid_count :]
+    kind = "free" if body.rigid_count else "held"
+    yield "reduced model", kind, f"{len(elastic)} elastic modes, {body.rigid_count} rigid ones"
+    if body.rigid_count:
+        yield "mass", "", f"{body.mass * 1e3:.6g} g"
+    if len(elastic):
+        low, high = elastic.min() / 1e3, elastic.max() / 1e3
+        yield "frequencies", "", f"{low:.5g} to {high:.5g} kHz"
+    ratios = body.damping[body.rigid_count :]
+    if len(ratios):
+        low, high = (round(100 * float(z), 9) for z in (ratios.min(), ratios.max()))
+        yield "damping", "", f"{low:.3g} %" if low == high else f"{low:.3g} to {high:.3g} %"
+    static = np.diag(body.static_compliance)
+    for port, compliance, share in zip(body.port_names, static, body.compliance_share, strict=True):
+        yield (
+            "port",
+            port,
+            f"elastic compliance {compliance * 1e9:.4g} nm/N, {100 * share:.3g} % of it in the "
+            "modes",
+        )
 
 
 def _mesh_rows(model: MeshModel) -> Iterator[Row]:
