@@ -2,7 +2,7 @@
 
 The usual reader follows counts of a damaged file into memory that is not its own and takes the
 program down; this one checks every count against the bytes that are there.  Read are full and
-sparse matrices of real numbers, texts, cell arrays and structures; objects are passed over.
+sparse matrices, texts, cell arrays and structures; objects are passed over.
 """
 
 import struct
@@ -85,13 +85,13 @@ def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
     Returns
     -------
     dict of str to value
-        Numbers as float64 arrays (sparse ones as csc_array), texts as tuples of str, cell arrays as
-        lists, structures as dicts, or lists of dicts where there are several.
+        Numbers as float64 or complex128 arrays (sparse ones as csc_array), texts as tuples of str,
+        cell arrays as lists, structures as dicts, or lists of dicts where there are several.
 
     Raises
     ------
     InputError
-        For damaged files, complex numbers, and files of version 4 or 7.3.
+        For damaged files, and files of version 4 or 7.3.
     """
     if path.stat().st_size > largest:
         raise InputError(
@@ -189,13 +189,6 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
     if not 2 <= len(shape) <= 8 or any(n < 0 for n in shape):
         raise _damaged(budget.path, f"a variable of shape {shape[:8]}")
     name = _text(budget, next(parts, None), order)
-    if marks & _COMPLEX:
-        raise InputError(
-            f"{budget.path}: {name}",
-            got="complex numbers",
-            expected="real numbers",
-            hint="matrices of a model are real; save the real part.",
-        )
     if kind == _CELL:
         return name, _cells(budget, parts, order, shape, depth)
     if kind in (_STRUCTURE, _OBJECT):
@@ -204,9 +197,13 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
         return name, _structures(budget, parts, order, shape, depth)
     if kind == _TEXT:
         return name, _texts(budget, next(parts, None), order, shape)
+    is_complex = bool(marks & _COMPLEX)
     if kind == _SPARSE:
-        return name, _sparse(budget, parts, order, shape)
-    return name, _numbers(budget, next(parts, None), order, shape)
+        return name, _sparse(budget, parts, order, shape, is_complex)
+    values = _numbers(budget, next(parts, None), order, shape)
+    if is_complex:
+        return name, values + 1j * _numbers(budget, next(parts, None), order, shape)
+    return name, values
 
 
 def _raw(budget: _Budget, element: _Element | None, order: str) -> NDArray[Any]:
@@ -238,11 +235,20 @@ def _numbers(
 
 
 def _sparse(
-    budget: _Budget, parts: Iterator[_Element], order: str, shape: tuple[int, ...]
+    budget: _Budget,
+    parts: Iterator[_Element],
+    order: str,
+    shape: tuple[int, ...],
+    is_complex: bool,
 ) -> csc_array:
     rows = _integers(budget, next(parts, None), order)
     starts = _integers(budget, next(parts, None), order)
     values = _raw(budget, next(parts, None), order)
+    if is_complex:
+        imaginary = _raw(budget, next(parts, None), order)
+        if len(imaginary) != len(values):
+            raise _damaged(budget.path, "a sparse matrix with half of its complex numbers")
+        values = values + 1j * imaginary
     fits = len(shape) == 2 and len(starts) == shape[1] + 1
     fits = fits and starts[0] == 0 and bool(np.all(np.diff(starts) >= 0))
     fits = fits and starts[-1] <= min(len(rows), len(values))
@@ -254,7 +260,8 @@ def _sparse(
         raise _damaged(budget.path, "a sparse matrix with rows outside of it")
     budget.take(24 * count)
     matrix = csc_array(
-        (values[:count].astype(np.float64), rows, starts), shape=(shape[0], shape[1])
+        (values[:count].astype(np.complex128 if is_complex else np.float64), rows, starts),
+        shape=(shape[0], shape[1]),
     )
     matrix.sum_duplicates()
     return matrix

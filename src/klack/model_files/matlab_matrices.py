@@ -1,6 +1,6 @@
 """Matrices in MATLAB files: sparse or full variables, or fields of one structure (``model.K``).
 
-Files up to version 7.2 go through scipy, later ones (``-v7.3``, which are HDF5) through h5py.
+Those of version 7.3 are HDF5 and need h5py.
 """
 
 from collections.abc import Iterator, Mapping
@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from klack.errors import InputError, KlackError, MissingExtraError
+from klack.model_files.mat5 import read_mat5
 from klack.model_files.stored_sparse import compressed_matrix, dense_matrix
 from klack.model_files.system_matrix import Role, SystemMatrix, choose_matrix
 
 __all__ = ["read_matlab_matrix"]
 
 _HDF5 = b"\x89HDF"
+_LARGEST = 8 << 30  # bytes
 _MOST_PACKED = 1100  # deflate packs 1032 bytes into one at best
 _HINT = "save it again: save('model.mat', 'K', 'M', '-v7')."
 
@@ -37,7 +39,7 @@ def read_matlab_matrix(path: Path, name: str | None, role: Role | None) -> Syste
         return reader(path, name, role)
     except KlackError:
         raise
-    except Exception as error:  # scipy and h5py meet damage with any kind of error
+    except Exception as error:  # h5py meets damage with any kind of error
         said = " ".join(str(error).split())[:80] or type(error).__name__
         raise InputError(
             str(path),
@@ -48,32 +50,24 @@ def read_matlab_matrix(path: Path, name: str | None, role: Role | None) -> Syste
 
 
 def _classic(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    from scipy.io import loadmat, whosmat
-
-    shapes = {key: (shape, kind) for key, shape, kind in whosmat(path)}
-    structures = [key for key, (_, kind) in shapes.items() if kind == "struct"]
-    room = _MOST_PACKED * path.stat().st_size
-    for key, (shape, kind) in shapes.items():
-        numbers = float(np.prod([float(n) for n in shape]))
-        if kind != "sparse" and numbers > room:
-            raise _too_large(path, key, shape)
-    single = {key for key, (shape, _) in shapes.items() if max(shape, default=0) > 1}
-    names = [key for key in shapes if key in single and key not in structures]
+    content = read_mat5(path, largest=_LARGEST)
+    names = [key for key, value in content.items() if _is_matrix(value)]
+    structures = [key for key, value in content.items() if isinstance(value, dict)]
     if name is not None and "." in name:
         names = []
     elif names:
         chosen = _choice(path, names, structures, name, role)
         if chosen in names:
-            content = loadmat(path, variable_names=[chosen])
             return _matrix(path, chosen, content[chosen])
-    content = loadmat(path, variable_names=structures, struct_as_record=True)
     fields = {
-        f"{key}.{field}": content[key].ravel()[0][field]
-        for key in structures
-        for field in content[key].dtype.names or ()
-        if content[key].size == 1
+        f"{key}.{field}": value for key in structures for field, value in content[key].items()
     }
     return _of_fields(path, fields, name, role)
+
+
+def _is_matrix(value: Any) -> bool:
+    """True for numbers in rows and columns, more than one of them."""
+    return getattr(value, "ndim", 0) == 2 and max(value.shape) > 1
 
 
 def _choice(
@@ -91,11 +85,7 @@ def _of_fields(
     path: Path, fields: Mapping[str, Any], name: str | None, role: Role | None
 ) -> SystemMatrix:
     """Choose among fields of structures, by their last name if need be."""
-    square = {
-        key: value
-        for key, value in fields.items()
-        if getattr(value, "ndim", 0) == 2 and max(value.shape) > 1
-    }
+    square = {key: value for key, value in fields.items() if _is_matrix(value)}
     last = {key.rpartition(".")[2]: key for key in square}
     if name is not None and name not in last:
         chosen = choose_matrix(str(path), square, name, role)
@@ -176,12 +166,3 @@ def _check_dataset(where: str, item: Any) -> None:
             expected="numbers that the file holds",
             hint=_HINT,
         )
-
-
-def _too_large(path: Path, name: str, shape: tuple[int, ...]) -> InputError:
-    return InputError(
-        f"{path}: {name}",
-        got=f"a variable of {shape} numbers in a file of {path.stat().st_size} bytes",
-        expected="no more numbers than the file can hold",
-        hint=_HINT,
-    )

@@ -154,6 +154,13 @@ def _collect(
     texts: dict[str, tuple[str, ...]],
 ) -> None:
     """Sort one value of a MATLAB file into numbers and texts; what is neither is left out."""
+    if isinstance(value, np.ndarray | csc_array) and np.iscomplexobj(value):
+        raise InputError(
+            f"{path}: {key}",
+            got="complex numbers",
+            expected="real numbers",
+            hint="matrices of a model are real; save the real part.",
+        )
     if isinstance(value, dict):
         for name, item in value.items():
             _collect(path, f"{key}.{name}", item, arrays, texts)

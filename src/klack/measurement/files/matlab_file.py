@@ -49,9 +49,11 @@ def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
         elif isinstance(value, tuple):
             if len(value) == 1:
                 about[key.lower()] = str(value[0])
-        elif isinstance(value, np.ndarray) and value.size == 1:
+        elif not isinstance(value, np.ndarray) or np.iscomplexobj(value):
+            continue
+        elif value.size == 1:
             about[key.lower()] = float(value.ravel()[0])
-        elif isinstance(value, np.ndarray) and value.size and value.ndim == 2:
+        elif value.size and value.ndim == 2:
             arrays.append(_array(key, value))
     return StoredGroup(path=path, arrays=arrays, about=about, groups=groups)
 
