@@ -42,12 +42,14 @@ class AccuracyWarning(UserWarning):
 
 
 class MissingExtraError(KlackError, ImportError):
-    """An optional package is needed for this and is not installed."""
+    """An optional package is needed for this and is not installed; ``extra`` may bring it."""
 
-    def __init__(self, package: str, purpose: str, extra: str) -> None:
+    def __init__(self, package: str, purpose: str, extra: str | None) -> None:
+        way = f"pip install {package}"
+        if extra is not None:
+            way = f"uv sync --extra {extra} (or pip install 'klack[{extra}]')"
         super().__init__(
-            f"{purpose} needs the package '{package}', which is not installed.\n"
-            f"Try: uv sync --extra {extra} (or pip install 'klack[{extra}]')."
+            f"{purpose} needs the package '{package}', which is not installed.\nTry: {way}."
         )
 
 

@@ -42,17 +42,6 @@ ContactKind = Literal["none", "linear", "power", "table"]
 """A squeeze film alone, ``F = k d``, ``F = K d^n``, piecewise cubic."""
 
 
-class _MissingControlError(MissingExtraError):
-    """The package is in no extra of klack."""
-
-    def __init__(self) -> None:
-        ImportError.__init__(
-            self,
-            "A model for python-control needs the package 'control', which is not installed.\n"
-            "Try: pip install control.",
-        )
-
-
 _LARGEST = 2**31 - 2**20
 """Bytes of A: MATLAB files of version 5 hold less than 2 GiB in one structure."""
 
@@ -193,7 +182,7 @@ def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "cont
     try:
         import control
     except ImportError as error:
-        raise _MissingControlError from error
+        raise MissingExtraError("control", "A model for python-control", None) from error
     form = state_space(model)
     return control.StateSpace(
         form.A,
