@@ -39,6 +39,7 @@ def read_nastran_op4(path: Path, name: str | None, role: Role | None) -> SystemM
     strings = found[known.index(chosen)]
     row, column, value = strings.entries(f"{path}: {chosen}")
     size = strings.header.columns
+    del data, found, strings  # the entries are copies
     matrix, notes = symmetric_matrix(f"{path}: {chosen}", row, column, value, size)
     return SystemMatrix(path=path, name=chosen, matrix=matrix, notes=notes)
 

@@ -133,20 +133,31 @@ class Op4Strings:
             self._cut_into_strings(*record)
         self.columns.clear()
         count = np.array(self.count, dtype=np.int64)
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        row = np.repeat(np.array(self.row, dtype=np.int64) - 1, count) + within
-        column = np.repeat(np.array(self.column, dtype=np.int64) - 1, count)
         value = self._values(count)
+        # four bytes hold every row of a matrix that fits into memory
+        narrow: type = np.int32 if self.header.columns < 2**31 else np.int64
+        row = np.repeat(np.array(self.row, dtype=narrow) - 1, count) + _within(count, narrow)
+        column: NDArray[np.int64] = np.repeat(np.array(self.column, dtype=narrow) - 1, count)
         kept = (value != 0) | (row == column)
-        return row[kept], column[kept], value[kept]
+        if not np.all(kept):
+            row, column, value = row[kept], column[kept], value[kept]
+        return row, column, value
 
     def _values(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
         kind = np.dtype(f"{self.order}f{self.item}")
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         # records do not start at multiples of the size of a number, but at those of a word
-        start = np.repeat(np.array(self.first, dtype=np.int64), count) + self.item * within
+        start = _within(count, np.int64)
+        start *= self.item
+        start += np.repeat(np.array(self.first, dtype=np.int64), count)
         words = np.lib.stride_tricks.sliding_window_view(self.data, self.item)
         return np.ascontiguousarray(words[start]).view(kind)[:, 0].astype(np.float64)
+
+
+def _within(count: NDArray[np.int64], kind: type) -> NDArray[np.int64]:
+    """Place of every number in its string."""
+    total = int(count.sum())
+    first: NDArray[np.int64] = np.repeat((np.cumsum(count) - count).astype(kind), count)
+    return np.subtract(np.arange(total, dtype=kind), first, out=first)
 
 
 def _damaged(where: str) -> InputError:

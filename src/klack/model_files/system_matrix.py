@@ -142,26 +142,38 @@ def symmetric_matrix(
     below, above = bool(np.any(row > column)), bool(np.any(row < column))
     if not (below or above):
         return A, ("it is diagonal",)
-    if below and above and _has_both(row, column):
-        return _symmetrised(where, A)
+    if below and above:
+        turned = A.T.tocsr()
+        if _same_pattern(A, turned):
+            difference = A.data - turned.data
+            del turned
+            notes = _asymmetry_notes(where, A, difference)
+            A.data -= 0.5 * difference
+            return A, notes
+        if _has_both(A):
+            odd = csr_array(A - turned)
+            notes = _asymmetry_notes(where, A, np.asarray(odd.data))
+            return csr_array(A - 0.5 * odd), notes
     # also a triangle in the order of another program, which is none in ours
     A = csr_array(A + A.T.tocsr())
     A.setdiag(A.diagonal() / 2)
     return A, ("one triangle was stored",)
 
 
-def _has_both(row: NDArray[np.int64], column: NDArray[np.int64]) -> bool:
+def _has_both(A: csr_array) -> bool:
     """True if any pair (i, j) is stored together with (j, i)."""
-    off = row != column
-    low, high = np.minimum(row[off], column[off]), np.maximum(row[off], column[off])
-    pairs = np.sort(low.astype(np.int64) * (int(high.max()) + 1) + high)
-    return bool(np.any(pairs[1:] == pairs[:-1]))
+    stored = csr_array((np.ones(A.nnz, dtype=np.int8), A.indices, A.indptr), shape=A.shape)
+    return int(stored.multiply(stored.T.tocsr()).nnz) > int(np.count_nonzero(stored.diagonal()))
 
 
-def _symmetrised(where: str, A: csr_array) -> tuple[csr_array, tuple[str, ...]]:
-    difference = (A - A.T).tocsr()
+def _same_pattern(A: csr_array, B: csr_array) -> bool:
+    return bool(np.array_equal(A.indptr, B.indptr) and np.array_equal(A.indices, B.indices))
+
+
+def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) -> tuple[str, ...]:
+    """Say how far a matrix is from its transpose; refuse one that is far."""
     size = float(np.linalg.norm(A.data))
-    asymmetry = float(np.linalg.norm(difference.data)) / size if size else 0.0
+    asymmetry = float(np.linalg.norm(difference)) / size if size else 0.0
     if not asymmetry <= _LARGEST_ASYMMETRY:
         raise InputError(
             where,
@@ -170,10 +182,9 @@ def _symmetrised(where: str, A: csr_array) -> tuple[csr_array, tuple[str, ...]]:
             hint="write K and M of a linear elastic model without friction, follower loads or "
             "rotating frame; dampers have no place in them.",
         )
-    if asymmetry == 0.0:
-        return A, ()
-    notes = (f"asymmetry {asymmetry:.1g}, made symmetric",) if asymmetry > _SEEN_ASYMMETRY else ()
-    return csr_array(A - 0.5 * difference), notes
+    if asymmetry <= _SEEN_ASYMMETRY:
+        return ()
+    return (f"asymmetry {asymmetry:.1g}, made symmetric",)
 
 
 def _check_entries(
