@@ -317,29 +317,55 @@ def pair_model(
     axial = np.zeros(body.mode_count)
     axial[: body.rigid_count] = body.rigid_axial
     rise = of_needle(axial)
-    spread = rise / body.mass
-    height = next((c.gap for c in system.contacts if c.body_a == moving), 0.0)
-    used = {contact.port_a for contact in system.contacts if contact.body_a == moving}
-    used |= {contact.port_b for contact in system.contacts if contact.body_b == moving}
-    inputs = [
+    inputs = (
         ModelInput(
             name="force",
             description=f"Outside force on {moving}, spread over its mass, positive along +z "
             "(opening)",
-            shape=spread,
-        )
-    ]
-    for port in body.port_names:
-        if port in used:
-            continue
-        inputs.append(
+            shape=rise / body.mass,
+        ),
+        *(
             ModelInput(
                 name=f"force_{identifier(port)}",
                 description=f"Outside force on {moving}.{port}, positive along +z (opening)",
                 shape=of_needle(system.shape(moving, port)),
             )
-        )
-    outputs = (
+            for port in _open_ports(system, moving)
+        ),
+    )
+    return ModalModel(
+        name=identifier(name),
+        kind="pair",
+        omega=flat.omega,
+        damping=flat.damping,
+        mode_names=tuple(text for member in system.bodies for text in _mode_names(member)),
+        start=rest,
+        start_velocity=np.asarray(flat.v, dtype=float),
+        rise=rise,
+        constant=constant,
+        inputs=inputs,
+        outputs=_motion(system, moving, rise / body.mass, rest),
+        contacts=_contacts(system, contact_names, films, flat.rows, rest),
+        residual_compliance=np.zeros((len(inputs), len(inputs))),
+        step=step,
+        duration=duration,
+        provenance=provenance,
+    )
+
+
+def _open_ports(system: ReducedSystem, moving: str) -> tuple[str, ...]:
+    """Ports of the moving body that no contact uses."""
+    used = {contact.port_a for contact in system.contacts if contact.body_a == moving}
+    used |= {contact.port_b for contact in system.contacts if contact.body_b == moving}
+    return tuple(port for port in system.body(moving).port_names if port not in used)
+
+
+def _motion(
+    system: ReducedSystem, moving: str, spread: NDArray[np.float64], rest: NDArray[np.float64]
+) -> tuple[ModelOutput, ...]:
+    """Lift and velocity of the centre of mass."""
+    height = next((c.gap for c in system.contacts if c.body_a == moving), 0.0)
+    return (
         ModelOutput(
             name="lift",
             description=f"Height of {moving} (centre of mass) above first touch",
@@ -354,35 +380,25 @@ def pair_model(
             shape=spread,
         ),
     )
-    names = [identifier(text) for text in contact_names]
-    contacts = tuple(
+
+
+def _contacts(
+    system: ReducedSystem,
+    names: Sequence[str],
+    films: Sequence[FilmRow | None],
+    rows: NDArray[np.float64],
+    rest: NDArray[np.float64],
+) -> tuple[ModelContact, ...]:
+    return tuple(
         ModelContact(
-            name=names[c],
-            shape=flat.rows[c],
-            gap=contact.gap - float(flat.rows[c] @ rest),
+            name=identifier(names[c]),
+            shape=rows[c],
+            gap=contact.gap - float(rows[c] @ rest),
             law=contact.law,
             series_compliance=contact.series_compliance,
             film=films[c] if films else None,
         )
         for c, contact in enumerate(system.contacts)
-    )
-    return ModalModel(
-        name=identifier(name),
-        kind="pair",
-        omega=flat.omega,
-        damping=flat.damping,
-        mode_names=tuple(text for member in system.bodies for text in _mode_names(member)),
-        start=rest,
-        start_velocity=np.asarray(flat.v, dtype=float),
-        rise=rise,
-        constant=constant,
-        inputs=tuple(inputs),
-        outputs=outputs,
-        contacts=contacts,
-        residual_compliance=np.zeros((len(inputs), len(inputs))),
-        step=step,
-        duration=duration,
-        provenance=provenance,
     )
 
 

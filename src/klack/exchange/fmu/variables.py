@@ -5,7 +5,7 @@ states (displacements of all modes, then velocities), their derivatives.  Versio
 adds the time after the last of them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -75,8 +75,22 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
     Parameters: ``internal_step`` [s] and, of a pair, ``start_velocity`` [m/s] and ``start_rise``
     [m] of the moving body.  A name that comes again gets ``_2``, ``_3`` and so on.
     """
-    variables = [
-        FmuVariable(
+    variables = _distinct(
+        [
+            *_inputs(model),
+            *_outputs(model),
+            *_contact_outputs(model),
+            *_parameters(model),
+            *_states(model),
+        ]
+    )
+    first = len(variables) - 2 * model.mode_count
+    return (*variables, *_rates(variables[first:], first))
+
+
+def _inputs(model: ModalModel) -> Iterator[FmuVariable]:
+    for item in model.inputs:
+        yield FmuVariable(
             name=item.name,
             description=item.description,
             unit="N",
@@ -84,23 +98,25 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
             start=0.0,
             nominal=_USUAL_FORCE,
         )
-        for item in model.inputs
-    ]
+
+
+def _outputs(model: ModalModel) -> Iterator[FmuVariable]:
     for output in model.outputs:
         moved = output.quantity == "displacement"
-        variables.append(
-            FmuVariable(
-                name=output.name,
-                description=output.description,
-                unit="m" if moved else "m/s",
-                causality="output",
-                nominal=_USUAL_WAY if moved else 1.0,
-            )
+        yield FmuVariable(
+            name=output.name,
+            description=output.description,
+            unit="m" if moved else "m/s",
+            causality="output",
+            nominal=_USUAL_WAY if moved else 1.0,
         )
+
+
+def _contact_outputs(model: ModalModel) -> Iterator[FmuVariable]:
     for i, contact in enumerate(model.contacts):
         end, where = contact_suffix(model, i), f"at {contact.name}"
-        rows = [("gap", f"Gap between the bodies {where}, below zero where they are pressed", "m")]
-        rows += [
+        rows = [
+            ("gap", f"Gap between the bodies {where}, below zero where they are pressed", "m"),
             ("contact_force", f"Contact force {where}", "N"),
             ("mean_contact_force", f"Mean contact force {where} over a communication step", "N"),
             ("peak_contact_force", f"Largest contact force {where} in a communication step", "N"),
@@ -109,89 +125,81 @@ def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
             rows.append(("film_force", f"Force of the squeeze film {where}, + apart", "N"))
         for name, words, unit in rows:
             force = unit == "N"
-            variables.append(
-                FmuVariable(
-                    name=f"{name}{end}",
-                    description=words,
-                    unit=unit,
-                    causality="output",
-                    minimum=0.0 if force and "contact" in name else None,
-                    nominal=_USUAL_FORCE if force else _USUAL_WAY,
-                )
+            yield FmuVariable(
+                name=f"{name}{end}",
+                description=words,
+                unit=unit,
+                causality="output",
+                minimum=0.0 if force and "contact" in name else None,
+                nominal=_USUAL_FORCE if force else _USUAL_WAY,
             )
-    variables.append(
-        FmuVariable(
-            name="internal_step",
-            description="Largest internal time step of co-simulation",
-            unit="s",
-            causality="parameter",
-            variability="fixed",
-            start=model.step,
-            minimum=1e-10,
-            maximum=1e-3,
-            nominal=model.step,
-        )
+
+
+def _parameters(model: ModalModel) -> Iterator[FmuVariable]:
+    yield FmuVariable(
+        name="internal_step",
+        description="Largest internal time step of co-simulation",
+        unit="s",
+        causality="parameter",
+        variability="fixed",
+        start=model.step,
+        minimum=1e-10,
+        maximum=1e-3,
+        nominal=model.step,
     )
-    if model.kind == "pair":
-        speed = float(model.rise @ model.start_velocity) / float(model.rise @ model.rise)
-        variables += [
-            FmuVariable(
-                name="start_velocity",
-                description="Velocity of the moving body at the start, + opening",
-                unit="m/s",
-                causality="parameter",
-                variability="fixed",
-                start=speed,
-                minimum=-100.0,
-                maximum=100.0,
-                nominal=1.0,
-            ),
-            FmuVariable(
-                name="start_rise",
-                description="Way of the moving body along +z before the start, from where the case "
-                "puts it",
-                unit="m",
-                causality="parameter",
-                variability="fixed",
-                start=0.0,
-                minimum=-1e-2,
-                maximum=1e-2,
-                nominal=1e-6,
-            ),
-        ]
-    first = len(variables)
-    m = model.mode_count
-    for kind, unit, start, nominal in zip(
-        ("q", "v"),
-        ("m.kg1/2", "m.kg1/2/s"),
-        (model.start, model.start_velocity),
-        _usual_states(model),
-        strict=True,
+    if model.kind != "pair":
+        return
+    yield FmuVariable(
+        name="start_velocity",
+        description="Velocity of the moving body at the start, + opening",
+        unit="m/s",
+        causality="parameter",
+        variability="fixed",
+        start=float(model.rise @ model.start_velocity) / float(model.rise @ model.rise),
+        minimum=-100.0,
+        maximum=100.0,
+        nominal=1.0,
+    )
+    yield FmuVariable(
+        name="start_rise",
+        description="Way of the moving body along +z before the start, from where the case puts it",
+        unit="m",
+        causality="parameter",
+        variability="fixed",
+        start=0.0,
+        minimum=-1e-2,
+        maximum=1e-2,
+        nominal=1e-6,
+    )
+
+
+def _states(model: ModalModel) -> Iterator[FmuVariable]:
+    way, speed = _usual_states(model)
+    for kind, word, unit, start, nominal in (
+        ("q", "displacement", "m.kg1/2", model.start, way),
+        ("v", "velocity", "m.kg1/2/s", model.start_velocity, speed),
     ):
-        variables += [
-            FmuVariable(
+        for i in range(model.mode_count):
+            yield FmuVariable(
                 name=f"{kind}_{model.mode_names[i]}",
-                description=f"Modal {'displacement' if kind == 'q' else 'velocity'}, "
-                f"{model.frequencies[i]:.6g} Hz",
+                description=f"Modal {word}, {model.frequencies[i]:.6g} Hz",
                 unit=unit,
                 causality="local",
                 start=float(start[i]),
                 nominal=float(nominal[i]),
             )
-            for i in range(m)
-        ]
-    variables = _distinct(variables)
-    variables += [
-        FmuVariable(
+
+
+def _rates(states: Sequence[FmuVariable], first: int) -> Iterator[FmuVariable]:
+    """Derivatives of the states, whose value references count from ``first``."""
+    for i, state in enumerate(states):
+        yield FmuVariable(
             name=f"der({state.name})",
             description=f"Rate of {state.name}",
             unit="m.kg1/2/s" if state.name.startswith("q_") else "m.kg1/2/s2",
             causality="local",
             derivative_of=first + i,
         )
-        for i, state in enumerate(variables[first:])
-    ]
-    return tuple(variables)
 
 
 def _usual_states(model: ModalModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
