@@ -15,14 +15,12 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from klack.elasticity.assembly import assemble
+from klack.elasticity.rigid_motions import held_dofs, motions_left_free, rigid_motions
 from klack.errors import InputError
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
 
 __all__ = ["ElasticBody", "elastic_body"]
-
-_AXIS = 1e-9
-_SUPPORT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +94,14 @@ class ElasticBody:
     @cached_property
     def is_fixed(self) -> bool:
         """True when the supports hold the body (it has no rigid modes)."""
-        return bool(np.any(_rigid_motions(self)[self.fixed]))
+        return bool(np.any(rigid_motions(self.mesh, self.centre_of_mass)[self.fixed]))
 
     @cached_property
     def rigid_modes(self) -> NDArray[np.float64]:
         """Rigid modes, shape (n_dof, 6 | 1 | 0) [1/sqrt(kg)], orthonormal in the mass."""
         if self.is_fixed:
             return np.zeros((self.dof_count, 0))
-        R = _rigid_motions(self)
+        R = rigid_motions(self.mesh, self.centre_of_mass)
         for _ in range(2):  # the second pass removes the round-off of the first
             L = np.linalg.cholesky(R.T @ (self.M @ R))
             R = np.linalg.solve(L, R.T).T.astype(np.float64)
@@ -137,31 +135,11 @@ def elastic_body(
     _check_one_piece(name, mesh)
     nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
     _check_nodes(name, mesh, nodes)
-    d = mesh.dimension
-    fixed = (d * nodes[:, None] + np.arange(d)).ravel()
-    if d == 2:
-        on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= _AXIS * np.ptp(mesh.points))
-        fixed = np.union1d(fixed, 2 * on_axis)
     K, M = assemble(mesh, materials)
-    body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=fixed)
+    body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=held_dofs(mesh, nodes))
     if nodes.size:
         _check_support(body)
     return body
-
-
-def _rigid_motions(body: ElasticBody) -> NDArray[np.float64]:
-    """Build translations and rotations about the centre of mass, of length 1 at the rim."""
-    x = body.mesh.points - body.centre_of_mass
-    if body.dimension == 2:
-        motion = np.zeros((len(x), 2, 1))
-        motion[:, 1, 0] = 1.0
-        return motion.reshape(-1, 1)
-    motion = np.zeros((len(x), 3, 6))
-    motion[:, :, :3] = np.eye(3)
-    for k in range(3):
-        motion[:, :, 3 + k] = np.cross(np.eye(3)[k], x)
-    motion[:, :, 3:] /= np.linalg.norm(x, axis=1).max()
-    return motion.reshape(-1, 6)
 
 
 def _check_nodes(name: str, mesh: Mesh, nodes: NDArray[np.int64]) -> None:
@@ -175,9 +153,8 @@ def _check_nodes(name: str, mesh: Mesh, nodes: NDArray[np.int64]) -> None:
 
 
 def _check_support(body: ElasticBody) -> None:
-    motions = _rigid_motions(body)
-    held = np.linalg.svd(motions[body.fixed], compute_uv=False)
-    left = motions.shape[1] - int(np.sum(held > _SUPPORT * held[0]))
+    motions = rigid_motions(body.mesh, body.centre_of_mass)
+    left = motions_left_free(motions[body.fixed])
     if left:
         raise InputError(
             f"body '{body.name}': fixed_nodes",

@@ -29,6 +29,8 @@ from klack.elasticity.plausible_material import (
     require_plausible_material,
 )
 from klack.elasticity.rigid_motions import (
+    held_dofs,
+    motions_left_free,
     require_rigid_motions,
     rigid_motions,
     without_rigid_strain,
@@ -187,14 +189,9 @@ def checked_body(
         rigid motion free.
     """
     where = f"body '{name}': matrices" if where is None else where
-    d = mesh.dimension
-    nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
-    fixed = (d * nodes[:, None] + np.arange(d)).ravel()
+    fixed = held_dofs(mesh, np.unique(np.fromiter(fixed_nodes, dtype=np.int64)))
     if absent is not None:
         fixed = np.union1d(fixed, absent)
-    if d == 2:
-        on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.ptp(mesh.points))
-        fixed = np.union1d(fixed, 2 * on_axis)
     _require_sizes(where, K, M, mesh)
     held = rigid_motions(mesh)[fixed]
     if np.any(held):
@@ -302,8 +299,7 @@ def _require_one_mass(
 
 
 def _require_support(name: str, held: NDArray[np.float64]) -> None:
-    sizes = np.linalg.svd(held, compute_uv=False)
-    left = held.shape[1] - int(np.sum(sizes > 1e-4 * sizes[0]))
+    left = motions_left_free(held)
     if left:
         raise InputError(
             f"body '{name}': supports",

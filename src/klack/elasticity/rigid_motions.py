@@ -7,7 +7,16 @@ from scipy.sparse import csr_array
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 
-__all__ = ["require_rigid_motions", "rigid_motions", "without_rigid_strain"]
+__all__ = [
+    "held_dofs",
+    "motions_left_free",
+    "require_rigid_motions",
+    "rigid_motions",
+    "without_rigid_strain",
+]
+
+_AXIS = 1e-9
+_SUPPORT = 1e-4
 
 _LARGEST_FORCE = 1e-5
 _MOST_TIED = 0.5
@@ -15,12 +24,34 @@ _NAMED = 4
 _QUIET = 0.05  # [Hz] rigid frequency that needs no cure
 
 
-def rigid_motions(mesh: Mesh) -> NDArray[np.float64]:
-    """Translations and rotations about the middle of the nodes, shape (n_dof, 6 | 1).
+def held_dofs(mesh: Mesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Degrees of freedom of held nodes; on the axis of a body of revolution r is held as well."""
+    d = mesh.dimension
+    held = (d * nodes[:, None] + np.arange(d)).ravel()
+    if d == 2:
+        on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= _AXIS * np.ptp(mesh.points))
+        held = np.union1d(held, 2 * on_axis)
+    return held
+
+
+def motions_left_free(held: NDArray[np.float64]) -> int:
+    """How many rigid motions a support leaves free, from their values where it holds."""
+    sizes = np.linalg.svd(held, compute_uv=False)
+    return held.shape[1] - int(np.sum(sizes > _SUPPORT * sizes[0]))
+
+
+def rigid_motions(mesh: Mesh, about: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Translations, and rotations about a place, shape (n_dof, 6 | 1).
 
     Rotations move the farthest node by 1.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    about : array, shape (dimension,), optional [m]
+        The middle of the nodes without.
     """
-    x = mesh.points - mesh.points.mean(axis=0)
+    x = mesh.points - (mesh.points.mean(axis=0) if about is None else about)
     if mesh.dimension == 2:
         motion = np.zeros((len(x), 2, 1))
         motion[:, 1, 0] = 1.0
