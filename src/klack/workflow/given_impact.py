@@ -4,7 +4,7 @@ There is no static contact problem to solve, hence no consistent law and no esti
 the law is the one of the case, and what the modes miss of both bodies lies in series with it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from time import perf_counter
@@ -13,17 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import __version__
-from klack.acoustics.comparison import compare_histories
 from klack.case.given_consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import HertzLaw, LinearLaw
-from klack.contact.restitution import Deviation
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.simulation.impact import simulate_impact
 from klack.workflow.given_pair import GivenPair, build_given_pair
-from klack.workflow.levels import elastic_count, level_result, lumped_level
+from klack.workflow.levels import deviations, elastic_count, level_result, lumped_level
 from klack.workflow.progress import Progress
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.study import ContactSummary, ImpactStudy, LawSummary, LevelResult
@@ -86,7 +84,7 @@ def run_given_impact(
         law=_law(pair, peak),
         levels=results,
         reference=reference,
-        deviations=_deviations(results, reference),
+        deviations=deviations(results, reference),
         warnings=tuple(notes),
     )
 
@@ -175,11 +173,3 @@ def _indentation(law: LinearLaw | HertzLaw, force: NDArray[np.float64]) -> NDArr
     if isinstance(law, LinearLaw):
         return force / law.stiffness
     return (force / law.coefficient) ** (1.0 / law.exponent)
-
-
-def _deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
-    return {
-        name: compare_histories(results[reference].history, result.history)
-        for name, result in results.items()
-        if name != reference
-    }

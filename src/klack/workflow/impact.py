@@ -33,6 +33,7 @@ from klack.workflow.levels import (
     PARTICIPATION_POOL,
     ReducedPair,
     classical_stiffness,
+    deviations,
     elastic_count,
     first_stiffness,
     mode_pools,
@@ -167,7 +168,7 @@ def run_impact(
         law=_law_summary(own, classical, peak),
         levels=results,
         reference=reference,
-        deviations=_deviations(results, reference),
+        deviations=deviations(results, reference),
         transfer=transfer,
         sections=sections,
         warnings=tuple(notes),
@@ -272,14 +273,6 @@ def _law_words(pair: ReducedPair) -> str:
     if isinstance(pair.law, LinearLaw):
         return f"{pair.law.stiffness / 1e6:.4g} N/um"
     return "Hertz law"
-
-
-def _deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
-    return {
-        name: compare_histories(results[reference].history, result.history)
-        for name, result in results.items()
-        if name != reference
-    }
 
 
 def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPicture, ...]:

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.comparison import compare_histories
 from klack.case.schema import (
     Case,
     HertzLocalLaw,
@@ -24,7 +25,7 @@ from klack.contact.laws import (
     gonthier_coefficient,
 )
 from klack.contact.local_law import LocalLaw, consistent_law
-from klack.contact.restitution import measure_impact
+from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.submodel import LocalStiffness, local_stiffness
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
@@ -38,7 +39,7 @@ from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 from klack.transient.full_order import simulate_full_order
-from klack.transient.result import FullOrderResult
+from klack.transient.result import FullOrderResult, Snapshots
 from klack.workflow.damping_choice import damping_of
 from klack.workflow.pressure import pressure_record
 from klack.workflow.problem import ContactProblem
@@ -51,6 +52,7 @@ __all__ = [
     "ReducedPair",
     "classical_stiffness",
     "damping_of",
+    "deviations",
     "elastic_count",
     "first_stiffness",
     "hertz_coefficient",
@@ -66,6 +68,7 @@ __all__ = [
     "run_lumped",
     "run_reduced",
     "selection_of",
+    "simulate_in_full",
     "static_curve",
 ]
 
@@ -406,6 +409,42 @@ def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
     )
 
 
+def simulate_in_full(
+    problem: ContactProblem,
+    *,
+    progress: Progress,
+    threads: int | None,
+    longest_period: float = 0.0,
+    snapshots: Snapshots | None = None,
+) -> FullOrderResult:
+    """Move the bodies of a case with every degree of freedom.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    progress : callable
+    threads : int or None
+    longest_period : float [s]
+    snapshots : Snapshots, optional
+        Both as in :func:`klack.transient.full_order.simulate_full_order`.
+    """
+    case, pair = problem.case, problem.pair
+    progress("full order", 0.0)
+    return simulate_full_order(
+        pair.upper,
+        pair.lower,
+        problem.space,
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.full_step,
+        axial_force=-case.motion.closing_force,
+        longest_period=longest_period,
+        threads=threads or 2,
+        progress=lambda fraction: progress("full order", fraction),
+        snapshots=snapshots,
+    )
+
+
 def run_full(
     problem: ContactProblem,
     pools: Mapping[str, Modes],
@@ -415,19 +454,11 @@ def run_full(
 ) -> tuple[LevelResult, FullOrderResult]:
     """Impact with every degree of freedom."""
     case, pair = problem.case, problem.pair
-    closing = case.motion.force + (case.motion.spring.preload if case.motion.spring else 0.0)
-    progress("full order", 0.0)
-    result = simulate_full_order(
-        pair.upper,
-        pair.lower,
-        problem.space,
-        speed=case.motion.speed,
-        duration=case.run.duration,
-        step=case.run.full_step,
-        axial_force=-closing,
+    result = simulate_in_full(
+        problem,
         longest_period=_longest_period(pools[pair.upper.name]),
-        threads=threads or 2,
-        progress=lambda fraction: progress("full order", fraction),
+        progress=progress,
+        threads=threads,
     )
     history = replace(
         result.history,
@@ -518,6 +549,15 @@ def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
     return {
         name: ByParticipation(count, PARTICIPATION_POOL)
         for name, count in zip(pair_names, _PARTICIPATING, strict=True)
+    }
+
+
+def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
+    """Lay every level over the reference."""
+    return {
+        name: compare_histories(results[reference].history, result.history)
+        for name, result in results.items()
+        if name != reference
     }
 
 

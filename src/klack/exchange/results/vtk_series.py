@@ -20,8 +20,8 @@ from klack.exchange.results.naming import file_stems
 from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.exchange.results.whole_file import whole_files
-from klack.transient.full_order import simulate_full_order
 from klack.transient.result import MotionOfBody, Snapshots
+from klack.workflow.levels import simulate_in_full
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 
@@ -141,23 +141,14 @@ def _fields(stress: StressField | None, body: MotionOfBody) -> dict[str, NDArray
 def _run_full(
     problem: ContactProblem, film: _Film, frames: int, progress: Progress, threads: int | None
 ) -> None:
-    case, pair = problem.case, problem.pair
+    run = problem.case.run
     problem.close()
-    closing = case.motion.force + (case.motion.spring.preload if case.motion.spring else 0.0)
-    progress("full order", 0.0)
-    simulate_full_order(
-        pair.upper,
-        pair.lower,
-        problem.space,
-        speed=case.motion.speed,
-        duration=case.run.duration,
-        step=case.run.full_step,
-        axial_force=-closing,
-        threads=threads or 2,
-        progress=lambda fraction: progress("full order", fraction),
-        snapshots=Snapshots(
-            steps=_instants(case.run.duration, case.run.full_step, frames), receive=film.add
-        ),
+    steps = _instants(run.duration, run.full_step, frames)
+    simulate_in_full(
+        problem,
+        progress=progress,
+        threads=threads,
+        snapshots=Snapshots(steps=steps, receive=film.add),
     )
 
 
