@@ -63,7 +63,6 @@ def data_header(model: ModalModel, guid: str) -> str:
         f"#define KLACK_INPUTS {len(model.inputs)}",
         f"#define KLACK_OUTPUTS {len(model.outputs)}",
         f"#define KLACK_CONTACTS {len(model.contacts)}",
-        f"#define KLACK_EVENTS {len(model.contacts)}",
         f"#define KLACK_FILMS {sum(film is not None for film in films)}",
         f"#define KLACK_PAIR {int(model.kind == 'pair')}",
         f"#define KLACK_VARIABLES {len(variables)}",
