@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
-from klack.exchange.results.whole_file import whole_files
 from klack.mesh.mesh import ElementBlock, Mesh
 from klack.verification.lattice import lattice_mesh
+from klack.whole_file import whole_files
 
 SOLIDS = ("tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15")
 PLANES = ("tri3", "tri6", "quad4", "quad8")

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from klack.errors import InputError
+from klack.whole_file import whole_files
 
 __all__ = ["listing", "require_folder", "require_json_target", "staged_folder", "write_json"]
 
@@ -73,31 +73,13 @@ def staged_folder(folder: Path) -> Iterator[Path]:
 
     What stands in ``folder`` under the same names is replaced, everything else there stays.
     """
-    made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
-    stage = folder / f".new.{os.getpid()}"
-    try:
-        stage.mkdir(parents=True)
-        yield stage
-        for item in sorted(stage.iterdir()):
-            _replace(item, folder / item.name)
-    except OSError as error:
+
+    def refuse(path: Path, error: OSError) -> InputError:
         reason = error.strerror or str(error)
-        raise _refuse("--out", folder, f"an error: {reason}", "a folder to write to") from error
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        for path in made:  # innermost first; stays if the results are inside
-            try:
-                path.rmdir()
-            except OSError:
-                break
+        return _refuse("--out", path, f"an error: {reason}", "a folder to write to")
 
-
-def _replace(new: Path, target: Path) -> None:
-    """Move a file or folder to its place; a folder there is put aside first."""
-    aside = new.with_name(f"old.{target.name}")
-    if target.is_dir() and not target.is_symlink():
-        target.rename(aside)
-    os.replace(new, target)
+    with whole_files(folder, refuse) as stage:
+        yield stage
 
 
 def _refuse(option: str, path: Path, got: str, expected: str) -> InputError:

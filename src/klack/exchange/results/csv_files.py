@@ -7,7 +7,7 @@ from pathlib import Path
 
 from klack.exchange.results.naming import file_stems
 from klack.exchange.results.table import ResultAxis, ResultChannel, ResultTable
-from klack.exchange.results.whole_file import whole_files
+from klack.whole_file import whole_files
 
 __all__ = ["write_csv"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from klack.errors import MissingExtraError
 from klack.exchange.results.naming import identifiers
 from klack.exchange.results.table import ResultRun, ResultTable
-from klack.exchange.results.whole_file import whole_file
+from klack.whole_file import whole_file
 
 __all__ = ["write_netcdf"]
 

@@ -19,8 +19,8 @@ from klack.errors import InputError
 from klack.exchange.results.naming import file_stems
 from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
-from klack.exchange.results.whole_file import whole_files
 from klack.transient.result import MotionOfBody, Snapshots
+from klack.whole_file import whole_files
 from klack.workflow.levels import simulate_in_full
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent

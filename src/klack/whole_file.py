@@ -2,13 +2,15 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from klack.errors import InputError
 
 __all__ = ["whole_file", "whole_files"]
+
+Refusal = Callable[[Path, OSError], InputError]
 
 
 @contextmanager
@@ -33,29 +35,47 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_files(folder: Path) -> Iterator[Path]:
+def whole_files(folder: Path, refuse: Refusal | None = None) -> Iterator[Path]:
     """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
 
-    Files and folders of the same names are replaced, everything else in ``folder`` stays.
+    Files and folders of the same names are replaced, everything else in ``folder`` stays.  Folders
+    that were made for it go again where nothing came into them.
+
+    Parameters
+    ----------
+    folder : Path
+    refuse : callable, optional
+        Turns the error of the system into that of the caller.
 
     Raises
     ------
     InputError
         If the place cannot be written to.
     """
+    made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
     stage = folder / f".new.{os.getpid()}"
     try:
         stage.mkdir(parents=True)
         yield stage
         for item in sorted(stage.iterdir()):
-            target = folder / item.name
-            if target.is_dir() and not target.is_symlink():
-                target.rename(stage / f"old.{item.name}")
-            item.replace(target)
+            _replace(item, folder / item.name)
     except OSError as error:
-        raise _refuse(folder, error) from error
+        raise (refuse or _refuse)(folder, error) from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+        for path in made:  # innermost first; stays if the results are inside
+            try:
+                path.rmdir()
+            except OSError:
+                break
+
+
+def _replace(new: Path, target: Path) -> None:
+    """Move a file or folder to its place; a folder there is put aside first."""
+    aside = new.with_name(f"old.{target.name}")
+    if target.is_dir() and not target.is_symlink():
+        target.rename(aside)
+    os.replace(new, target)
 
 
 def _refuse(path: Path, error: OSError) -> InputError:
