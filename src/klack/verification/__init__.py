@@ -1,6 +1,14 @@
 """Exact and published cases that klack checks itself against."""
 
-from klack.verification.check import Check, compare
+from klack.verification.check import LARGEST_HEADROOM, Check, ComparedCurve, compare
 from klack.verification.registry import GROUPS, iterate_checks, run_checks
 
-__all__ = ["GROUPS", "Check", "compare", "iterate_checks", "run_checks"]
+__all__ = [
+    "GROUPS",
+    "LARGEST_HEADROOM",
+    "Check",
+    "ComparedCurve",
+    "compare",
+    "iterate_checks",
+    "run_checks",
+]

@@ -1,8 +1,43 @@
 """One comparison of a computed number with a known one."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-__all__ = ["Check", "compare"]
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # the command line names the groups and must start quickly
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["LARGEST_HEADROOM", "Check", "ComparedCurve", "compare"]
+
+LARGEST_HEADROOM = 100.0
+"""A tolerance that is more than so many times the deviation needs a reason."""
+
+_ROUND_OFF = 1e-15  # a few units in the last place; no deviation counts for less
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ComparedCurve:
+    """The whole curve of which a check compares one number.
+
+    Parameters
+    ----------
+    x_label, y_label : str
+        With the unit: ``"time [us]"``.
+    expected : tuple of two arrays, shapes (n,)
+        Abscissae and values of the known curve (few points where a table is quoted).
+    computed : tuple of two arrays, shapes (m,)
+        The same of klack, on its own abscissae.
+    x_log, y_log : bool
+    """
+
+    x_label: str
+    y_label: str
+    expected: tuple[NDArray[np.float64], NDArray[np.float64]]
+    computed: tuple[NDArray[np.float64], NDArray[np.float64]]
+    x_log: bool = False
+    y_log: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +55,11 @@ class Check:
         Largest accepted magnitude of ``deviation``.
     source : str
         Author, year, equation or table; or the closed formula.
+    reason : str
+        Why the tolerance is as wide as it is, where :attr:`headroom` is above
+        :data:`LARGEST_HEADROOM`: the digits of a printed table, the scatter of a standard.
+    curve : ComparedCurve, optional
+        Where the number belongs to a curve.
     """
 
     group: str
@@ -29,11 +69,26 @@ class Check:
     deviation: float
     tolerance: float
     source: str
+    reason: str = ""
+    curve: ComparedCurve | None = None
 
     @property
     def passed(self) -> bool:
         """True when the deviation is within the tolerance (nan fails)."""
         return bool(abs(self.deviation) <= self.tolerance)
+
+    @property
+    def headroom(self) -> float:
+        """How many times the present deviation the tolerance lets pass.
+
+        Deviations below round-off count as round-off; nan for a check that did not run.
+        """
+        return float(self.tolerance / max(abs(self.deviation), _ROUND_OFF))
+
+    @property
+    def is_wide(self) -> bool:
+        """True where :data:`LARGEST_HEADROOM` is passed without a reason."""
+        return self.headroom > LARGEST_HEADROOM and not self.reason
 
 
 def compare(
@@ -45,6 +100,8 @@ def compare(
     tolerance: float,
     source: str,
     absolute: bool = False,
+    reason: str = "",
+    curve: ComparedCurve | None = None,
 ) -> Check:
     """Build a :class:`Check`; relative unless ``absolute`` or the expected value is zero."""
     difference = computed - expected
@@ -57,4 +114,6 @@ def compare(
         deviation=float(deviation),
         tolerance=tolerance,
         source=source,
+        reason=reason,
+        curve=curve,
     )
