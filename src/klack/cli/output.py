@@ -11,24 +11,35 @@ from typing import Any
 from klack.errors import InputError
 from klack.whole_file import whole_files
 
-__all__ = ["listing", "require_folder", "require_json_target", "staged_folder", "write_json"]
+__all__ = [
+    "listing",
+    "require_file_target",
+    "require_folder",
+    "require_json_target",
+    "staged_folder",
+    "write_json",
+]
 
 _MOST_NAMES = 8
 
 
 def require_json_target(path: Path | None) -> None:
     """Refuse a target of ``--json`` that cannot be written, before the long work begins."""
-    if path is None or str(path) == "-":
+    if str(path) != "-":
+        require_file_target("--json", path)
+
+
+def require_file_target(option: str, path: Path | None) -> None:
+    """Refuse a file that cannot be written, before the long work begins."""
+    if path is None:
         return
     if path.is_dir():
-        raise _refuse("--json", path, "a folder", "the name of a file")
+        raise _refuse(option, path, "a folder", "the name of a file")
     if not path.absolute().parent.is_dir():
-        raise _refuse(
-            "--json", path, "a file in a folder that does not exist", "an existing folder"
-        )
+        raise _refuse(option, path, "a file in a folder that does not exist", "an existing folder")
     target = path if path.exists() else path.absolute().parent
     if not os.access(target, os.W_OK):
-        raise _refuse("--json", path, "a place that may not be written to", "a writable file")
+        raise _refuse(option, path, "a place that may not be written to", "a writable file")
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:

@@ -1,21 +1,20 @@
 """``klack verify``: klack against exact and published results."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from klack.cli.options import Json, Quiet
-from klack.cli.output import require_json_target, write_json
+from klack.cli.output import require_file_target, require_json_target, write_json
 from klack.cli.progress import show_progress
-from klack.cli.tables import print_table
+from klack.cli.verify_text import print_checks, print_groups
 from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:
     from klack.verification import Check
 
 __all__ = ["verify"]
-
-_COLUMNS = ("group", "check", "source", "verdict", "expected", "computed", "deviation", "tolerance")
 
 
 def verify(
@@ -29,38 +28,46 @@ def verify(
             help=f"{', '.join(GROUPS)}. [default: all]",
         ),
     ] = None,
+    html: Annotated[
+        Path | None,
+        Parameter(name="--html", help="Write a page of all checks with their curves to this file."),
+    ] = None,
+    every: Annotated[
+        bool, Parameter(name="--all", negative="", help="Print every check, not only the worst.")
+    ] = False,
+    listing: Annotated[
+        bool, Parameter(name="--list", negative="", help="Say what each group covers, and stop.")
+    ] = False,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
     """Compare klack with exact and published results; exit code 1 if a check fails."""
+    if listing:
+        print_groups()
+        return 0
     from klack.verification import iterate_checks
+    from klack.verification.run_conditions import run_conditions
 
     require_json_target(json)
+    require_file_target("--html", html)
     wanted = tuple(group) if group else GROUPS
     checks: list[Check] = []
     with show_progress(quiet) as progress:
         for _, found in iterate_checks(wanted, started=lambda name: progress(name, 0.0)):
             checks += found
-    failed = sum(not check.passed for check in checks)
+        if html is not None:
+            from klack.verification.page import write_page
+
+            progress("page", 0.0)
+            write_page(html, checks, run_conditions())
     if not quiet:
-        title = f"{len(checks) - failed} of {len(checks)} checks passed"
-        print_table(title, _COLUMNS, map(_row, checks), left=4, to_stderr=str(json) == "-")
+        print_checks(checks, every=every, to_stderr=str(json) == "-")
+        if html is not None and str(json) != "-":
+            print(f"Page in {html}")
     if json is not None:
-        write_json(json, {"checks": [_numbers(check) for check in checks]})
-    return 1 if failed else 0
-
-
-def _row(check: "Check") -> tuple[str, ...]:
-    return (
-        check.group,
-        check.name,
-        check.source,
-        "ok" if check.passed else "FAILED",
-        f"{check.expected:.6g}",
-        f"{check.computed:.6g}",
-        f"{check.deviation:+.1e}",
-        f"{check.tolerance:.1e}",
-    )
+        about = run_conditions().words()
+        write_json(json, {"about": about, "checks": [_numbers(check) for check in checks]})
+    return 0 if all(check.passed for check in checks) else 1
 
 
 def _numbers(check: "Check") -> dict[str, Any]:
@@ -73,7 +80,11 @@ def _numbers(check: "Check") -> dict[str, Any]:
         "expected": finite(check.expected),
         "computed": finite(check.computed),
         "deviation": finite(check.deviation),
+        "deviation_unit": check.deviation_unit,
         "tolerance": check.tolerance,
+        "headroom": finite(check.headroom),
+        "wide": check.is_wide,
         "passed": check.passed,
         "source": check.source,
+        "reason": check.reason,
     }

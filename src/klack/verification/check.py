@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ __all__ = ["LARGEST_HEADROOM", "Check", "ComparedCurve", "compare"]
 
 LARGEST_HEADROOM = 100.0
 """A tolerance that is more than so many times the deviation needs a reason."""
+
+_UNIT = re.compile(r"\[([^\[\]]+)\]$")
 
 _ROUND_OFF = 1e-15  # a few units in the last place; no deviation counts for less
 
@@ -59,7 +62,9 @@ class Check:
         Why the tolerance is as wide as it is, where :attr:`headroom` is above
         :data:`LARGEST_HEADROOM`: the digits of a printed table, the scatter of a standard.
     curve : ComparedCurve, optional
-        Where the number belongs to a curve.
+        Where the number belongs to a curve; several checks may share one object.
+    is_absolute : bool
+        Whether ``deviation`` has the unit of the numbers.
     """
 
     group: str
@@ -71,11 +76,29 @@ class Check:
     source: str
     reason: str = ""
     curve: ComparedCurve | None = None
+    is_absolute: bool = False
 
     @property
     def passed(self) -> bool:
         """True when the deviation is within the tolerance (nan fails)."""
         return bool(abs(self.deviation) <= self.tolerance)
+
+    @property
+    def unit(self) -> str:
+        """What stands in brackets at the end of the name; empty for pure numbers.
+
+        >>> compare("a", "time [s]", expected=1, computed=1, tolerance=0, source="").unit
+        's'
+        """
+        found = _UNIT.search(self.name)
+        return "" if found is None or found[1] == "-" else found[1]
+
+    @property
+    def deviation_unit(self) -> str:
+        """``"relative"``, the unit of an absolute deviation, or else ``"absolute"``."""
+        if not self.is_absolute or "relative" in self.name or " over " in self.unit:
+            return "relative"
+        return self.unit or "absolute"
 
     @property
     def headroom(self) -> float:
@@ -105,7 +128,8 @@ def compare(
 ) -> Check:
     """Build a :class:`Check`; relative unless ``absolute`` or the expected value is zero."""
     difference = computed - expected
-    deviation = difference if absolute or expected == 0 else difference / abs(expected)
+    is_absolute = absolute or expected == 0
+    deviation = difference if is_absolute else difference / abs(expected)
     return Check(
         group=group,
         name=name,
@@ -116,4 +140,5 @@ def compare(
         source=source,
         reason=reason,
         curve=curve,
+        is_absolute=is_absolute,
     )

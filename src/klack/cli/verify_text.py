@@ -1,0 +1,99 @@
+"""Checks on the terminal: one line per group, and in full only what deserves a look.
+
+A check needs its name, its source and five numbers; side by side they do not fit into the 100
+columns of a terminal, and hundreds of rows hide the one that matters.  So the table has one row per
+group; what failed and what came closest to its tolerance follows in full; ``--all`` prints all
+checks in that form, and ``--html`` makes a table of them that can be searched.
+"""
+
+import sys
+from collections.abc import Iterator, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from klack.cli.tables import print_table
+from klack.verification.registry import COVERS
+
+if TYPE_CHECKING:
+    from klack.verification import Check
+
+__all__ = ["print_checks", "print_groups"]
+
+_COLUMNS = ("group", "verdict", "checks", "failed", "wide", "least headroom", "largest")
+_CLOSEST = 5
+_WIDTH = 100
+
+
+def print_groups() -> None:
+    """One sentence per group."""
+    for group, sentence in COVERS.items():
+        indent = " " * 14
+        print(fill(sentence, _WIDTH, initial_indent=f"{group:<14}", subsequent_indent=indent))
+
+
+def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
+    """Print the summary per group, then the failed checks and the closest, or all of them."""
+    from klack.verification.wording import summary
+
+    groups = dict.fromkeys(check.group for check in checks)
+    rows = [_row(group, [check for check in checks if check.group == group]) for group in groups]
+    print_table(f"{summary(checks)}\n", _COLUMNS, rows, left=2, to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for line in _all_lines(checks) if every else _worst_lines(checks):
+        print(line, file=stream)
+
+
+def _row(group: str, checks: Sequence["Check"]) -> tuple[str, ...]:
+    from klack.verification.wording import headroom_text
+
+    failed = sum(not check.passed for check in checks)
+    compared = [check for check in checks if check.tolerance > 0 and check.passed]
+    by_headroom = sorted(compared, key=lambda check: check.headroom)
+    return (
+        group,
+        "FAILED" if failed else "ok",
+        str(len(checks)),
+        str(failed),
+        str(sum(check.is_wide for check in checks)),
+        headroom_text(by_headroom[0]) if by_headroom else "",
+        headroom_text(by_headroom[-1]) if by_headroom else "",
+    )
+
+
+def _all_lines(checks: Sequence["Check"]) -> Iterator[str]:
+    for check in checks:
+        yield from _lines(check)
+
+
+def _worst_lines(checks: Sequence["Check"]) -> Iterator[str]:
+    for check in checks:
+        if not check.passed:
+            yield from _lines(check)
+    close = [check for check in checks if check.passed and check.tolerance > 0]
+    close.sort(key=lambda check: check.headroom)
+    if close:
+        yield "Closest to their tolerance (--all prints every check, --html makes a page):"
+    for check in close[:_CLOSEST]:
+        yield from _lines(check)
+
+
+def _lines(check: "Check") -> Iterator[str]:
+    from klack.verification.wording import (
+        deviation_text,
+        headroom_text,
+        number_text,
+        tolerance_text,
+    )
+
+    verdict = "ok" if check.passed else "FAILED"
+    name = f"{check.group}: {check.name}"
+    indent = " " * 8
+    yield fill(name, _WIDTH, initial_indent=f"{verdict:<8}", subsequent_indent=indent)
+    numbers = (
+        f"expected {number_text(check.expected)}, computed {number_text(check.computed)}, "
+        f"deviation {deviation_text(check)}, tolerance {tolerance_text(check)} "
+        f"({headroom_text(check)})"
+    )
+    yield fill(numbers, _WIDTH, initial_indent=indent, subsequent_indent=indent)
+    words = f"source: {check.source}" + (f"; {check.reason}" if check.reason else "")
+    yield fill(words, _WIDTH, initial_indent=indent, subsequent_indent=indent)
