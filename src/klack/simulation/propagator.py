@@ -112,29 +112,44 @@ def damping_loss(
     step : float [s]
     """
     w, z = np.asarray(omega, dtype=float), np.asarray(damping, dtype=float)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    fastest = float(np.max(w * np.maximum(1.0, 2.0 * z) * (z > 0.0), initial=0.0))
-    panels = max(1, int(np.ceil(fastest * step)))
-    width = step / panels
     forms = np.zeros((6, w.size))
-    for panel in range(panels):
-        for node, weight in zip(nodes, weights, strict=True):
-            P = modal_propagator(w, z, (panel + 0.5 * (node + 1.0)) * width)
-            rate = weight * 0.5 * width * 2.0 * z * w
-            forms[0] += rate * P.A21**2
-            forms[1] += rate * 2.0 * P.A21 * P.A22
-            forms[2] += rate * P.A22**2
-            forms[3] += rate * 2.0 * P.A21 * P.B2
-            forms[4] += rate * 2.0 * P.A22 * P.B2
-            forms[5] += rate * P.B2**2
+    lossy = (w > 0.0) & (z > 0.0)
+    if np.any(lossy):
+        forms[:, lossy] = _loss_forms(w[lossy], z[lossy], float(step))
     Q11, Q12, Q22, L1, L2, S = forms
     return DampingLoss(Q11=Q11, Q12=Q12, Q22=Q22, L1=L1, L2=L2, S=S)
+
+
+def _loss_forms(w: NDArray[np.float64], z: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Rows Q11, Q12, Q22, L1, L2, S of modes that all have damping."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    panels = max(1, int(np.ceil(np.max(w * np.maximum(1.0, 2.0 * z)) * step)))
+    width = step / panels
+    over = z >= 1.0
+    forms = np.zeros((6, w.size))
+    for panel in range(panels):
+        times = ((panel + 0.5 * (nodes + 1.0)) * width)[:, None]
+        A12, A22 = np.empty((2, nodes.size, w.size))  # what acts on the velocity; B2 is A12
+        for part, formula in ((~over, _underdamped), (over, _overdamped)):
+            if np.any(part):
+                _, A12[:, part], A22[:, part], _ = formula(w[part], z[part], times)
+        A21 = -(w**2) * A12
+        share = 0.5 * width * weights
+        forms[0] += share @ A21**2
+        forms[1] += share @ (2.0 * A21 * A22)
+        forms[2] += share @ A22**2
+        forms[3] += share @ (2.0 * A21 * A12)
+        forms[4] += share @ (2.0 * A22 * A12)
+        forms[5] += share @ A12**2
+    return forms * (2.0 * z * w)
 
 
 _Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
-def _underdamped(w: NDArray[np.float64], z: NDArray[np.float64], h: float) -> _Columns:
+def _underdamped(
+    w: NDArray[np.float64], z: NDArray[np.float64], h: float | NDArray[np.float64]
+) -> _Columns:
     wd = w * np.sqrt((1.0 - z) * (1.0 + z))
     e = np.exp(-z * w * h)
     s = h * np.sinc(wd * h / np.pi)  # sin(wd h)/wd, finite for zeta -> 1
@@ -144,7 +159,9 @@ def _underdamped(w: NDArray[np.float64], z: NDArray[np.float64], h: float) -> _C
     return e * (c + z * w * s), A12, e * (c - z * w * s), one_minus_A11 / w**2
 
 
-def _overdamped(w: NDArray[np.float64], z: NDArray[np.float64], h: float) -> _Columns:
+def _overdamped(
+    w: NDArray[np.float64], z: NDArray[np.float64], h: float | NDArray[np.float64]
+) -> _Columns:
     root = np.sqrt((z - 1.0) * (z + 1.0))
     slow, spread = -w / (z + root), 2.0 * w * root  # decay rates: slow and slow - spread
     e = np.exp(slow * h)
