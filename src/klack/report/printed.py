@@ -57,11 +57,11 @@ def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
     return stream.getvalue()
 
 
-def svg_chart(chart: Chart) -> bytes:
-    """Draw a chart with its legend above it."""
+def svg_chart(chart: Chart, *, width: float = _WIDTH) -> bytes:
+    """Draw a chart with its legend above it; ``width`` in inches, letters keep their size."""
     shares = [panel.share for panel in chart.panels]
     with rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 0.7 + 1.9 * sum(shares)), layout="constrained")
+        figure = Figure(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
         grid = figure.subplots(
             len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
         )[:, 0]

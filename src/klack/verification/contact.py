@@ -9,7 +9,7 @@ from klack.contact.local_law import consistent_law
 from klack.contact.pairing import face_geometry, project_to_surface
 from klack.contact.statics import StaticContact
 from klack.elasticity.statics import Flexibility
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.indentation import (
     STEEL,
     IndentationProblem,
@@ -59,6 +59,7 @@ def _hertz(static: StaticContact) -> list[Check]:
     at = int(np.argmin(np.abs(static.space.points[:, 0] - 0.5 * radius)))
     place = static.space.points[at, 0]
     pressure = static.pressures[-1, at] / static.space.area[at]
+    ladder, face = _force_curve(static), _pressure_curve(static, radius, peak)
     return [
         compare(
             _GROUP,
@@ -67,6 +68,7 @@ def _hertz(static: StaticContact) -> list[Check]:
             computed=force,
             tolerance=2e-3,
             source=source,
+            curve=ladder,
         ),
         compare(
             _GROUP,
@@ -75,6 +77,7 @@ def _hertz(static: StaticContact) -> list[Check]:
             computed=float(np.polyfit(*logs, 1)[0]),
             tolerance=2e-3,
             source=source,
+            curve=ladder,
         ),
         compare(
             _GROUP,
@@ -83,6 +86,7 @@ def _hertz(static: StaticContact) -> list[Check]:
             computed=static.half_width[-1],
             tolerance=5e-3,
             source=source,
+            curve=face,
         ),
         compare(
             _GROUP,
@@ -91,8 +95,36 @@ def _hertz(static: StaticContact) -> list[Check]:
             computed=pressure,
             tolerance=1e-2,
             source=source,
+            curve=face,
         ),
     ]
+
+
+def _force_curve(static: StaticContact) -> ComparedCurve:
+    approach = static.approach * 1e9
+    return ComparedCurve(
+        x_label="approach [nm]",
+        y_label="force [N]",
+        expected=(approach, np.array([_hertz_force(d) for d in static.approach])),
+        computed=(approach, static.force),
+        x_log=True,
+        y_log=True,
+    )
+
+
+def _pressure_curve(static: StaticContact, radius: float, peak: float) -> ComparedCurve:
+    """Over the radius, at the highest force."""
+    order = np.argsort(static.space.points[:, 0])
+    place = static.space.points[order, 0]
+    near = place < 1.4 * radius
+    place, order = place[near], order[near]
+    inside = np.sqrt(np.maximum(1.0 - (place / radius) ** 2, 0.0))
+    return ComparedCurve(
+        x_label="radius [um]",
+        y_label="pressure [MPa]",
+        expected=(place * 1e6, peak * inside / 1e6),
+        computed=(place * 1e6, static.pressures[-1, order] / static.space.area[order] / 1e6),
+    )
 
 
 def _balance(problem: IndentationProblem, static: StaticContact) -> list[Check]:

@@ -12,7 +12,7 @@ from klack.elasticity.loads import traction_load
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.lattice import lattice_mesh
 
 __all__ = ["checks"]
@@ -52,6 +52,13 @@ def _axisymmetric_cylinder() -> Iterator[Check]:
     lines = [np.linspace(0.0, _RADIUS, 7), np.linspace(0.0, _LENGTH, 91)]
     body = elastic_body("cylinder", lattice_mesh("quad8", lines), {"solid": _STEEL})
     frequency = eigenmodes(body, count=max(_AXIAL)).frequency
+    numbers = np.array(list(_AXIAL))
+    curve = ComparedCurve(
+        x_label="number of the axisymmetric mode [-]",
+        y_label="frequency [kHz]",
+        expected=(numbers, np.array(list(_AXIAL.values())) / 1e3),
+        computed=(numbers, frequency[numbers - 1] / 1e3),
+    )
     for number, exact in _AXIAL.items():
         yield compare(
             _GROUP,
@@ -60,6 +67,7 @@ def _axisymmetric_cylinder() -> Iterator[Check]:
             computed=frequency[number - 1],
             tolerance=_AXIAL_TOLERANCE[number],
             source=_RITZ,
+            curve=curve,
         )
 
 
@@ -110,15 +118,28 @@ def _thick_cylinder() -> Iterator[Check]:
     with Flexibility(body) as flexibility:
         u = flexibility.solve(load)[0::2]
     scale = pressure * inner**2 / (_STEEL.young * (outer**2 - inner**2))
+
+    def lame(r: NDArray[np.float64]) -> NDArray[np.float64]:
+        return scale * ((1 - _STEEL.poisson) * r + (1 + _STEEL.poisson) * outer**2 / r)
+
+    nodes = mesh.surface("bottom").nodes
+    nodes = nodes[np.argsort(mesh.points[nodes, 0])]
+    wall = mesh.points[nodes, 0]
+    curve = ComparedCurve(
+        x_label="radius [mm]",
+        y_label="radial displacement [um]",
+        expected=(wall * 1e3, lame(wall) * 1e6),
+        computed=(wall * 1e3, u[nodes] * 1e6),
+    )
     for name, r in (("inner", inner), ("outer", outer)):
-        exact = scale * ((1 - _STEEL.poisson) * r + (1 + _STEEL.poisson) * outer**2 / r)
         yield compare(
             _GROUP,
             f"open tube under 100 MPa inside, radial displacement of the {name} wall [m]",
-            expected=exact,
+            expected=float(lame(np.array(r))),
             computed=float(u[mesh.surface(name).nodes].mean()),
             tolerance=1e-5,
             source="Lame 1852: u = p a^2/(E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2/r)",
+            curve=curve,
         )
 
 
@@ -142,6 +163,14 @@ def _free_rod() -> Iterator[Check]:
         source="-cot(k L)/(E A k) + 1/(m w^2) at w = 0: L/(3 E A)",
     )
     carried = np.cumsum((unit @ modes.shapes) ** 2 / modes.omega**2)
+    kept = np.arange(1.0, max(_RESIDUAL) + 1.0)
+    curve = ComparedCurve(
+        x_label="number of modes [-]",
+        y_label="missing compliance [L/(E A)]",
+        expected=(kept, 1 / 3 - 2 / np.pi**2 * np.cumsum(1 / kept**2)),
+        computed=(kept, (static - carried) * spring),
+        y_log=True,
+    )
     for count, exact in _RESIDUAL.items():
         yield compare(
             _GROUP,
@@ -150,6 +179,7 @@ def _free_rod() -> Iterator[Check]:
             computed=(static - float(carried[count - 1])) * spring,
             tolerance=1e-4,
             source="L/(E A) (1/3 - 2/pi^2 sum of 1/n^2, n = 1..N)",
+            curve=curve,
         )
 
 

@@ -1,9 +1,10 @@
 """Fluids: reference equations, mixtures with gas and vapour, and their table."""
 
 from itertools import pairwise
-from math import exp, log, sqrt
+from math import exp, log
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from klack.hydraulics.fluid import Fluid
@@ -11,7 +12,7 @@ from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.liquid import Murnaghan
 from klack.hydraulics.mixture import EntrainedGas, Vapour
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -34,9 +35,22 @@ def checks() -> list[Check]:
     ]
 
 
-def _check(name: str, expected: float, computed: float, tolerance: float, source: str) -> Check:
+def _check(
+    name: str,
+    expected: float,
+    computed: float,
+    tolerance: float,
+    source: str,
+    curve: ComparedCurve | None = None,
+) -> Check:
     return compare(
-        GROUP, name, expected=expected, computed=computed, tolerance=tolerance, source=source
+        GROUP,
+        name,
+        expected=expected,
+        computed=computed,
+        tolerance=tolerance,
+        source=source,
+        curve=curve,
     )
 
 
@@ -129,24 +143,38 @@ def _bubbly(fraction: float) -> Fluid:
     )
 
 
+def _wood(fraction: float, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Wood's law, with the volumes of both phases written out [m/s]."""
+    n, above = 1.4, p - 1e5
+    K_l = 1.4e9 + 10.0 * above
+    gas = fraction * (p / 1e5) ** (-1.0 / n)
+    liquid = (1.0 - fraction) * (1.0 + 10.0 * above / 1.4e9) ** -0.1
+    share = gas / (gas + liquid)
+    K = 1.0 / (share / (n * p) + (1.0 - share) / K_l)
+    rho = ((1.0 - fraction) * 820.0 + fraction * 1.204 * 1e5 / ATMOSPHERE) / (gas + liquid)
+    return np.asarray(np.sqrt(K / rho))
+
+
 def _bubbles() -> list[Check]:
-    """Wood's law, with the volumes of both phases at 6 bar written out."""
-    p, n = 6e5, 1.4
-    K_l = 1.4e9 + 10.0 * 5e5
+    p = 6e5
+    pressures = np.geomspace(1e5, 300e5, 150)
     out = []
     for fraction in (0.0, 1e-4, 1e-3, 1e-2):
-        gas = fraction * 6.0 ** (-1.0 / n)
-        liquid = (1.0 - fraction) * (1.0 + 10.0 * 5e5 / 1.4e9) ** -0.1
-        share = gas / (gas + liquid)
-        K = 1.0 / (share / (n * p) + (1.0 - share) / K_l)
-        rho = ((1.0 - fraction) * 820.0 + fraction * 1.204 * 1e5 / ATMOSPHERE) / (gas + liquid)
+        curve = ComparedCurve(
+            x_label="pressure [bar]",
+            y_label="sound speed [m/s]",
+            expected=(pressures / 1e5, _wood(fraction, pressures)),
+            computed=(pressures / 1e5, np.asarray(_bubbly(fraction).sound_speed(pressures))),
+            x_log=True,
+        )
         out.append(
             _check(
                 f"sound speed of oil with {100 * fraction:g} % air at 6 bar [m/s]",
-                sqrt(K / rho),
+                float(_wood(fraction, np.array(p))),
                 float(_bubbly(fraction).sound_speed(p)),
                 1e-12,
                 "Wood, A Textbook of Sound, 1930",
+                curve if fraction > 0.0 else None,
             )
         )
         if fraction == 1e-3:
@@ -222,6 +250,15 @@ def _table() -> list[Check]:
     p = np.geomspace(1.0, 3e8, 30_011)
     rho, slope = np.array([fluid_at(table, x, 0)[:2] for x in p]).T
     v, tangent = fluid.specific_volume(p)
+    few = slice(None, None, 30)
+    density = ComparedCurve(
+        x_label="pressure [Pa]",
+        y_label="density [kg/m^3]",
+        expected=(p[few], 1.0 / v[few]),
+        computed=(p[few], rho[few]),
+        x_log=True,
+        y_log=True,
+    )
     worst = 0.0
     places = [100.0, 1e3, *fluid.kinks, 2e4, ATMOSPHERE, 6e5, 1e7, 3e8]
     for a, b in pairwise(places):
@@ -235,6 +272,7 @@ def _table() -> list[Check]:
             float(np.max(np.abs(rho * v - 1.0))),
             1e-9,
             "the fluid itself, 1 Pa to 3000 bar",
+            density,
         ),
         _check(
             "table: largest relative error of the compressibility [-]",

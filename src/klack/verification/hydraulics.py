@@ -26,7 +26,7 @@ from klack.network.rows import Ambient
 from klack.network.step_function import evaluate
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -141,12 +141,17 @@ def _mantle(foot: Sequence[float]) -> float:
 
 
 def _seats() -> list[Check]:
-    along = LIFT * cos(ANGLE)  # from the raised cone's point over the edge to the foot
-    foot = (RADIUS - along * sin(ANGLE), LIFT - along * cos(ANGLE))
     R = 1e-3
     x0 = sqrt(R**2 - RADIUS**2)
-    far = hypot(RADIUS, x0 + LIFT)
-    touch = (R * RADIUS / far, (x0 + LIFT) * (1 - R / far))
+
+    def cone_foot(lift: float) -> tuple[float, float]:
+        along = lift * cos(ANGLE)  # from the raised cone's point over the edge to the foot
+        return (RADIUS - along * sin(ANGLE), lift - along * cos(ANGLE))
+
+    def ball_foot(lift: float) -> tuple[float, float]:
+        far = hypot(RADIUS, x0 + lift)
+        return (R * RADIUS / far, (x0 + lift) * (1 - R / far))
+
     width, low = 0.2e-3, 0.3e-6
     land = Seat(
         shape="flat", diameter=2 * RADIUS, land_width=width, critical_flow_number=1e-3
@@ -154,22 +159,37 @@ def _seats() -> list[Check]:
     inputs = [0.0, 1e-8, 1e5 + 1.0, 1e5, RHO, RHO, low, low, 0.0, 0.0]
     viscous = evaluate(seat_step, land, [0.0] * 5, inputs, 10)[1][0]
     geometry = "mantle between the edge and its foot on the other surface"
+    lifts = np.linspace(2e-6, 150e-6, 75)
+    cone, ball = (
+        ComparedCurve(
+            x_label="lift [um]",
+            y_label="area [mm^2]",
+            expected=(lifts * 1e6, np.array([_mantle(foot_at(y)) for y in lifts]) * 1e6),
+            computed=(lifts * 1e6, np.array([area_at(y) for y in lifts]) * 1e6),
+        )
+        for foot_at, area_at in (
+            (cone_foot, lambda y: cone_opening(y, RADIUS, sin(ANGLE), cos(ANGLE))[0]),
+            (ball_foot, lambda y: ball_opening(y, RADIUS, R, x0)[0]),
+        )
+    )
     return [
         compare(
             GROUP,
             "cone, 60 um open, area [m^2]",
-            expected=_mantle(foot),
+            expected=_mantle(cone_foot(LIFT)),
             computed=cone_opening(LIFT, RADIUS, sin(ANGLE), cos(ANGLE))[0],
             tolerance=1e-12,
             source=geometry,
+            curve=cone,
         ),
         compare(
             GROUP,
             "ball, 60 um open, area [m^2]",
-            expected=_mantle(touch),
+            expected=_mantle(ball_foot(LIFT)),
             computed=ball_opening(LIFT, RADIUS, R, x0)[0],
             tolerance=1e-12,
             source=geometry,
+            curve=ball,
         ),
         compare(
             GROUP,
@@ -374,6 +394,12 @@ def _emptying() -> Check:
         computed=float(p[k]),
         tolerance=2e-4,
         source="exp(-t/tau), tau = V/(K dQ/dp); implicit Euler: h/(2 tau) = 5e-5",
+        curve=ComparedCurve(
+            x_label="time over tau [-]",
+            y_label="pressure above ambient [Pa]",
+            expected=(result.time / tau, 1e3 * np.exp(-result.time / tau)),
+            computed=(result.time / tau, p),
+        ),
     )
 
 

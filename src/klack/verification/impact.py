@@ -6,7 +6,8 @@ import numpy as np
 
 from klack.contact.laws import HertzLaw, HuntCrossley, gonthier_coefficient
 from klack.contact.restitution import measure_impact
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.hertz_pulse import hertz_force
 from klack.verification.one_dimension import (
     BAR_SPEED,
     DENSITY,
@@ -60,8 +61,14 @@ def _hertz() -> list[Check]:
     mass, speed, K = 1e-3, 0.5, 4.0 / 3.0 * 115.4e9 * sqrt(2e-3)
     depth = (5.0 * mass * speed**2 / (4.0 * K)) ** 0.4
     duration = 4.0 * sqrt(pi) / 5.0 * gamma(0.4) / gamma(0.9) * depth / speed
-    m = measure_impact(
-        mass_on_law(mass, HertzLaw(K), speed=speed, step=2e-9, duration=1.2 * duration)
+    history = mass_on_law(mass, HertzLaw(K), speed=speed, step=2e-9, duration=1.2 * duration)
+    m = measure_impact(history)
+    since = history.time - 0.02 * 1.2 * duration  # its gap is closed by then
+    curve = ComparedCurve(
+        x_label="time since first touch [us]",
+        y_label="force [N]",
+        expected=(since * 1e6, hertz_force(since, duration=duration, peak=K * depth**1.5)),
+        computed=(since * 1e6, history.force),
     )
     where = "Johnson 1985, section 11.4, sphere of 1 g and R = 2 mm on a plane at 0.5 m/s"
     return [
@@ -72,6 +79,7 @@ def _hertz() -> list[Check]:
             computed=m.contact_time,
             tolerance=1e-6,
             source=where,
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -80,6 +88,7 @@ def _hertz() -> list[Check]:
             computed=m.peak_force,
             tolerance=1e-6,
             source=where,
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -117,6 +126,15 @@ def _st_venant() -> list[Check]:
     m = measure_impact(hard)
     inside = (soft.time > 6e-6) & (soft.time < 14e-6)
     coarse = measure_impact(st_venant_rods(1e9, 20, step=10e-9))
+    touch = 0.1e-6  # [s] its gap of 0.1 um at 1 m/s
+    along = (soft.time - touch) * 1e6
+    on = (along > 0.0) & (along < 0.08 / BAR_SPEED * 1e6)
+    curve = ComparedCurve(
+        x_label="time since first touch [us]",
+        y_label="force [N]",
+        expected=(along, np.where(on, 0.5 * Z, 0.0)),
+        computed=(along, soft.force),
+    )
     return [
         compare(
             GROUP,
@@ -125,6 +143,7 @@ def _st_venant() -> list[Check]:
             computed=float(np.mean(soft.force[inside])),
             tolerance=1e-4,
             source=source,
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -209,8 +228,21 @@ def _modal_convergence() -> list[Check]:
 
 def _zener() -> list[Check]:
     out = []
-    for inelasticity, restitution, peak in ZENER:
-        m = measure_impact(sphere_on_rod(inelasticity))
+    runs = [measure_impact(sphere_on_rod(row[0])) for row in ZENER]
+    table = np.array(ZENER).T
+    rebound, force = (
+        ComparedCurve(
+            x_label="inelasticity lambda [-]",
+            y_label=label,
+            expected=(table[0], expected),
+            computed=(table[0], np.array(computed)),
+        )
+        for label, expected, computed in (
+            ("restitution [-]", table[1], [m.restitution for m in runs]),
+            ("peak force [m v/T0]", table[2], [m.peak_force for m in runs]),
+        )
+    )
+    for (inelasticity, restitution, peak), m in zip(ZENER, runs, strict=True):
         out.append(
             compare(
                 GROUP,
@@ -220,6 +252,7 @@ def _zener() -> list[Check]:
                 tolerance=2e-6,
                 source=ZENER_SOURCE,
                 absolute=True,
+                curve=rebound,
             )
         )
         out.append(
@@ -230,6 +263,7 @@ def _zener() -> list[Check]:
                 computed=m.peak_force,
                 tolerance=2e-6,
                 source=ZENER_SOURCE,
+                curve=force,
             )
         )
     return out

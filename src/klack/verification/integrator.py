@@ -9,7 +9,7 @@ from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.contact.restitution import measure_impact
 from klack.simulation.impact import simulate, simulate_impact
 from klack.simulation.propagator import modal_propagator
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.one_dimension import mass_on_law, one_contact, steel_rod
 
 __all__ = ["checks"]
@@ -90,6 +90,15 @@ def _order() -> list[Check]:
     counts = np.array([150, 300, 600, 1200])
     errors = np.array([np.linalg.norm(end(int(n)) - fine) for n in counts])
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    steps = 12e-6 / counts[::-1] * 1e9
+    curve = ComparedCurve(
+        x_label="step [ns]",
+        y_label="error [m/s kg^0.5]",
+        expected=(steps, errors[-1] * (steps / steps[0]) ** 2),
+        computed=(steps, errors[::-1]),
+        x_log=True,
+        y_log=True,
+    )
     return [
         compare(
             GROUP,
@@ -99,6 +108,7 @@ def _order() -> list[Check]:
             tolerance=0.1,
             source="against a step 40 times finer",
             absolute=True,
+            curve=curve,
         )
     ]
 

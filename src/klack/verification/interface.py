@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.complementarity import solve_lcp
+from klack.contact.history import ImpactHistory
 from klack.contact.restitution import find_contacts, measure_impact
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
@@ -18,7 +19,8 @@ from klack.transient.interface_model import InterfaceBody, InterfaceContact, Int
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
 from klack.verification.beam_impact import sphere_on_beam
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.hertz_pulse import hertz_force
 from klack.verification.impacts import (
     STEEL,
     bulk_wave_speed,
@@ -251,16 +253,25 @@ def _blocked_bar() -> list[Check]:
     history = run.history
     inside = (history.time > 0.2 * time) & (history.time < 0.8 * time)
     pressure = run.impacts[0].point_force[inside].mean(axis=0) / model.area
+    height = STEEL.density * c * pi * 2e-3**2 * _SPEED
+    since = _since_touch(history)
+    curve = ComparedCurve(
+        x_label="time since first touch [us]",
+        y_label="force [N]",
+        expected=(since * 1e6, np.where((since > 0.0) & (since < time), height, 0.0)),
+        computed=(since * 1e6, history.force),
+    )
     name = "bar without lateral strain on a wall, 40 modes"
     source = "square pulse F = rho c_p A v, T = 2 L/c_p, e = 1; 40 modes ring at its front"
     return [
         compare(
             _GROUP,
             f"{name}: mean force [N]",
-            expected=STEEL.density * c * pi * 2e-3**2 * _SPEED,
+            expected=height,
             computed=float(history.force[inside].mean()),
             tolerance=1e-2,
             source=source,
+            curve=curve,
         ),
         compare(
             _GROUP,
@@ -269,6 +280,7 @@ def _blocked_bar() -> list[Check]:
             computed=measure_impact(history).contact_time,
             tolerance=1e-2,
             source=source,
+            curve=curve,
         ),
         compare(
             _GROUP,
@@ -297,6 +309,11 @@ def _blocked_bar() -> list[Check]:
     ]
 
 
+def _since_touch(history: ImpactHistory) -> NDArray[np.float64]:
+    first = int(np.argmax(history.force > 0))
+    return np.asarray(history.time - history.time[first] + 0.5 * history.step)
+
+
 def _two_spheres() -> list[Check]:
     hertz = hertz_impact(2e-3, 2e-3, 0.2)
     a, b, space = two_spheres(2e-3, 2e-3, size=hertz.radius / 5.0)
@@ -308,6 +325,16 @@ def _two_spheres() -> list[Check]:
     out = []
     for level, history in (("interface level", run.history), ("full order", full.history)):
         measures = measure_impact(history)
+        since = _since_touch(history)
+        curve = ComparedCurve(
+            x_label="time since first touch [us]",
+            y_label="force [N]",
+            expected=(
+                since * 1e6,
+                hertz_force(since, duration=time, peak=hertz.peak_force),
+            ),
+            computed=(since * 1e6, history.force),
+        )
         out += [
             compare(
                 _GROUP,
@@ -316,6 +343,7 @@ def _two_spheres() -> list[Check]:
                 computed=measures.peak_force,
                 tolerance=1e-2,
                 source=source,
+                curve=curve,
             ),
             compare(
                 _GROUP,
@@ -324,6 +352,7 @@ def _two_spheres() -> list[Check]:
                 computed=measures.contact_time,
                 tolerance=1e-2,
                 source=source,
+                curve=curve,
             ),
         ]
     out.append(

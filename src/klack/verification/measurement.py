@@ -12,7 +12,7 @@ from klack.measurement.sensor import LiftSensor
 from klack.measurement.set_measures import expected_maximum, measure_set
 from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
 from klack.verification.bouncing_flight import BouncingDrop
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -66,15 +66,34 @@ def _velocity() -> list[Check]:
     sine = velocity_of(t, np.sin(omega * t), bandwidth=20e3)
     inside = slice(sine.window, -sine.window)
     rate = (omega * np.cos(omega * t))[inside]
+    exact = 1e-2 * (2.0 * u - 0.3 * u**2)
+    polynomial, tone = (
+        ComparedCurve(
+            x_label="time [ms]",
+            y_label=label,
+            expected=(time * 1e3, known),
+            computed=(time * 1e3, found),
+        )
+        for label, time, known, found in (
+            ("velocity [m/s]", t, exact, cubic),
+            (
+                "velocity over 2 pi f [-]",
+                t[inside][:200],
+                (1.0 + float(sine.amplitude_error(15e3))) * rate[:200] / omega,
+                sine.velocity[inside][:200] / omega,
+            ),
+        )
+    )
     return [
         compare(
             GROUP,
             "largest error of the velocity of a cubic [m/s]",
             expected=0.0,
-            computed=float(np.max(np.abs(cubic - 1e-2 * (2.0 * u - 0.3 * u**2)))),
+            computed=float(np.max(np.abs(cubic - exact))),
             tolerance=1e-9,
             source="d/dt",
             absolute=True,
+            curve=polynomial,
         ),
         compare(
             GROUP,
@@ -83,6 +102,7 @@ def _velocity() -> list[Check]:
             computed=float(rate @ sine.velocity[inside] / (rate @ rate)),
             tolerance=1e-9,
             source="Savitzky & Golay 1964, frequency response of the weights",
+            curve=tone,
         ),
     ]
 

@@ -18,7 +18,7 @@ from klack.network.component import Component
 from klack.network.network import Network
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -39,9 +39,22 @@ def checks() -> list[Check]:
     ]
 
 
-def _check(name: str, expected: float, computed: float, tolerance: float, source: str) -> Check:
+def _check(
+    name: str,
+    expected: float,
+    computed: float,
+    tolerance: float,
+    source: str,
+    curve: ComparedCurve | None = None,
+) -> Check:
     return compare(
-        GROUP, name, expected=expected, computed=computed, tolerance=tolerance, source=source
+        GROUP,
+        name,
+        expected=expected,
+        computed=computed,
+        tolerance=tolerance,
+        source=source,
+        curve=curve,
     )
 
 
@@ -103,6 +116,12 @@ def _oscillates() -> list[Check]:
         run = _alone(Spring(stiffness=k, preload=0.0), speed=v, duration=1e-3, step=step)
         exact = v / omega * np.sin(omega * run.time)
         errors.append(float(np.abs(_place(run) - exact).max() / (v / omega)))
+    motion = ComparedCurve(
+        x_label="time [ms]",
+        y_label="displacement [um]",
+        expected=(run.time * 1e3, exact * 1e6),
+        computed=(run.time * 1e3, _place(run) * 1e6),
+    )
     damped = _alone(Spring(stiffness=k, preload=0.0, damping=2.0), speed=v, duration=2e-3)
     zeta = 2.0 / (2.0 * sqrt(k * MASS))
     shifted = omega * sqrt(1.0 - zeta**2)
@@ -122,6 +141,7 @@ def _oscillates() -> list[Check]:
             errors[1],
             1e-3,
             "phase error (omega h)^2/12 of the implicit midpoint rule",
+            motion,
         ),
         _check("the same, damped by 0.8 %: error over amplitude [-]", 0.0, share, 2e-4, NEWTON),
     ]

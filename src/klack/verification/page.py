@@ -27,6 +27,9 @@ from klack.whole_file import whole_file
 
 __all__ = ["render_page", "write_page"]
 
+_WIDTH = 4.6
+"""Of a plot [in]: three stand beside each other on a wide screen."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
@@ -113,7 +116,7 @@ def _section(group: str, checks: Sequence[tuple[int, Check]]) -> Section:
         plots=tuple(
             Plot(
                 name=names[key],
-                image=svg_chart(curve_chart(curve, name=names[key], title=group)),
+                image=svg_chart(curve_chart(curve, name=names[key], title=group), width=_WIDTH),
                 checks=tuple(users[key]),
             )
             for key, curve in curves.items()

@@ -14,7 +14,7 @@ from klack.reduction.receptance import reduced_receptance
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.lattice import lattice_mesh
 
 __all__ = ["LENGTH", "RADIUS", "STEEL_WITHOUT_POISSON", "checks", "rod"]
@@ -157,6 +157,7 @@ def _receptance_checks(
     computed = full.receptance.values[:, 0, :]
     names = ("drive-point", "end-to-end")
     worst = np.max(np.abs(computed / exact - 1), axis=0)
+    curves = [_receptance_curve(axis, exact[:, i], computed[:, i]) for i in range(2)]
     checks = [
         compare(
             _GROUP,
@@ -165,8 +166,9 @@ def _receptance_checks(
             computed=float(deviation),
             tolerance=5e-3,
             source=source,
+            curve=curve,
         )
-        for name, deviation in zip(names, worst, strict=True)
+        for name, deviation, curve in zip(names, worst, curves, strict=True)
     ]
     checks.append(
         compare(
@@ -204,4 +206,20 @@ def _correction_check(reduced: ReducedBody) -> Check:
         computed=float(deviation),
         tolerance=2e-2,
         source="-cot(kL)/(EAk)",
+        curve=_receptance_curve(axis, exact, computed.values[:, 0, 0]),
+    )
+
+
+def _receptance_curve(
+    frequency: NDArray[np.float64],
+    exact: NDArray[np.complex128],
+    computed: NDArray[np.complex128],
+) -> ComparedCurve:
+    return ComparedCurve(
+        x_label="frequency [kHz]",
+        y_label="receptance [m/N]",
+        expected=(frequency / 1e3, np.abs(exact)),
+        computed=(frequency / 1e3, np.abs(computed)),
+        x_log=True,
+        y_log=True,
     )

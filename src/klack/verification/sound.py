@@ -14,7 +14,7 @@ from klack.acoustics.sound import audio_band, click_pressure
 from klack.acoustics.spectrum import energy_spectral_density, force_spectrum
 from klack.acoustics.weighting import a_weighting
 from klack.signals import TimeSeries
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -66,6 +66,23 @@ def _click() -> list[Check]:
     f = np.linspace(20.0, 24e3, 100_001)
     radiated = _transfer(f) * 2.0 * (_spectrum(f) * audio_band(f)) ** 2
     energy = np.cumsum(click.values**2) * click.step / STRENGTH
+
+    def exact_spectrum(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.sqrt(STRENGTH * _transfer(at)) * _spectrum(at))
+
+    def found_spectrum(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        turned = np.exp(-2j * pi * np.outer(at, click.time))
+        return np.asarray(np.abs(turned @ click.values) * click.step)
+
+    axis = np.geomspace(50.0, 17e3, 60)  # below the edge of the audio band
+    curve = ComparedCurve(
+        x_label="frequency [Hz]",
+        y_label="sound pressure spectrum [Pa s]",
+        expected=(axis, exact_spectrum(axis)),
+        computed=(axis, found_spectrum(axis)),
+        x_log=True,
+        y_log=True,
+    )
     out = [
         compare(
             GROUP,
@@ -85,16 +102,16 @@ def _click() -> list[Check]:
         ),
     ]
     for frequency in (100.0, 1e3, 15e3):
-        turned = np.exp(-2j * pi * frequency * click.time)
         at = np.array([frequency])
         out.append(
             compare(
                 GROUP,
                 f"sound pressure spectrum of the click at {frequency:g} Hz [Pa s]",
-                expected=float(np.sqrt(STRENGTH * _transfer(at)[0]) * _spectrum(at)[0]),
-                computed=float(np.abs(turned @ click.values) * click.step),
+                expected=float(exact_spectrum(at)[0]),
+                computed=float(found_spectrum(at)[0]),
                 tolerance=1e-4,
                 source="sqrt(rho c T / (4 pi r^2)) |F|",
+                curve=curve,
             )
         )
     return out
@@ -156,6 +173,14 @@ def _pattern() -> list[Check]:
 
 
 def _weighting() -> list[Check]:
+    table, axis = np.array(A_WEIGHTS).T, np.geomspace(20.0, 20e3, 200)
+    curve = ComparedCurve(
+        x_label="frequency [Hz]",
+        y_label="A-weighting [dB]",
+        expected=(table[0], table[1]),
+        computed=(axis, 20.0 * np.log10(a_weighting(axis))),
+        x_log=True,
+    )
     return [
         compare(
             GROUP,
@@ -165,6 +190,7 @@ def _weighting() -> list[Check]:
             tolerance=0.05,
             source="IEC 61672-1:2013, Table 3, one decimal",
             absolute=True,
+            curve=curve,
         )
         for frequency, level in A_WEIGHTS
     ]

@@ -3,12 +3,14 @@
 from math import cos, pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import energy_spectral_density, impulse_spectrum
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
 from klack.contact.laws import HertzLaw
 from klack.signals import Spectrum, TimeSeries
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.hertz_pulse import hertz_force
 from klack.verification.one_dimension import mass_on_law
 
 __all__ = ["checks"]
@@ -40,6 +42,17 @@ def _at(spectrum: Spectrum, frequency: float) -> float:
 
 def _half_sine() -> list[Check]:
     spectrum = impulse_spectrum(_pulse(), resolution=50.0)
+
+    def exact_share(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(2.0 / pi * np.abs(np.cos(pi * x) / (1.0 - 4.0 * x * x)))
+
+    at = spectrum.frequency[spectrum.frequency * LENGTH < 4.5][::40] * LENGTH
+    curve = ComparedCurve(
+        x_label="frequency times length f T [-]",
+        y_label="spectrum [F0 T]",
+        expected=(at, exact_share(at)),
+        computed=(at, np.array([_at(spectrum, x / LENGTH) for x in at]) / (PEAK * LENGTH)),
+    )
     out = []
     for x in (0.0, 0.25, 1.0, 2.0, 4.0):
         exact = 2.0 / pi * abs(cos(pi * x)) / abs(1.0 - 4.0 * x * x)
@@ -51,6 +64,7 @@ def _half_sine() -> list[Check]:
                 computed=_at(spectrum, x / LENGTH) / (PEAK * LENGTH),
                 tolerance=1e-5,
                 source="(2/pi) |cos(pi f T)| / |1 - 4 (f T)^2|",
+                curve=curve,
             )
         )
     out.append(
@@ -61,6 +75,7 @@ def _half_sine() -> list[Check]:
             computed=_at(spectrum, 1.5 / LENGTH) / (PEAK * LENGTH),
             tolerance=1e-5,
             source="zeros at f T = 1.5, 2.5, ...",
+            curve=curve,
         )
     )
     return out
@@ -73,18 +88,36 @@ def _hertz() -> list[Check]:
     history = mass_on_law(mass, HertzLaw(K), speed=speed, step=10e-9, duration=1.2 * duration)
     series = TimeSeries(step=history.step, values=history.force, unit="N", name="Hertz impact")
     spectrum = impulse_spectrum(series, resolution=50.0)
+    scale = K * depth**1.5 * duration
+    x = np.linspace(0.0, 3.0, 121)
+    computed = np.array([_at(spectrum, one / duration) for one in x]) / scale
+    curve = ComparedCurve(
+        x_label="frequency times length f T [-]",
+        y_label="spectrum [F0 T]",
+        expected=(x, _hertz_spectrum(x)),
+        computed=(x, computed),
+    )
     return [
         compare(
             GROUP,
             f"simulated Hertz impact, |F| at f T = {x:g} [F0 T]",
             expected=expected,
-            computed=_at(spectrum, x / duration) / (K * depth**1.5 * duration),
+            computed=_at(spectrum, x / duration) / scale,
             tolerance=2e-5,
             source="Fourier integral of the Hertz pulse, numerically",
             absolute=True,
+            curve=curve,
         )
         for x, expected in HERTZ
     ]
+
+
+def _hertz_spectrum(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the pulse in closed form, peak and length one, by the trapezoidal rule."""
+    time = np.linspace(0.0, 1.0, 20_001)
+    force = hertz_force(time, duration=1.0, peak=1.0)
+    turned = np.exp(-2j * pi * np.outer(x, time))
+    return np.asarray(np.abs(np.trapezoid(turned * force, time, axis=1)))
 
 
 def _parseval() -> list[Check]:

@@ -3,9 +3,11 @@
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.transient.result import FullOrderResult
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.hertz_pulse import hertz_force
 from klack.verification.impacts import (
     STEEL,
     bulk_wave_speed,
@@ -35,6 +37,7 @@ def _rod_on_wall() -> list[Check]:
     run = drop_rod(length, elements=_ELEMENTS)
     other = drop_rod(length, elements=_ELEMENTS, scheme="massless")
     history = run.history
+    curve = _square_pulse(run, impedance * _SPEED, contact_time)
     source = "bar on rigid wall, one-dimensional wave equation: "
     return [
         compare(
@@ -44,6 +47,7 @@ def _rod_on_wall() -> list[Check]:
             computed=plateau(run, contact_time),
             tolerance=1e-5,
             source=source + "F = rho c A v",
+            curve=curve,
         ),
         compare(
             _GROUP,
@@ -52,6 +56,7 @@ def _rod_on_wall() -> list[Check]:
             computed=_contact_time(run),
             tolerance=1e-2,
             source=source + "T = 2 L / c; dispersion smears the front",
+            curve=curve,
         ),
         compare(
             _GROUP,
@@ -105,6 +110,7 @@ def _two_rods() -> list[Check]:
             computed=plateau(run, contact_time),
             tolerance=1e-5,
             source=source + "F = rho c A v / 2",
+            curve=_square_pulse(run, 0.5 * impedance * _SPEED, contact_time),
         ),
         compare(
             _GROUP,
@@ -121,6 +127,7 @@ def _two_rods() -> list[Check]:
             computed=plateau(unequal, contact_time),
             tolerance=1e-5,
             source=source + "F = v Z1 Z2 / (Z1 + Z2)",
+            curve=_square_pulse(unequal, 0.75 * impedance * _SPEED, contact_time),
         ),
     ]
 
@@ -137,6 +144,7 @@ def _blocked_bar() -> list[Check]:
             computed=plateau(run, 2.0 * length / c),
             tolerance=1e-3,
             source="F = rho c_p A v, c_p^2 = E (1-nu) / (rho (1+nu) (1-2nu))",
+            curve=_square_pulse(run, STEEL.density * c * pi * 2e-3**2 * speed, 2.0 * length / c),
         )
     ]
 
@@ -145,6 +153,14 @@ def _sphere_on_block() -> list[Check]:
     """Sphere of 4 mm on a block so large that no echo returns in time."""
     run = drop_sphere(radius=50e-3, height=50e-3, bulk=3e-3, speed=_SPEED)
     history = run.history
+    peak, contact_time = 30.4775197, 15.8774048e-6
+    since = _since_touch(run)
+    curve = ComparedCurve(
+        x_label="time since first touch [us]",
+        y_label="force [N]",
+        expected=(since * 1e6, hertz_force(since, duration=contact_time, peak=peak)),
+        computed=(since * 1e6, history.force),
+    )
     return [
         compare(
             _GROUP,
@@ -157,18 +173,20 @@ def _sphere_on_block() -> list[Check]:
         compare(
             _GROUP,
             "steel sphere D4 on thick steel block, 0.5 m/s: peak force [N]",
-            expected=30.4775197,
+            expected=peak,
             computed=float(np.max(history.force)),
             tolerance=1e-2,
             source="Hertz 1882 (quasi-static; contact radius 1/27 of the sphere's)",
+            curve=curve,
         ),
         compare(
             _GROUP,
             "steel sphere D4 on thick steel block, 0.5 m/s: contact time [s]",
-            expected=15.8774048e-6,
+            expected=contact_time,
             computed=_contact_time(run),
             tolerance=1e-2,
             source="Hertz 1882, T = 2.9433 delta_max / v",
+            curve=curve,
         ),
         compare(
             _GROUP,
@@ -179,6 +197,23 @@ def _sphere_on_block() -> list[Check]:
             source="Deuflhard, Krause & Ertel 2008: the loss vanishes with the step",
         ),
     ]
+
+
+def _since_touch(run: FullOrderResult) -> NDArray[np.float64]:
+    history = run.history
+    first = int(np.argmax(history.force > 0))
+    return np.asarray(history.time - history.time[first] + 0.5 * history.step)
+
+
+def _square_pulse(run: FullOrderResult, height: float, duration: float) -> ComparedCurve:
+    since = _since_touch(run)
+    on = (since > 0.0) & (since < duration)
+    return ComparedCurve(
+        x_label="time since first touch [us]",
+        y_label="force [N]",
+        expected=(since * 1e6, np.where(on, height, 0.0)),
+        computed=(since * 1e6, run.history.force),
+    )
 
 
 def _contact_time(run: FullOrderResult) -> float:

@@ -27,7 +27,7 @@ from klack.reduction.ports import Port, surface_port
 from klack.reduction.structure import Structure
 from klack.reduction.structure_building import StructurePort, build_structure
 from klack.signals import TimeSeries
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.reduction import LENGTH, RADIUS, STEEL_WITHOUT_POISSON, rod
 
 __all__ = ["checks", "oscillator", "pulses", "rod_structure"]
@@ -134,6 +134,29 @@ def checks() -> list[Check]:
 
 def _rods() -> list[Check]:
     held = rod_structure()
+    axis = np.linspace(0.05, 6.2, 247)  # omega L / c; no point on a resonance
+    f = axis / (2.0 * pi * _TRAVEL)
+    mobility, support = (
+        ComparedCurve(
+            x_label="omega L/c [-]",
+            y_label=label,
+            expected=(axis, np.abs(exact)),
+            computed=(axis, np.abs(found)),
+            y_log=True,
+        )
+        for label, exact, found in (
+            (
+                "mobility [1/(rho c A)]",
+                np.tan(axis),
+                drive_point_mobility(held, "tip", f) * _WAVE,
+            ),
+            (
+                "support force over force [-]",
+                1.0 / np.cos(axis),
+                support_force_transfer(held, "tip", f),
+            ),
+        )
+    )
     out = []
     for x in (0.4, 2.3, 5.1):  # omega L / c between resonances; the highest mode has 36
         f = np.array([x / (2.0 * pi * _TRAVEL)])
@@ -145,6 +168,7 @@ def _rods() -> list[Check]:
                 computed=float(drive_point_mobility(held, "tip", f)[0].imag * _WAVE),
                 tolerance=1e-3,  # the modes left out are taken as static
                 source="Y = i tan(omega L/c) / (rho c A), Cremer, Heckl & Petersson 2005",
+                curve=mobility,
             )
         )
         out.append(
@@ -155,6 +179,7 @@ def _rods() -> list[Check]:
                 computed=float(support_force_transfer(held, "tip", f)[0].real),
                 tolerance=1e-3,
                 source="R = F / cos(omega L/c)",
+                curve=support,
             )
         )
     f = np.array([1.7 / (2.0 * pi * _TRAVEL)])
@@ -292,8 +317,18 @@ def _plate_integral(loss: float) -> complex:
 
 def _pistons() -> list[Check]:
     out = []
+    radius, c = 0.01, 340.0
+    axis = np.geomspace(0.05, 10.0, 100)
+    found = piston_efficiency(axis * c / (2.0 * pi * radius), pi * radius**2, c)
+    curve = ComparedCurve(
+        x_label="k a [-]",
+        y_label="radiation efficiency [-]",
+        expected=(axis, np.array([_piston_integral(ka) for ka in axis])),
+        computed=(axis, found),
+        x_log=True,
+        y_log=True,
+    )
     for ka in (0.1, 1.0, 3.0):
-        radius, c = 0.01, 340.0
         f = np.array([ka * c / (2.0 * pi * radius)])
         out.append(
             compare(
@@ -303,6 +338,7 @@ def _pistons() -> list[Check]:
                 computed=float(piston_efficiency(f, pi * radius**2, c)[0]),
                 tolerance=1e-9,
                 source="far-field intensity (2 J1(x)/x)^2, x = k a sin(theta), integrated",
+                curve=curve,
             )
         )
     return out
