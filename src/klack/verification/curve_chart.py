@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.report.chart import AxisSpec, Chart, Curve, Panel
+from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
 from klack.report.thinning import thinned
 from klack.verification.check import ComparedCurve
 
@@ -82,4 +82,4 @@ def _difference(curve: ComparedCurve, y: AxisSpec) -> tuple[Panel, ...]:
         left, axis = computed - known, AxisSpec(label="difference", unit=y.unit)
     x, left = _drawn((x, left), curve)
     line = Curve(x=x, y=left, colour="blue", width=1.4)
-    return (Panel(y=axis, curves=(line,), share=0.45),)
+    return (Panel(y=axis, curves=(line,), marks=(Mark(value=0.0, axis="y"),), share=0.45),)

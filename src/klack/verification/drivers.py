@@ -18,7 +18,7 @@ from klack.magnetics.static import static_state
 from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
 from klack.magnetics.voltage_table import VoltageTable
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.single_coil import run_coil
 
 __all__ = ["checks", "injector", "linear_coil", "opening"]
@@ -93,6 +93,15 @@ def opening(duration: float, step: float) -> np.ndarray:
     return np.asarray(80e-6 * np.sin(pi * t) ** 2)
 
 
+def _current_curve(time: np.ndarray, exact: np.ndarray, found: np.ndarray) -> ComparedCurve:
+    return ComparedCurve(
+        x_label="time [ms]",
+        y_label="current [A]",
+        expected=(time * 1e3, exact),
+        computed=(time * 1e3, found),
+    )
+
+
 def _program(voltage: float, **more: float) -> DriveProgram:
     return VoltageStep(voltage=voltage, **more).program()
 
@@ -131,6 +140,7 @@ def _linear() -> list[Check]:
             computed=float(np.max(np.abs(rise.current - exact))),
             tolerance=1e-8,
             source="i = u/R (1 - exp(-R t/L)); 12 A, 20 ns",
+            curve=_current_curve(rise.time, exact, rise.current),
         ),
         compare(
             GROUP,
@@ -180,6 +190,7 @@ def _switching() -> list[Check]:
             computed=float(np.max(np.abs(saw.current - exact))),
             tolerance=1e-10,
             source="R = 0: straight lines between 2 and 3 A; 1 us steps, instants located in them",
+            curve=_current_curve(saw.time, exact, saw.current),
         ),
         compare(
             GROUP,
@@ -284,6 +295,13 @@ def _core() -> list[Check]:
         time = np.array([0.05, 0.1, 0.2])
         share = np.interp(time * tau, run.time, run.flux * reluctance)
         exact = 1.0 - 4.0 * np.sum(np.exp(-(b**2) * time[:, None]) / b**2, axis=1)
+        axis = np.linspace(0.002, 0.2, 100)
+        curve = ComparedCurve(
+            x_label="time over tau [-]",
+            y_label="flux over final flux [-]",
+            expected=(axis, 1.0 - 4.0 * np.sum(np.exp(-np.outer(axis, b**2)) / b**2, axis=1)),
+            computed=(axis, np.interp(axis * tau, run.time, run.flux * reluctance)),
+        )
         out.append(
             compare(
                 GROUP,
@@ -292,6 +310,7 @@ def _core() -> list[Check]:
                 computed=float(np.max(np.abs(share - exact))),
                 tolerance=tolerance,
                 source="1 - 4 sum exp(-b_n^2 t/tau)/b_n^2, J0(b_n) = 0; t = 0.05 to 0.2 tau",
+                curve=curve,
             )
         )
     return out

@@ -11,7 +11,7 @@ from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.film_reference import film_by_ode, squeeze_by_volumes
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import one_contact, steel_rod
@@ -39,6 +39,18 @@ def _geometry() -> list[Check]:
     ring = RingFilm(shape="ring", inner_radius=1.4e-3, outer_radius=2e-3)
     force = ring.film_row(4e-4, 1e5).cubic * 0.3 / 2e-6**3
     gridded = squeeze_by_volumes(1.4e-3, 2e-3, 2000) * 4e-4 * 0.3 / 2e-6**3
+    gaps = np.geomspace(0.5e-6, 50e-6, 60)
+    curve = ComparedCurve(
+        x_label="gap [um]",
+        y_label="force [N]",
+        expected=(gaps * 1e6, gridded * (2e-6 / gaps) ** 3),
+        computed=(
+            gaps * 1e6,
+            np.array([_film_force(ring.film_row(4e-4, 1e5), h, 0.3) for h in gaps]),
+        ),
+        x_log=True,
+        y_log=True,
+    )
     disc = DiscFilm(shape="disc", radius=1e-3)
     narrow = RingFilm(shape="ring", inner_radius=1e-3, outer_radius=1.001e-3)
     cone = ConeFilm(shape="cone", mean_radius=0.75e-3, width=0.25e-3, half_angle=pi / 4)
@@ -50,6 +62,7 @@ def _geometry() -> list[Check]:
             computed=force,
             tolerance=1e-6,
             source="Reynolds' equation in 2000 finite volumes",
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -144,6 +157,16 @@ def _mass() -> list[Check]:
     # the impulse of the film, B/(2 h^2), grows evenly over time
     time = light.step * np.arange(light.gap.size)
     times = np.interp([20e-6**-2, 1e-6**-2], light.gap**-2, time)
+    falling = (light.gap < 20e-6) & (light.gap > 1e-6)
+    since = time[falling] - times[0]
+    exact = 1.0 / np.sqrt(20e-6**-2 + 20.0 * since / ring.cubic)
+    curve = ComparedCurve(
+        x_label="time since 20 um [us]",
+        y_label="gap [um]",
+        expected=(since * 1e6, exact * 1e6),
+        computed=(since * 1e6, light.gap[falling] * 1e6),
+        y_log=True,
+    )
     parting = interface_motion(
         rigid_mass_body("needle", 3e-3, port="bottom"),
         wall,
@@ -170,6 +193,7 @@ def _mass() -> list[Check]:
             computed=float(times[1] - times[0]),
             tolerance=1e-5,
             source="Stefan (1874): t = B/(2F) (1/h2^2 - 1/h1^2); step 20 ns, mass 0.1 ug",
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -234,6 +258,7 @@ def _rods() -> list[Check]:
         )
         errors.append(_energy_norm(m.state - exact, a, b) / _energy_norm(exact, a, b))
     order = -np.polyfit(np.log(steps[:3]), np.log(errors[:3]), 1)[0]
+    widths = 60e-6 / steps * 1e9
     rough = FilmRow(cubic=5e-17, linear=4e-12, cut_off=0.2e-6, suction=0.6)
     law = HuntCrossley(LinearLaw(1e10), gonthier_coefficient(0.9))
     both = interface_motion(
@@ -256,6 +281,14 @@ def _rods() -> list[Check]:
             tolerance=0.1,
             source="steps of 160, 80, 40 ns against Radau IIA",
             absolute=True,
+            curve=ComparedCurve(
+                x_label="step [ns]",
+                y_label="error of the state [-]",
+                expected=(widths, errors[0] * (widths / widths[0]) ** 2),
+                computed=(widths, np.array(errors)),
+                x_log=True,
+                y_log=True,
+            ),
         ),
         compare(
             GROUP,

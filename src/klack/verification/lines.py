@@ -15,7 +15,7 @@ from klack.hydraulics.line_friction import (
     zielke_weight,
 )
 from klack.network.rows import LineRow
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.single_line import (
     End,
     exponential_decay,
@@ -72,6 +72,10 @@ def heptane_line(segments: int, weights: ExponentialWeights | None = KAGAWA) -> 
     )
 
 
+def _microseconds(count: int) -> NDArray[np.float64]:
+    return np.asarray(np.arange(count) * (STEP * 1e6), dtype=np.float64)
+
+
 def _closure() -> list[Check]:
     """Reservoir at a, valve at b that shuts at once; 50 periods."""
     speed, periods = 0.4, 50
@@ -82,6 +86,14 @@ def _closure() -> list[Check]:
     )
     jump = RHO * SPEED * speed
     square = np.where((np.arange(n) // (2 * STEPS)) % 2 == 0, jump, -jump)
+    first = slice(0, 16 * STEPS, 10)  # four periods
+    time = _microseconds(n)[first]
+    curve = ComparedCurve(
+        x_label="time since closure [us]",
+        y_label="pressure [bar]",
+        expected=(time, square[first] / 1e5),
+        computed=(time, run.pressure[first, 1] / 1e5),
+    )
     return [
         compare(
             GROUP,
@@ -98,6 +110,7 @@ def _closure() -> list[Check]:
             computed=float(np.max(np.abs(run.pressure[:, 1] - square))) / jump,
             tolerance=1e-10,
             source="d'Alembert; no friction, no decay",
+            curve=curve,
         ),
     ]
 
@@ -117,6 +130,13 @@ def _slow_closure() -> list[Check]:
         late = 2 * STEPS * k
         exact[late:] += 2.0 * (-1) ** k * IMPEDANCE * missing[: n - late]
     bound = 2.0 * RHO * LENGTH * speed / (closing * STEP)
+    time = _microseconds(n)
+    curve = ComparedCurve(
+        x_label="time [us]",
+        y_label="pressure [bar]",
+        expected=(time, exact / 1e5),
+        computed=(time, run.pressure[:, 1] / 1e5),
+    )
     return [
         compare(
             GROUP,
@@ -125,6 +145,7 @@ def _slow_closure() -> list[Check]:
             computed=float(np.max(np.abs(run.pressure[:, 1] - exact))) / bound,
             tolerance=1e-12,
             source="Wylie & Streeter 1993, ch. 3: characteristics without friction",
+            curve=curve,
         ),
         compare(
             GROUP,
@@ -133,6 +154,7 @@ def _slow_closure() -> list[Check]:
             computed=float(np.max(run.pressure[:, 1])),
             tolerance=1.0 / (2 * STEPS),
             source="Michaud: 2 rho L v / t_c; records are means over a step",
+            curve=curve,
         ),
     ]
 
@@ -206,6 +228,17 @@ def _pulse() -> list[Check]:
 def _weights() -> list[Check]:
     source = "sum exp(-j_2k^2 tau), zeros of J_2"
     zielke, kagawa = (np.logspace(np.log10(low), 0.0, 400) for low in (1e-6, 1e-5))
+    curves = [
+        ComparedCurve(
+            x_label="nu t / R^2 [-]",
+            y_label="weight [-]",
+            expected=(tau, laminar_weight(tau)),
+            computed=(tau, weight(tau)),
+            x_log=True,
+            y_log=True,
+        )
+        for tau, weight in ((zielke, zielke_weight), (kagawa, KAGAWA))
+    ]
     return [
         compare(
             GROUP,
@@ -214,6 +247,7 @@ def _weights() -> list[Check]:
             computed=float(np.max(np.abs(zielke_weight(zielke) / laminar_weight(zielke) - 1.0))),
             tolerance=1e-3,
             source=source,
+            curve=curves[0],
         ),
         compare(
             GROUP,
@@ -222,6 +256,7 @@ def _weights() -> list[Check]:
             computed=float(np.max(np.abs(KAGAWA(kagawa) / laminar_weight(kagawa) - 1.0))),
             tolerance=3.5e-3,
             source=source,
+            curve=curves[1],
         ),
     ]
 
@@ -308,6 +343,12 @@ def _start_up() -> list[Check]:
             computed=float(np.max(np.abs(share - exact)[late])),
             tolerance=3e-3,
             source="Szymanski 1932, over the final flow; Kagawa's terms are 0.3 % off",
+            curve=ComparedCurve(
+                x_label="nu t / R^2 [-]",
+                y_label="flow over the final flow [-]",
+                expected=(tau, exact),
+                computed=(tau, share),
+            ),
         )
     ]
 

@@ -15,7 +15,7 @@ from klack.magnetics.lifting_magnet import lifting_magnet
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.static import static_state
 from klack.verification import lifting_magnet as published
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 
 __all__ = ["checks"]
 
@@ -206,8 +206,34 @@ def _eddy() -> list[Check]:
         terms=4,
     )
     R_sheet = 20e-3 / (mu * 2e-3 * 10e-3)
-    z = np.sqrt(10j)
-    exact = z * iv(0, z) / (2.0 * iv(1, z))
+
+    def impedance(ratio: np.ndarray) -> np.ndarray:
+        z = np.sqrt(1j * ratio)
+        return np.asarray(np.abs(z * iv(0, z) / (2.0 * iv(1, z))))
+
+    ratios = np.geomspace(0.1, 1000.0, 80)
+    driven = np.array([abs(1.0 + four.mmf_per_flux(1j * w / tau) / R) for w in ratios])
+    over_frequency = ComparedCurve(
+        x_label="omega mu sigma a^2 [-]",
+        y_label="mmf over flux [reluctance]",
+        expected=(ratios, impedance(ratios)),
+        computed=(ratios, driven),
+        x_log=True,
+        y_log=True,
+    )
+    times = np.linspace(0.01, 0.5, 99)
+    steps = {
+        name: ComparedCurve(
+            x_label="time [mu sigma a^2]",
+            y_label="mean flux over final flux [-]",
+            expected=(times, exact(times)),
+            computed=(times, np.array([_step(ladder, R0, t * tau) for t in times])),
+        )
+        for name, ladder, R0, exact in (
+            ("cylinder", four, R, _cylinder_step),
+            ("sheet", sheet, R_sheet, _sheet_step),
+        )
+    }
     return [
         compare(
             GROUP,
@@ -220,10 +246,11 @@ def _eddy() -> list[Check]:
         compare(
             GROUP,
             "four terms at omega tau = 10, |mmf/flux| of a cylinder [-]",
-            expected=float(abs(exact)),
+            expected=float(impedance(np.array(10.0))),
             computed=abs(1.0 + four.mmf_per_flux(10j / tau) / R),
             tolerance=1e-6,
             source="z I0(z)/(2 I1(z)), z^2 = j omega mu sigma a^2",
+            curve=over_frequency,
         ),
         compare(
             GROUP,
@@ -241,6 +268,7 @@ def _eddy() -> list[Check]:
                 computed=_step(ladder, R0, t * tau),
                 tolerance=0.01,
                 source="exact series of flux diffusion after a step of the surface field",
+                curve=steps[name],
             )
             for name, ladder, R0, t, expected in (
                 ("cylinder", four, R, 0.02, 0.2985639),
@@ -250,6 +278,17 @@ def _eddy() -> list[Check]:
             )
         ),
     ]
+
+
+def _cylinder_step(time: np.ndarray) -> np.ndarray:
+    b = jn_zeros(0, 200)
+    return np.asarray(1.0 - 4.0 * np.sum(np.exp(-np.outer(time, b**2)) / b**2, axis=1))
+
+
+def _sheet_step(time: np.ndarray) -> np.ndarray:
+    """Thickness ``a``, fields on both faces."""
+    n = pi * (2.0 * np.arange(200) + 1.0)
+    return np.asarray(1.0 - 8.0 * np.sum(np.exp(-np.outer(time, n**2)) / n**2, axis=1))
 
 
 def _matrices(ladder: EddyLadder, R: float) -> tuple[np.ndarray, np.ndarray]:
@@ -301,11 +340,28 @@ def _map() -> list[Check]:
 def _lifting_magnet() -> list[Check]:
     circuit = lifting_magnet()
     source = "finite elements; Modelica Standard Library, ComparisonQuasiStatic"
+    states = [static_state(circuit, current=published.CURRENT, gap=float(x)) for x in published.GAP]
+    curves = {
+        what: ComparedCurve(
+            x_label="gap [mm]",
+            y_label=label,
+            expected=(published.GAP * 1e3, known),
+            computed=(published.GAP * 1e3, np.array(found)),
+        )
+        for what, label, known, found in (
+            ("force", "force [N]", published.FORCE, [s.force for s in states]),
+            (
+                "inductance",
+                "inductance [H]",
+                published.INDUCTANCE,
+                [s.inductance for s in states],
+            ),
+        )
+    }
     out = []
-    for x, force, inductance in zip(
-        published.GAP, published.FORCE, published.INDUCTANCE, strict=True
+    for x, force, inductance, state in zip(
+        published.GAP, published.FORCE, published.INDUCTANCE, states, strict=True
     ):
-        state = static_state(circuit, current=published.CURRENT, gap=float(x))
         for what, unit, expected, computed in (
             ("force", "N", force, state.force),
             ("inductance", "H", inductance, state.inductance),
@@ -318,6 +374,7 @@ def _lifting_magnet() -> list[Check]:
                     computed=computed,
                     tolerance=0.1,
                     source=source,
+                    curve=curves[what],
                 )
             )
     return out

@@ -35,7 +35,7 @@ from klack.simulation.impact import simulate_impact
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.units import Compliance, Length
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.film_reference import film_by_ode
 from klack.verification.one_dimension import one_contact, steel_rod
 from klack.verification.whole_valve import peak_and_hold, whole_valve
@@ -80,6 +80,7 @@ def _check(
     source: str,
     *,
     absolute: bool = False,
+    curve: ComparedCurve | None = None,
 ) -> Check:
     return compare(
         GROUP,
@@ -89,6 +90,7 @@ def _check(
         tolerance=tolerance,
         source=source,
         absolute=absolute,
+        curve=curve,
     )
 
 
@@ -289,12 +291,20 @@ def _kernel() -> Check:
     }
     connections = [["a.bottom", "stop.upper"], ["b.top", "stop.lower"]]
     result = _run(Network(parts, connections), 40e-6, free=True)
+    record = result.interfaces["stop"]
+    force = record.contact_force
     return _check(
         "two rods, peak force [N]",
         float(history.force.max()),
-        float(result.interfaces["stop"].contact_force.max()),
+        float(force.max()),
         1e-9,
         "the impact kernel of klack, written apart: 60 modes, 1e9 N/m before 1e-9 m/N",
+        curve=ComparedCurve(
+            x_label="time [us]",
+            y_label="force [N]",
+            expected=(history.time * 1e6, history.force),
+            computed=(record.time * 1e6, force),
+        ),
     )
 
 
@@ -491,6 +501,15 @@ def _coil() -> list[Check]:
             float(_values(result, "coil current")[-1]),
             1e-5,
             "U/R (1 - exp(-R t/L)); implicit midpoint, order 2",
+            curve=ComparedCurve(
+                x_label="time [ms]",
+                y_label="current [A]",
+                expected=(
+                    result.time * 1e3,
+                    -voltage / R * np.expm1(-R * result.time / inductance),
+                ),
+                computed=(result.time * 1e3, _values(result, "coil current")),
+            ),
         ),
         _check(
             "force on the armature then [N]",
