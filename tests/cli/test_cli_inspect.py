@@ -12,6 +12,8 @@ from klack.cli.main import main
 from klack.errors import InputError
 from klack.exchange.fmu.build import build_fmu
 from klack.exchange.modal_model import Provenance, body_model
+from klack.mesh.profile import Line, Profile
+from klack.mesh.solid import write_step_revolved
 from klack.simulation.bodies import rod_body
 
 NEEDLE = find_case("needle-from-inp").parent / "needle.inp"
@@ -24,6 +26,60 @@ def test_a_mesh_shows_its_sets_and_where_they_lie(capsys):
     assert "7670 nodes, 4741 elements" in shown
     assert "extent z 0 to 24 mm" in shown  # length of the drawn needle
     assert "surface top 82 faces, z 24 mm, r" in shown
+
+
+CASE = """\
+klack: 1
+title: Pin on a block
+materials: {steel: {young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}
+bodies:
+  pin:
+    geometry: {step: {file: pin.step}}
+    material: steel
+    mesh: {size: 1 mm}
+  block:
+    geometry: {step: {file: pin.step}}
+    material: steel
+    mesh: {size: 1 mm}
+    fixed: [{surface: foot}]
+contact: {between: [pin.foot, block.head], gap: 0 um}
+motion: {speed: 1 m/s}
+run: {duration: 10 us}
+"""
+
+
+def test_a_step_file_shows_its_faces_alone_and_in_a_case(tmp_path: Path, capsys):
+    """Truth: areas and volume of the drawn cylinder."""
+    pin = Profile(
+        (0.0, 0.0),
+        (
+            Line((1e-3, 0.0), "foot"),
+            Line((1e-3, 5e-3), "side"),
+            Line((0.0, 5e-3), "head"),
+            Line((0.0, 0.0)),
+        ),
+    )
+    write_step_revolved({"pin": pin}, tmp_path / "pin.step")
+    text = (tmp_path / "pin.step").read_text()
+    (tmp_path / "nameless.step").write_text(
+        text.replace("ADVANCED_FACE('head'", "ADVANCED_FACE(''")
+    )
+    (tmp_path / "case.yaml").write_text(CASE)
+
+    assert main(["inspect", str(tmp_path / "pin.step")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "solid pin 15.708 mm^3" in shown  # pi 1^2 5
+    assert "surface head 3.1416 mm^2, x -1 to 1 mm, y -1 to 1 mm, z 5 mm" in shown
+    assert "note" not in shown
+
+    assert main(["inspect", str(tmp_path / "nameless.step")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "3.1416 mm^2, x -1 to 1 mm, y -1 to 1 mm, z 5 mm" in shown
+    assert "1 face without a name" in shown
+
+    assert main(["inspect", str(tmp_path / "case.yaml")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert shown.count("surface side 31.416 mm^2") == 2
 
 
 def test_a_mesh_without_unit_is_refused(capsys):

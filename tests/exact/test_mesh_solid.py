@@ -16,7 +16,8 @@ from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import mesh_summary
 from klack.mesh.sizing import MeshSizing, Refinement
-from klack.mesh.solid import mesh_revolved, mesh_step, step_names, write_step_revolved
+from klack.mesh.solid import mesh_revolved, mesh_step, write_step_revolved
+from klack.mesh.step_content import step_content
 
 MM = 1e-3
 COARSE = MeshSizing(size=1.5 * MM)
@@ -136,10 +137,15 @@ def test_ring_and_surface_sizes_are_kept(body):
 
 
 def test_step_keeps_names_solids_and_size(step):
-    assert step_names(step) == (
-        ("pin", "cap"),
-        ("tip", "shank", "joint", "brim", "rim", "top"),
-    )
+    content = step_content(step)
+    assert [solid.name for solid in content.solids] == ["pin", "cap"]
+    drawn = pin().volume, cap().volume
+    assert [solid.size for solid in content.solids] == pytest.approx(drawn, rel=1e-9)
+    names = ["tip", "shank", "joint", "brim", "rim", "top"]
+    assert [face.name for face in content.faces] == names
+    (top,) = (face for face in content.faces if face.name == "top")
+    assert top.low[2] == top.high[2]  # a flat face
+    assert top.size == pytest.approx(np.pi * top.high[0] ** 2, rel=1e-9)
     mesh = mesh_step(step, COARSE)
 
     assert mesh.solids == ("pin", "cap")
@@ -172,7 +178,9 @@ def test_faces_without_a_name_are_numbered(step, tmp_path):
         text = text.replace(f"ADVANCED_FACE('{name}'", "ADVANCED_FACE(''")
     nameless.write_text(text)
 
-    assert step_names(nameless)[1][:3] == ("face1", "face2", "face3")
+    faces = step_content(nameless).faces
+    assert [face.name for face in faces[:3]] == ["face1", "face2", "face3"]
+    assert not any(face.named for face in faces)
     assert "face1" in mesh_step(nameless, COARSE).surfaces
 
 

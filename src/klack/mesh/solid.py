@@ -22,7 +22,14 @@ from klack.mesh.profile import Profile
 from klack.mesh.quality import require_connected, require_positive_jacobians
 from klack.mesh.sizing import MeshSizing, Refinement, ball_points
 
-__all__ = ["mesh_revolved", "mesh_step", "step_names", "write_step_revolved"]
+__all__ = [
+    "face_names",
+    "mesh_revolved",
+    "mesh_step",
+    "read_step",
+    "solid_names",
+    "write_step_revolved",
+]
 
 # Elements per radius of curvature.  Netgen's default of 2 leaves flat elements with four nodes on a
 # cylinder (scaled Jacobian down to -0.01 on a needle), 2.5 none (0.15 or more).
@@ -51,7 +58,7 @@ def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
         If the file is not STEP, has no solid, a solid is inside out, a sized surface is not there,
         the solids do not touch, or netgen cannot mesh it.
     """
-    shape = _read_step(Path(path))
+    shape = read_step(Path(path))
     return _mesh_shape(f"mesh_step: {path}", shape, sizing)
 
 
@@ -88,13 +95,14 @@ def write_step_revolved(profiles: Mapping[str, Profile], path: str | Path) -> No
     path.write_text(text, encoding="latin-1")
 
 
-def step_names(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the solids and of the faces in a STEP file, as :func:`mesh_step` gives them."""
-    shape = _read_step(Path(path))
-    return _names(shape.solids, "solid"), tuple(dict.fromkeys(_names(shape.faces, "face")))
+def read_step(path: Path) -> Any:
+    """Shape of a STEP file: one solid, or several that share their common faces.
 
-
-def _read_step(path: Path) -> Any:
+    Raises
+    ------
+    InputError
+        If the file is not STEP, has no solid, or its solids overlap.
+    """
     from netgen.occ import OCCGeometry
 
     if not path.is_file():
@@ -144,6 +152,16 @@ def _glued(where: str, solids: list[Any]) -> Any:
     return shape
 
 
+def solid_names(shape: Any) -> tuple[str, ...]:
+    """Name of each solid of a shape; solid1, solid2, ... of those without."""
+    return _names(shape.solids, "solid")
+
+
+def face_names(shape: Any) -> tuple[str, ...]:
+    """Name of each face of a shape; face1, face2, ... of those without."""
+    return _names(shape.faces, "face")
+
+
 def _names(shapes: Any, kind: str) -> tuple[str, ...]:
     """Names of solids or faces; those without are called after their place in the list."""
     return tuple(shape.name or f"{kind}{k + 1}" for k, shape in enumerate(shapes))
@@ -153,7 +171,7 @@ def _mesh_shape(where: str, shape: Any, sizing: MeshSizing) -> Mesh:
     from netgen.meshing import MeshingParameters
     from netgen.occ import OCCGeometry
 
-    solids, faces = _names(shape.solids, "solid"), _names(shape.faces, "face")
+    solids, faces = solid_names(shape), face_names(shape)
     _require_upright(where, shape, solids)
     sizing.require_surfaces(faces)
     for k, solid in enumerate(shape.solids):

@@ -12,6 +12,7 @@ from klack.mesh.mesh import Mesh
 from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
 from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
+from klack.mesh.step_content import StepPart, step_content
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.model_files.system_matrix import SystemMatrix
 from klack.reduction.reduced_body import ReducedBody
@@ -24,14 +25,16 @@ Row = tuple[str, str, str]
 """What, its name, its numbers in words."""
 
 
-INSPECTED = (*MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
+STEP_ENDINGS = (".step", ".stp")
+
+INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
 """Endings of the files that :func:`inspect_file` knows."""
 
 
 def inspect_file(
     path: Path, unit_length: float | None = None, matrix: str | None = None
 ) -> tuple[Row, ...]:
-    """What a mesh, a matrix or an FMU holds.
+    """What a STEP file, a mesh, a matrix or an FMU holds.
 
     Parameters
     ----------
@@ -51,6 +54,8 @@ def inspect_file(
     if not path.is_file():
         hint = "check the spelling and the folder."
         raise InputError(str(path), got="no such file", expected="a file", hint=hint)
+    if ending in STEP_ENDINGS:
+        return tuple(_step_rows(path))
     if ending in MESH_FORMATS:
         return tuple(_mesh_rows(read_mesh_file(path, unit_length)))
     if ending in MATRIX_FORMATS:
@@ -61,7 +66,7 @@ def inspect_file(
         str(path),
         got=f"a file that ends in '{path.suffix}'",
         expected=f"one of: {', '.join(dict.fromkeys(INSPECTED))}",
-        hint="klack inspect reads meshes, matrices and FMUs.",
+        hint="klack inspect reads CAD, meshes, matrices and FMUs.",
     )
 
 
@@ -83,6 +88,8 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
         elif body.geometry.mesh is not None:
             mesh = body.geometry.mesh
             yield name, tuple(_mesh_rows(read_mesh_file(mesh.file, mesh.unit)))
+        elif body.geometry.step is not None:
+            yield name, tuple(_step_rows(body.geometry.step.file))
         else:
             yield name, (("geometry", "", "meshed by klack when the case runs"),)
 
@@ -108,6 +115,25 @@ def _reduced_rows(body: ReducedBody) -> Iterator[Row]:
             f"elastic compliance {compliance * 1e9:.4g} nm/N, {100 * share:.3g} % of it in the "
             "modes",
         )
+
+
+def _step_rows(path: Path) -> Iterator[Row]:
+    content = step_content(path)
+    for solid in content.solids:
+        yield "solid", solid.name, f"{solid.size * 1e9:.6g} mm^3, {_box(solid)}"
+    for face in content.faces:
+        count = "" if face.count == 1 else f"{face.count} faces, "
+        yield "surface", face.name, f"{count}{face.size * 1e6:.5g} mm^2, {_box(face)}"
+    nameless = sum(not face.named for face in content.faces)
+    if nameless:
+        faces = "1 face" if nameless == 1 else f"{nameless} faces"
+        yield "note", "", f"{faces} without a name in the file: numbered by klack"
+
+
+def _box(part: StepPart) -> str:
+    """Box around a part, along each axis."""
+    spans = zip("xyz", part.low, part.high, strict=True)
+    return ", ".join(f"{axis} {_range(np.array([low, high]))}" for axis, low, high in spans)
 
 
 def _mesh_rows(model: MeshModel) -> Iterator[Row]:

@@ -1,0 +1,83 @@
+"""What a STEP file holds, before it is meshed: its solids and faces, and where they lie."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.mesh.occ import MM, box_mm
+from klack.mesh.solid import face_names, read_step, solid_names
+
+__all__ = ["StepContent", "StepPart", "step_content"]
+
+_BOX_MARGIN = 1e-6  # [mm] by which OpenCASCADE draws some boxes too large
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepPart:
+    """A solid, or all faces of one name.
+
+    Parameters
+    ----------
+    name : str
+        As :func:`~klack.mesh.solid.mesh_step` gives it.
+    named : bool
+        Whether the file says the name; otherwise it is a number of the list of faces.
+    count : int
+        Solids or faces of this name.
+    size : float [m^3] or [m^2]
+        Volume or area of all of them.
+    low, high : array, shape (3,) [m]
+        Corners of the box around all of them.
+    """
+
+    name: str
+    named: bool
+    count: int
+    size: float
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepContent:
+    """Solids and faces of a STEP file, in its order."""
+
+    solids: tuple[StepPart, ...]
+    faces: tuple[StepPart, ...]
+
+
+def step_content(path: str | Path) -> StepContent:
+    """Solids and faces of a STEP file under the names that a case uses.
+
+    Raises
+    ------
+    InputError
+        If the file is not STEP, has no solid, or its solids overlap.
+    """
+    shape = read_step(Path(path))
+    return StepContent(
+        solids=_parts(list(shape.solids), solid_names(shape), MM**3),
+        faces=_parts(list(shape.faces), face_names(shape), MM**2),
+    )
+
+
+def _parts(shapes: list, names: tuple[str, ...], unit: float) -> tuple[StepPart, ...]:
+    """One entry for each name; ``unit`` is a cubic or square metre in millimetres."""
+    parts = []
+    for name in dict.fromkeys(names):
+        here = [shape for shape, other in zip(shapes, names, strict=True) if other == name]
+        boxes = [box_mm(shape) for shape in here]
+        low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+        parts.append(
+            StepPart(
+                name=name,
+                named=bool(here[0].name),
+                count=len(here),
+                size=sum(shape.mass for shape in here) / unit,
+                low=np.round(low / _BOX_MARGIN) * _BOX_MARGIN / MM,
+                high=np.round(high / _BOX_MARGIN) * _BOX_MARGIN / MM,
+            )
+        )
+    return tuple(parts)
