@@ -17,7 +17,7 @@ def inspect(
         Path,
         Parameter(
             name="FILE",
-            help="STEP file, mesh, matrix or FMU of another program; or a case: its bodies are checked.",
+            help="STEP, mesh, matrix or FMU of another program; or a case: its bodies are checked.",
         ),
     ],
     /,
@@ -30,7 +30,7 @@ def inspect(
         str | None, Parameter(name="--matrix", help="Name of a matrix in a file of several.")
     ] = None,
 ) -> int:
-    """Show solids, surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
+    """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
     Of a case: the bodies that come from other programs, checked as a run checks them.
     """
