@@ -1,5 +1,6 @@
 """A small FMU that the tests of several folders need."""
 
+import os
 import shutil
 import subprocess
 import zipfile
@@ -7,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+os.environ["KLACK_CACHE"] = "off"  # every test computes; those of the cache take a folder of theirs
 
 SOURCE = Path(__file__).parent / "data" / "spring_damper.c"
 

@@ -2,6 +2,7 @@
 
 __all__ = [
     "AccuracyWarning",
+    "CacheWarning",
     "ConvergenceError",
     "InputError",
     "KlackError",
@@ -39,6 +40,10 @@ class ConvergenceError(KlackError, RuntimeError):
 
 class AccuracyWarning(UserWarning):
     """A result is less accurate than it could be; the text says why and what to refine."""
+
+
+class CacheWarning(UserWarning):
+    """Results are not kept for later runs; those of this run are not affected."""
 
 
 class MissingExtraError(KlackError, ImportError):

@@ -93,6 +93,7 @@ def run_case(
 
 
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
+    from klack.workflow.stages import from_cache
     from klack.workflow.summary import SUMMARY_COLUMNS, estimate_lines, summary_rows
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
@@ -101,5 +102,7 @@ def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr:
         print(line, file=stream)
     for warning in study.warnings:
         print(f"Note: {warning}", file=stream)
+    if cached := from_cache(study.stage_times):
+        print(f"From the cache: {', '.join(cached)} (see klack cache)", file=stream)
     made = ["result.zarr", *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -24,6 +24,7 @@ from cyclopts import App, CycloptsError
 
 from klack import __version__
 from klack.cli import (
+    cache,
     calibrate,
     compare,
     demo,
@@ -38,7 +39,7 @@ from klack.cli import (
     stroke,
     verify,
 )
-from klack.errors import AccuracyWarning, ConvergenceError, KlackError
+from klack.errors import AccuracyWarning, CacheWarning, ConvergenceError, KlackError
 
 __all__ = ["app", "main"]
 
@@ -65,6 +66,7 @@ app.command(compare.compare)
 app.command(calibrate.calibrate)
 app.command(verify.verify)
 app.command(schema.schema)
+app.command(cache.cache)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -102,7 +104,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str], name: str) -> int:
     def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-        if issubclass(category, AccuracyWarning):
+        if issubclass(category, (AccuracyWarning, CacheWarning)):
             print(f"{name}: note: {message}", file=sys.stderr)
         else:
             usual(message, category, *place, **more)

@@ -15,11 +15,13 @@ of mass, as in a modal model with the rigid mode as one coordinate.
 """
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.cache.entry import Entry
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.statics import Flexibility
@@ -59,6 +61,34 @@ def contact_compliance(
     array, shape (nc, nc) [m/N]
         Symmetric.
     """
+    return _remembered_compliance(
+        flexibility_a,
+        flexibility_b,
+        (space.G_a, space.G_b),
+        lambda: _condensed(space, flexibility_a, flexibility_b),
+    )
+
+
+def _remembered_compliance(
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+    parts: tuple[object, ...],
+    compute: Callable[[], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    if flexibility_a.cache is None or flexibility_b.cache is None:
+        return compute()
+    return flexibility_a.remembered(
+        "compliance of the contact",
+        (flexibility_b.key, *parts),
+        compute,
+        lambda C: Entry(arrays={"C": C}),
+        lambda entry: entry.arrays["C"],
+    )
+
+
+def _condensed(
+    space: ContactSpace, flexibility_a: Flexibility, flexibility_b: Flexibility
+) -> NDArray[np.float64]:
     C = np.zeros((space.count, space.count))
     for G, flexibility in ((space.G_a, flexibility_a), (space.G_b, flexibility_b)):
         for start in range(0, space.count, _CHUNK):
@@ -160,6 +190,21 @@ def extended_compliance(
     """
     if space.slave != known.space.slave:
         return contact_compliance(space, flexibility_a, flexibility_b)
+    parts = (space.G_a, space.G_b, space.nodes, known.space.nodes, known.compliance)
+    return _remembered_compliance(
+        flexibility_a,
+        flexibility_b,
+        parts,
+        lambda: _extended(space, known, flexibility_a, flexibility_b),
+    )
+
+
+def _extended(
+    space: ContactSpace,
+    known: StaticContact,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+) -> NDArray[np.float64]:
     _, here, there = np.intersect1d(space.nodes, known.space.nodes, return_indices=True)
     fresh = np.setdiff1d(np.arange(space.count), here)
     C = np.zeros((space.count, space.count))

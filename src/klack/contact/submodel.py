@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from klack.cache.result_cache import ResultCache
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
@@ -52,6 +53,7 @@ def local_stiffness(
     *,
     size: float,
     fit_share: tuple[float, float] = (0.5, 1.0),
+    cache: ResultCache | None = None,
 ) -> LocalStiffness:
     """Linear stiffness of the region within ``size`` of the contact, both bodies together.
 
@@ -67,6 +69,8 @@ def local_stiffness(
         Some half widths of the contact; the result depends on it.
     fit_share : pair of float [-]
         Range of the fit as shares of the highest force.
+    cache : ResultCache, optional
+        Keeps the compliance of the region for later runs.
     """
     require_positive("contact submodel: size", size, "m")
     low, high = fit_share
@@ -80,7 +84,10 @@ def local_stiffness(
     space = static.space
     carrying = space.points[static.pressures[-1] > 0]
     parts = [_region(body, carrying, size) for body in (body_a, body_b)]
-    with Flexibility(parts[0][0]) as first, Flexibility(parts[1][0]) as second:
+    with (
+        Flexibility(parts[0][0], cache=cache) as first,
+        Flexibility(parts[1][0], cache=cache) as second,
+    ):
         C = contact_compliance(space, first, second)
     yields = np.diag(C) > 1e-6 * np.max(np.diag(C))  # a held point has no compliance at all
     space, C = space.restricted(yields), C[np.ix_(yields, yields)]

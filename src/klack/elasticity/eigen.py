@@ -13,6 +13,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from klack.cache.entry import Entry
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend
 from klack.elasticity.lanczos import block_lanczos
@@ -79,12 +80,28 @@ def eigenmodes(
     _check_request(body, count, max_frequency)
     rigid_frequencies(body)
     if len(body.free) <= _LARGEST_DENSE:
-        shapes = _dense(body)
-    elif flexibility is not None:
-        shapes = _iterated(flexibility, count, max_frequency)
-    else:
-        with Flexibility(body, backend=backend, threads=threads) as own:
-            shapes = _iterated(own, count, max_frequency)
+        return _lowest(body, _dense(body), count, max_frequency)
+    if flexibility is not None:
+        # a pool of more modes is no answer: its first ones differ by 1e-8, the bound of Lanczos
+        return flexibility.remembered(
+            "modes",
+            (count, max_frequency),
+            lambda: _lowest(
+                body, _iterated(flexibility, count, max_frequency), count, max_frequency
+            ),
+            lambda modes: Entry(arrays={"omega": modes.omega, "shapes": modes.shapes}),
+            lambda entry: Modes(entry.arrays["omega"], entry.arrays["shapes"]),
+        )
+    with Flexibility(body, backend=backend, threads=threads) as own:
+        return _lowest(body, _iterated(own, count, max_frequency), count, max_frequency)
+
+
+def _lowest(
+    body: ElasticBody,
+    shapes: NDArray[np.float64],
+    count: int | None,
+    max_frequency: float | None,
+) -> Modes:
     modes = _rayleigh_ritz(body, shapes)
     keep = len(modes.omega) if count is None else count
     if max_frequency is not None:

@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 
-__all__ = ["Backend", "Factorization", "Precision", "available_backends", "factorize"]
+__all__ = [
+    "Backend",
+    "Factorization",
+    "Precision",
+    "available_backends",
+    "chosen_backend",
+    "factorize",
+]
 
 Backend = Literal["auto", "pardiso", "ngsolve", "superlu"]
 Precision = Literal["double", "single"]
@@ -126,7 +133,7 @@ def factorize(
         raise not_positive_definite(
             f"diagonal entry {int(np.argmin(A.diagonal()))} is not positive"
         )
-    name = _chosen(backend)
+    name = chosen_backend(backend)
     single = precision == "single" and name == "pardiso"
     factor = _load(name)(A, threads, "single") if single else _load(name)(A, threads)
     try:
@@ -167,7 +174,8 @@ def _load(name: str) -> Callable[..., Factorization]:
     return getattr(import_module(module), class_name)
 
 
-def _chosen(backend: str) -> str:
+def chosen_backend(backend: str) -> str:
+    """Name of the solver that a choice means here; refuses one that is not installed."""
     names = available_backends()
     if backend == "auto":
         return names[0]

@@ -10,20 +10,34 @@ where P removes the resultant of the load by the inertia forces of the rigid mot
 rigid motion from the answer.  K^+ may be any generalised inverse: here six degrees of freedom of
 three distant nodes (one of a body of revolution) are held, which costs no reaction force because
 the load is in balance.
+
+A factorisation cannot be stored, but what was solved with it can.  With a cache, a body that was
+factorised before is factorised again only when something is asked for that the cache does not have.
 """
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from klack.cache.content import content_key
+from klack.cache.entry import Entry
+from klack.cache.remember import remembered
+from klack.cache.result_cache import ResultCache
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.closing import Closing
-from klack.elasticity.factorization import Backend, Factorization, factorize
+from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
 from klack.errors import InputError
 
 __all__ = ["Flexibility"]
 
 _CHUNK = 64
+_POSITIVE = Entry(arrays={}, text="positive definite")
+
+Result = TypeVar("Result")
 
 
 class Flexibility(Closing):
@@ -35,19 +49,47 @@ class Flexibility(Closing):
     backend : {"auto", "pardiso", "ngsolve", "superlu"}
     threads : int, optional
         See :func:`klack.elasticity.factorization.factorize`.
+    cache : ResultCache, optional
+        Keeps what :meth:`deflections` and :meth:`remembered` compute, for later runs.
     """
 
     def __init__(
-        self, body: ElasticBody, *, backend: Backend = "auto", threads: int | None = None
+        self,
+        body: ElasticBody,
+        *,
+        backend: Backend = "auto",
+        threads: int | None = None,
+        cache: ResultCache | None = None,
     ) -> None:
-        self.body = body
+        self.body, self.cache = body, cache
+        self._backend, self._threads = backend, threads
+        self._factor: Factorization | None = None
+        self._closed = False
         self._R = body.rigid_modes
         self._MR = body.M @ self._R
         self._kept = body.free
         if self._R.shape[1]:
             self._kept = np.setdiff1d(body.free, _isostatic_support(body), assume_unique=True)
-        self.factorization: Factorization = factorize(
-            body.K[self._kept][:, self._kept], backend=backend, threads=threads
+        # known to be positive definite, and most of what it is needed for is in the cache
+        self.remembered("factorisation", (), self._check, lambda _: _POSITIVE, lambda _: None)
+
+    @property
+    def factorization(self) -> Factorization:
+        """The factorisation, made when it is first needed."""
+        if self._closed:
+            raise RuntimeError("this factorisation has been closed")
+        if self._factor is None:
+            K = self.body.K[self._kept][:, self._kept]
+            self._factor = factorize(K, backend=self._backend, threads=self._threads)
+        return self._factor
+
+    @cached_property
+    def key(self) -> str:
+        """Key of everything that an answer depends on."""
+        body = self.body
+        return content_key(
+            (body.K, body.M, body.fixed, body.mesh.points, body.dimension),
+            (chosen_backend(self._backend), self._threads),
         )
 
     def solve(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,9 +121,41 @@ class Flexibility(Closing):
                 U[:, at : at + _CHUNK] = self._solve_block(F[:, at : at + _CHUNK])
         return U
 
+    def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""
+        return self.remembered(
+            "deflections",
+            (F,),
+            lambda: self.solve(F),
+            lambda U: Entry(arrays={"U": U}),
+            lambda entry: entry.arrays["U"],
+        )
+
+    def remembered(
+        self,
+        kind: str,
+        parts: tuple[object, ...],
+        compute: Callable[[], Result],
+        pack: Callable[[Result], Entry],
+        unpack: Callable[[Entry], Result],
+    ) -> Result:
+        """Take a result of this body from its cache; see :func:`klack.cache.remember.remembered`.
+
+        ``parts`` is what it depends on besides the body and its solver.
+        """
+        if self.cache is None:
+            return compute()
+        return remembered(self.cache, kind, (self.key, *parts), compute, pack=pack, unpack=unpack)
+
     def close(self) -> None:
         """Give back the memory of the factorisation."""
-        self.factorization.close()
+        self._closed = True
+        if self._factor is not None:
+            self._factor.close()
+
+    def _check(self) -> None:
+        """Factorise: an error of the matrix comes here and not later."""
+        _ = self.factorization
 
     def _solve_block(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         R, MR = self._R, self._MR

@@ -85,7 +85,7 @@ def reduce_body(
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
     pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, flexibility)
     kept = kept_modes(modes, pool, patterns)
-    deflections = flexibility.solve(patterns)
+    deflections = flexibility.deflections(patterns)
     extra = _no_modes(body)
     if correction == "attachment" and shifts is None:
         extra = residual_attachment(body, kept, deflections)

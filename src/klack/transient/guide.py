@@ -241,7 +241,7 @@ def _missing(
     """Static compliance of a section less that of the kept modes, shape (2, 2) [m/N]."""
     omega = model.omega[: own.shape[1]]
     elastic = omega > 0
-    whole = load.T @ flexibility.solve(load)
+    whole = load.T @ flexibility.deflections(load)
     modal = (own[:, elastic] / omega[elastic]) @ (own[:, elastic] / omega[elastic]).T
     rest = whole - modal
     return np.asarray(0.5 * (rest + rest.T))

@@ -406,7 +406,7 @@ def _fresh_statics(
             if (G := _rows_of(contact, item.body.name)) is not None
         ]
         forces = sum(G.T @ loads[rows] for G, rows in parts)
-        u = item.flexibility.solve(np.asarray(forces))
+        u = item.flexibility.deflections(np.asarray(forces))
         for G, rows in parts:
             answers[rows] += G @ u
     works = loads.T @ answers

@@ -14,15 +14,13 @@ from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
-from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.mesh_file import read_mesh_file
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
-from klack.mesh.solid import mesh_revolved, mesh_step
-from klack.mesh.swept import sweep
 from klack.units import format_si
 from klack.workflow.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.workflow.generated_mesh import meshed_profiles, meshed_step
 from klack.workflow.held_nodes import held_nodes
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
@@ -162,17 +160,14 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
             f"bodies.{name}", got="no element sizes", expected="mesh", hint="add mesh: {size: ...}."
         )
     if geometry.step is not None:
-        return mesh_step(geometry.step.file, _sizing(body.mesh, places))
+        return meshed_step(geometry.step, _sizing(body.mesh, places))
     if geometry.profile is None:
         raise InputError(
             f"bodies.{name}.geometry", got="no shape", expected="a profile", hint="draw one."
         )
     sizing = _sizing(body.mesh, tuple(_ring(at) for at in places))
     profiles = geometry.profile.profiles()
-    if geometry.model == "solid":
-        return mesh_revolved(profiles, sizing)
-    meridian = mesh_meridian(profiles, sizing)
-    return meridian if geometry.layers is None else sweep(meridian, geometry.layers)
+    return meshed_profiles(profiles, sizing, geometry.model or "axisymmetric", geometry.layers)
 
 
 def _ring(place: tuple[float, ...]) -> tuple[float, ...]:

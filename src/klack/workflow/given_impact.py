@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import __version__
+from klack.cache.setting import result_cache
 from klack.case.given_consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
@@ -52,7 +53,7 @@ def run_given_impact(
     """
     begin = perf_counter()
     wanted = _checked(case, levels)
-    clock = StageClock(progress)
+    clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         pair = build_given_pair(case, clock, threads=threads)
         clock("reduced", 0.0)

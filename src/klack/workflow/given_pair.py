@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.cache.setting import result_cache
 from klack.case.bodies import CaseBody, SurfaceName
 from klack.case.schema import Case, HertzLocalLaw, LinearLocalLaw
 from klack.contact.laws import HertzLaw, LinearLaw
@@ -134,7 +135,7 @@ def _side(case: Case, surface: SurfaceName, threads: int | None) -> tuple[Reduce
         _note_missing(given, reduced)
         return reduced, _summary(given, reduced, surface.surface)
     body, port = _elastic(case, surface)
-    flexibility = Flexibility(body, threads=threads)
+    flexibility = Flexibility(body, threads=threads, cache=result_cache())
     choice = selection_of(case.reduction.choice(body.name))
     pool = mode_pool(choice, body, flexibility)
     correction = case.reduction.correction

@@ -10,6 +10,7 @@ import numpy as np
 
 from klack import __version__
 from klack.acoustics.comparison import compare_histories
+from klack.cache.setting import result_cache
 from klack.case.schema import Case, SubmodelLocalLaw
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
@@ -106,7 +107,7 @@ def run_impact(
     _require_time_to_touch(case)
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
-    clock = StageClock(progress)
+    clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
         needed = [1]

@@ -111,7 +111,7 @@ def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibilit
     compliance = 0.0
     for G, flexibility in ((space.G_a, upper), (space.G_b, lower)):
         load = G.T @ lam
-        compliance += float(load @ flexibility.solve(load[:, None])[:, 0])
+        compliance += float(load @ flexibility.deflections(load[:, None])[:, 0])
     return compliance
 
 

@@ -165,7 +165,13 @@ def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStif
     law = problem.case.contact.local_law
     width = problem.static.half_width_at(min(peak_force, problem.static.max_force))
     size = law.size if isinstance(law, SubmodelLocalLaw) else _CLASSICAL_SIZE * width
-    return local_stiffness(problem.static, problem.pair.upper, problem.pair.lower, size=size)
+    return local_stiffness(
+        problem.static,
+        problem.pair.upper,
+        problem.pair.lower,
+        size=size,
+        cache=problem.flexibility_upper.cache,
+    )
 
 
 def first_stiffness(problem: ContactProblem) -> float:

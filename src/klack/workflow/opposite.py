@@ -82,7 +82,7 @@ def build_opposite(
     moving_surface = pair.upper.mesh.surface(asked.moving.surface)
     shift = touching_shift(mesh, surface, pair.upper.mesh, moving_surface)
     body = assemble_body(case, name, mesh.moved(np.array([0.0] * (mesh.dimension - 1) + [shift])))
-    flexibility = Flexibility(body, threads=threads)
+    flexibility = Flexibility(body, threads=threads, cache=moving.cache)
     contact = BodyPair(
         upper=body,
         lower=pair.upper,

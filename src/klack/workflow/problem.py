@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import StaticContact
@@ -58,9 +59,10 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     """
     pair = build_bodies(case, progress)
     progress("factorise", 0.0)
-    upper = Flexibility(pair.upper, threads=threads)
+    cache = result_cache()
+    upper = Flexibility(pair.upper, threads=threads, cache=cache)
     progress("factorise", 0.5)
-    lower = Flexibility(pair.lower, threads=threads)
+    lower = Flexibility(pair.lower, threads=threads, cache=cache)
     progress("factorise", 1.0)
     static = static_ladder(
         pair,

@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from klack import __version__
+from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.errors import ConvergenceError
@@ -82,7 +83,7 @@ def run_shots(
     seed = stated.seed if seed is None else seed
     workers = available_cores() if workers is None else workers
     log = shot_log(folder, shots_mark(case, seed, threads))
-    clock = StageClock(progress)
+    clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         model = build_shots(case, clock, threads=threads)
         draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]

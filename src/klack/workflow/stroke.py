@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from klack import __version__
+from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase, Variant
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.statics import check_resolution
@@ -68,7 +69,7 @@ def run_stroke(
     wanted = case.require_variants(tuple(variants) or case.run.variants)
     states = {name: _state(case, after, name) for name in wanted}
     roles = find_roles(case)
-    clock = StageClock(progress)
+    clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
         runs = {name: _run(valve, roles, name, states[name], clock) for name in wanted}

@@ -146,7 +146,7 @@ def _structure(
         modes=kept_modes(selection_of(case.reduction.choice(body.name)), pool, patterns),
         damping=damping_of(case.bodies[body.name].damping),
         ports=ports,
-        deflections=flexibility.solve(patterns),
+        deflections=flexibility.deflections(patterns),
         surfaces=surfaces[0],
         left_out=surfaces[1],
     )

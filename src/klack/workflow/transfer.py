@@ -13,6 +13,7 @@ from klack.reduction.damping import LossFactor
 from klack.reduction.full_order import full_order_receptance
 from klack.reduction.ports import Port
 from klack.reduction.receptance import Receptance, reduced_receptance
+from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_entry
 from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_receptances
@@ -63,13 +64,19 @@ def _compare(
     port: Port,
     frequencies: NDArray[np.float64],
 ) -> TransferComparison:
-    full = full_order_receptance(
-        body,
-        [port],
-        frequencies,
-        loss_factor=_LOSS_FACTOR,
-        flexibility=flexibility,
-        modes=pool,
+    full = flexibility.remembered(
+        "full-order receptance",
+        (port.name, port.pattern, frequencies, _LOSS_FACTOR, pool.omega, pool.shapes),
+        lambda: full_order_receptance(
+            body,
+            [port],
+            frequencies,
+            loss_factor=_LOSS_FACTOR,
+            flexibility=flexibility,
+            modes=pool,
+        ),
+        entry_of_receptance,
+        receptance_of_entry,
     )
     candidates: list[Receptance] = []
     for count in _COUNTS:

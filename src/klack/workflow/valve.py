@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY
@@ -75,7 +76,7 @@ def build_valve(
     flexibilities: dict[str, Flexibility] = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("factorise", i / len(bodies))
-        flexibilities[name] = Flexibility(body, threads=threads)
+        flexibilities[name] = Flexibility(body, threads=threads, cache=result_cache())
     pools = _mode_pools(case, bodies, flexibilities, progress)
     contacts = {
         name: build_stop(case, name, bodies, flexibilities, pools, progress) for name in case.stops

@@ -60,7 +60,7 @@ class _Recovered:
         """Fields under a contact force [N] with its load pattern, shape (n_dof,)."""
         u = self.shapes @ q
         if self.missing is not None and force > 0.0:
-            u = u + force * (self.flexibility.solve(load[:, None])[:, 0] + self.missing)
+            u = u + force * (self.flexibility.deflections(load[:, None])[:, 0] + self.missing)
         return MotionOfBody(name=self.name, displacement=u, velocity=self.shapes @ v)
 
 

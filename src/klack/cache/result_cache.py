@@ -1,0 +1,165 @@
+"""A folder of results under their keys: bounded, safe to delete, never the reason of a failure."""
+
+import os
+import re
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+
+from klack.cache.entry import DamagedEntry, Entry, read_entry, write_entry
+from klack.errors import CacheWarning
+
+__all__ = ["CacheContent", "ResultCache"]
+
+_NAME = re.compile(r"[0-9a-f]{64}\.entry")
+_UNFINISHED = re.compile(r"new-[^.]*\.entry\.part")
+_FORGOTTEN = 3600.0  # s after which a file that nobody finished is taken away
+_TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to delete.\n"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CacheContent:
+    """What a folder holds: number of entries, and their size [byte], unfinished files included."""
+
+    count: int
+    size: int
+
+
+class ResultCache:
+    """Results in a folder; several processes may use it at once.
+
+    An entry is written beside its place and renamed, so that a reader finds all of it or nothing;
+    of two processes that store the same result the last one wins, with the same content.  What is
+    damaged counts as absent and is written anew.  A folder that cannot be written to costs one
+    note and is then only read.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when the first result is stored.  Only files named like entries are ever deleted.
+    limit : int [byte]
+        Above it the entries that were not used for the longest time go.
+    """
+
+    def __init__(self, folder: Path, limit: int) -> None:
+        self.folder, self.limit = folder, limit
+        self.served: Counter[str] = Counter()
+        """Results given from the folder in this process, by kind."""
+        self.missed: Counter[str] = Counter()
+        """Results that it did not have."""
+        self._lock = Lock()
+        self._writable = True
+
+    def load(self, key: str, kind: str) -> Entry | None:
+        """Entry of a key, None if there is none that is whole."""
+        path = self._path(key)
+        entry = None
+        with suppress(OSError, DamagedEntry, MemoryError):
+            entry = read_entry(path, key)
+        with self._lock:
+            (self.missed if entry is None else self.served)[kind] += 1
+        if entry is not None:
+            with suppress(OSError):
+                os.utime(path)  # used just now
+        return entry
+
+    def store(self, key: str, entry: Entry) -> None:
+        """Keep a result; without effect where that is not possible."""
+        if not self._writable:
+            return
+        try:
+            try:
+                self._write(key, entry)
+            except FileNotFoundError:  # somebody deleted the folder just now
+                self._write(key, entry)
+            self._keep_within_limit()
+        except OSError as error:
+            self._give_up(error)
+
+    def content(self) -> CacheContent:
+        """Count what is there."""
+        files = list(self._files())
+        count = sum(1 for path, _, _ in files if _NAME.fullmatch(path.name))
+        return CacheContent(count=count, size=sum(size for _, size, _ in files))
+
+    def clear(self) -> CacheContent:
+        """Delete all entries; says what was deleted.
+
+        Raises
+        ------
+        OSError
+            If one cannot be deleted.
+        """
+        count = size = 0
+        for path, length, _ in list(self._files()):
+            path.unlink(missing_ok=True)
+            count, size = count + bool(_NAME.fullmatch(path.name)), size + length
+        return CacheContent(count=count, size=size)
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.entry"
+
+    def _write(self, key: str, entry: Entry) -> None:
+        self._prepare()
+        part = None
+        try:
+            with tempfile.NamedTemporaryFile(
+                dir=self.folder, prefix="new-", suffix=".entry.part", delete=False
+            ) as file:
+                part = Path(file.name)
+                write_entry(file, key, entry)
+            os.replace(part, self._path(key))
+        except BaseException:
+            if part is not None:
+                with suppress(OSError):
+                    part.unlink(missing_ok=True)
+            raise
+
+    def _prepare(self) -> None:
+        if self.folder.is_dir():
+            return
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with suppress(OSError):  # tells backups to leave it out
+            (self.folder / "CACHEDIR.TAG").write_text(_TAG, encoding="ascii")
+
+    def _files(self) -> Iterator[tuple[Path, int, float]]:
+        """Files of ours, with size [byte] and time of the last use [s]."""
+        try:
+            places = list(os.scandir(self.folder))
+        except OSError:
+            return
+        for place in places:
+            if not (_NAME.fullmatch(place.name) or _UNFINISHED.fullmatch(place.name)):
+                continue
+            with suppress(OSError):  # another process may just have deleted it
+                if place.is_file(follow_symlinks=False):
+                    state = place.stat(follow_symlinks=False)
+                    yield Path(place.path), state.st_size, state.st_mtime
+
+    def _keep_within_limit(self) -> None:
+        files = sorted(self._files(), key=lambda file: file[2])
+        old = time.time() - _FORGOTTEN
+        total = sum(size for _, size, _ in files)
+        for path, size, used in files:
+            forgotten = _UNFINISHED.fullmatch(path.name) and used < old
+            if total > self.limit or forgotten:
+                with suppress(OSError):
+                    path.unlink()
+                    total -= size
+
+    def _give_up(self, error: OSError) -> None:
+        with self._lock:
+            first, self._writable = self._writable, False
+        if first:
+            warnings.warn(
+                f"results are not kept for later: {error.strerror or error} ({self.folder}). Try: "
+                "'klack cache --clear', or KLACK_CACHE with another folder, or 'off'.",
+                CacheWarning,
+                stacklevel=3,
+            )

@@ -1,0 +1,64 @@
+"""``klack cache``: results that earlier runs have left for later ones."""
+
+import sys
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from klack.cli.options import Json
+from klack.cli.output import require_json_target, write_json
+
+__all__ = ["cache"]
+
+
+def cache(
+    *,
+    clear: Annotated[bool, Parameter(negative="", help="Delete everything in it.")] = False,
+    json: Json = None,
+) -> int:
+    """Show where results are kept for later runs, and how much; KLACK_CACHE=off turns that off.
+
+    KLACK_CACHE names another folder, KLACK_CACHE_SIZE the size at which the oldest results go
+    (5 GB).  Meshes, modes and static solutions are kept, under a key of all that they depend on;
+    deleting them costs nothing but time.
+    """
+    from klack.cache.setting import result_cache
+    from klack.errors import InputError
+
+    require_json_target(json)
+    results = result_cache()
+    stream = sys.stderr if str(json) == "-" else sys.stdout
+    if results is None:
+        print("The cache is off (KLACK_CACHE, or a user without a home).", file=stream)
+        if json is not None:
+            write_json(json, {"folder": None, "count": 0, "size_B": 0, "limit_B": 0})
+        return 0
+    if clear:
+        try:
+            gone = results.clear()
+        except OSError as error:
+            raise InputError(
+                f"klack cache {results.folder}",
+                got=f"an error: {error.strerror or error}",
+                expected="files that may be deleted",
+                hint="check who owns the folder, or set KLACK_CACHE to another one.",
+            ) from error
+        print(f"Deleted {gone.count} results, {_size(gone.size)}.", file=stream)
+    there = results.content()
+    print(f"Folder: {results.folder}", file=stream)
+    print(
+        f"Results: {there.count}, {_size(there.size)} of at most {_size(results.limit)}",
+        file=stream,
+    )
+    if json is not None:
+        folder = str(results.folder)
+        numbers = {"count": there.count, "size_B": there.size, "limit_B": results.limit}
+        write_json(json, {"folder": folder, **numbers})
+    return 0
+
+
+def _size(count: int) -> str:
+    """Bytes in words."""
+    if count < 1_000_000:
+        return f"{count / 1e3:.3g} kB"
+    return f"{count / 1e6:.3g} MB" if count < 1_000_000_000 else f"{count / 1e9:.3g} GB"

@@ -1,0 +1,324 @@
+"""The folder of the cache under stress.
+
+Exact: a stored result comes back with its bits or not at all, whatever other processes, a full disk
+or a kill do to the folder.
+"""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from klack.cache.content import content_key
+from klack.cache.entry import Entry
+from klack.cache.remember import remembered
+from klack.cache.result_cache import ResultCache
+from klack.cache.setting import result_cache
+from klack.errors import CacheWarning, InputError
+
+LARGE = 10**9
+
+SQUARES = """
+import sys, time
+from pathlib import Path
+import numpy as np
+from klack.cache.entry import Entry
+from klack.cache.remember import remembered
+from klack.cache.result_cache import ResultCache
+cache = ResultCache(Path(sys.argv[1]), 10**9)
+print("ready", flush=True)
+sys.stdin.readline()
+for turn in range(int(sys.argv[2])):
+    for n in range(20):
+        x = remembered(cache, "squares", (n,), lambda: np.arange(2000.0 + n) ** 2,
+                       pack=lambda x: Entry(arrays={"x": x}), unpack=lambda e: e.arrays["x"])
+        assert np.array_equal(x, np.arange(2000.0 + n) ** 2)
+print(cache.served["squares"], cache.missed["squares"], flush=True)
+"""
+
+
+def squares(cache: ResultCache | None, n: int, calls: list[int]) -> np.ndarray:
+    def compute() -> np.ndarray:
+        calls.append(n)
+        return np.arange(1000.0 + n) ** 2
+
+    return remembered(
+        cache,
+        "squares",
+        (n,),
+        compute,
+        pack=lambda x: Entry(arrays={"x": x}),
+        unpack=lambda entry: entry.arrays["x"],
+    )
+
+
+def started(folder: Path, turns: int) -> subprocess.Popen:
+    command = [sys.executable, "-W", "error", "-c", SQUARES, str(folder), str(turns)]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+def test_a_result_is_computed_once(tmp_path):
+    calls: list[int] = []
+    first = squares(ResultCache(tmp_path / "c", LARGE), 3, calls)
+    again = squares(ResultCache(tmp_path / "c", LARGE), 3, calls)
+    none = squares(None, 3, calls)
+
+    assert calls == [3, 3]  # the last one without a cache
+    assert first.tobytes() == again.tobytes() == none.tobytes()
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data())
+def test_damage_is_repaired(tmp_path_factory, data):
+    folder, calls = tmp_path_factory.mktemp("c"), []
+    expected = squares(ResultCache(folder, LARGE), 3, calls)
+    (path,) = folder.glob("*.entry")
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 3))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+
+    found = squares(ResultCache(folder, LARGE), 3, calls)
+    once_more = squares(ResultCache(folder, LARGE), 3, calls)
+
+    assert found.tobytes() == once_more.tobytes() == expected.tobytes()
+    assert len(calls) <= 2
+
+
+def test_an_entry_of_another_purpose_is_replaced(tmp_path):
+    cache, calls = ResultCache(tmp_path, LARGE), []
+    expected = squares(cache, 3, calls)
+    (path,) = tmp_path.glob("*.entry")
+    cache.store(path.stem, Entry(arrays={}))
+
+    assert squares(cache, 3, calls).tobytes() == expected.tobytes()
+    assert squares(cache, 3, calls).tobytes() == expected.tobytes()
+    assert calls == [3, 3]
+
+
+def test_what_was_not_used_for_longest_goes_first(tmp_path):
+    cache, calls = ResultCache(tmp_path, 40_000), []  # an entry takes 8 kB: four fit
+    for n in range(4):
+        squares(cache, n, calls)
+        for path in tmp_path.glob("*.entry"):  # an hour each
+            os.utime(path, (path.stat().st_atime, path.stat().st_mtime - 3600))
+    squares(cache, 0, calls)  # used
+    for n in (4, 5):
+        squares(cache, n, calls)
+
+    assert cache.content().size <= 40_000
+    calls.clear()
+    for n in (0, 3, 4, 5):
+        squares(cache, n, calls)
+    assert calls == []
+    squares(cache, 1, calls)
+    assert calls == [1]
+
+
+def test_only_files_of_klack_are_deleted(tmp_path):
+    calls: list[int] = []
+    foreign = [tmp_path / name for name in ("notes.txt", "a.entry", "new-x.part")]
+    for path in foreign:
+        path.write_text("keep me")
+    outside = tmp_path.parent / f"{tmp_path.name}-outside"
+    outside.write_text("keep me")
+    (tmp_path / f"{content_key('link')}.entry").symlink_to(outside)
+    cache = ResultCache(tmp_path, 1)
+    squares(cache, 1, calls)  # above the limit at once
+    cache.clear()
+
+    assert [path.read_text() for path in [*foreign, outside]] == ["keep me"] * 4
+
+
+def test_unfinished_files_of_killed_runs_go_after_an_hour(tmp_path):
+    old, new = tmp_path / "new-old.entry.part", tmp_path / "new-new.entry.part"
+    old.write_bytes(b"half")
+    new.write_bytes(b"half")
+    os.utime(old, (0, time.time() - 4000))
+    squares(ResultCache(tmp_path, LARGE), 1, [])
+
+    assert not old.exists()
+    assert new.exists()  # somebody may be writing it
+
+
+def test_two_processes_on_one_empty_cache(tmp_path):
+    """Both meet the same empty folder at once; both are right, nothing unfinished is left."""
+    processes = [started(tmp_path / "deep" / "cache", 3) for _ in range(2)]
+    for process in processes:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    for process in processes:
+        out, error = process.communicate(timeout=60)
+        assert process.returncode == 0, error
+        served, missed = map(int, out.split())
+        assert served >= 40
+        assert missed <= 20
+
+    names = {path.suffix for path in (tmp_path / "deep" / "cache").iterdir()}
+    assert names == {".entry", ".TAG"}
+    assert len(list((tmp_path / "deep" / "cache").glob("*.entry"))) == 20
+
+
+def test_deleting_while_another_process_reads(tmp_path):
+    reader = started(tmp_path / "c", 30)
+    reader.stdin.write("go\n")
+    reader.stdin.flush()
+    cache = ResultCache(tmp_path / "c", LARGE)
+    cleared = 0
+    while reader.poll() is None:
+        cleared += cache.clear().count
+        time.sleep(0.005)
+
+    assert reader.returncode == 0, reader.stderr.read()
+    assert cleared > 0
+
+
+KILLED = SQUARES.replace(
+    'print("ready", flush=True)',
+    """
+import klack.cache.result_cache as module
+def slow(file, key, entry):
+    file.write(b"klack cache 1")
+    file.flush()
+    print("writing", flush=True)
+    time.sleep(60)
+module.write_entry = slow
+print("ready", flush=True)
+""",
+)
+
+
+def test_a_kill_while_writing_leaves_no_half_entry(tmp_path):
+    command = [sys.executable, "-c", KILLED, str(tmp_path), "1"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+        assert process.stdout.readline() == "ready\n"
+        assert process.stdout.readline() == "writing\n"
+        process.send_signal(signal.SIGKILL)
+    calls: list[int] = []
+
+    assert len(list(tmp_path.glob("*.part"))) == 1
+    assert not list(tmp_path.glob("*.entry"))
+    squares(ResultCache(tmp_path, LARGE), 1, calls)
+    assert calls == [1]
+
+
+def notes_of(cache: ResultCache) -> list[str]:
+    calls: list[int] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for n in (1, 2, 1):
+            assert squares(cache, n, calls).tobytes() == (np.arange(1000.0 + n) ** 2).tobytes()
+    assert all(item.category is CacheWarning for item in caught)
+    return [str(item.message) for item in caught]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT])
+def test_a_folder_that_cannot_be_written_costs_one_note(tmp_path, monkeypatch, number):
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("klack.cache.result_cache.write_entry", refuse)
+
+    notes = notes_of(ResultCache(tmp_path, LARGE))
+
+    assert len(notes) == 1
+    assert os.strerror(number) in notes[0]
+    assert "KLACK_CACHE" in notes[0]
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_folder_that_is_a_file_costs_one_note(tmp_path):
+    (tmp_path / "file").write_text("mine")
+
+    assert len(notes_of(ResultCache(tmp_path / "file" / "cache", LARGE))) == 1
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 32 kB, where mounting is allowed."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=32k", "none", str(folder)],
+        capture_output=True,
+        check=False,
+    )
+    if mounted.returncode:
+        pytest.skip("mounting is not allowed here")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_costs_one_note(small_disk):
+    (small_disk / "filled").write_bytes(bytes(28 * 1024))
+    notes = notes_of(ResultCache(small_disk, LARGE))
+
+    assert len(notes) == 1
+    assert os.strerror(errno.ENOSPC) in notes[0]
+    assert [path.name for path in small_disk.iterdir()] == ["filled"]
+
+
+def test_a_disk_that_has_become_read_only_is_still_read(small_disk):
+    expected = squares(ResultCache(small_disk, LARGE), 1, [])
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    calls: list[int] = []
+    cache = ResultCache(small_disk, LARGE)
+
+    assert squares(cache, 1, calls).tobytes() == expected.tobytes()
+    assert calls == []
+    assert len(notes_of(cache)) == 1
+
+
+def test_the_environment_says_where(tmp_path, monkeypatch):
+    monkeypatch.setenv("KLACK_CACHE", str(tmp_path / "here"))
+    monkeypatch.setenv("KLACK_CACHE_SIZE", "1.5 GB")
+    here = result_cache()
+    assert here is not None
+    assert (here.folder, here.limit) == (tmp_path / "here", 1_500_000_000)
+    assert not here.folder.exists()  # nothing stored yet
+
+    monkeypatch.delenv("KLACK_CACHE_SIZE")
+    assert result_cache().limit == 5_000_000_000
+    monkeypatch.setenv("KLACK_CACHE", "OFF")
+    assert result_cache() is None
+    monkeypatch.delenv("KLACK_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert result_cache().folder == tmp_path / "xdg" / "klack" / "results"
+
+
+@pytest.mark.parametrize("size", ["much", "-1", "3 furlongs", "1e3000", "nan"])
+def test_a_size_that_is_none_is_refused(monkeypatch, tmp_path, size):
+    monkeypatch.setenv("KLACK_CACHE", str(tmp_path))
+    monkeypatch.setenv("KLACK_CACHE_SIZE", size)
+
+    with pytest.raises(InputError, match=r"KLACK_CACHE_SIZE.*expected a size"):
+        result_cache()
+
+
+def test_a_user_without_a_home_has_no_cache(monkeypatch):
+    """A user that the system does not know, such as one of a container: '~' stays '~'."""
+    for name in ("KLACK_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    monkeypatch.chdir("/")
+
+    assert result_cache() is None
