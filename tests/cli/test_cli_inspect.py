@@ -135,3 +135,32 @@ def test_a_case_shows_the_bodies_of_other_programs(capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert "mass 3.94584 g" in shown  # as that case says, and as the drawn rod weighs
     assert "port tip elastic compliance" in shown
+
+
+def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path, capsys):
+    """Truth: two unit bricks, written by hand."""
+    brick = "*NODE\n" + "".join(
+        f"{8 * k + i + 1}, {x}, {y}, {3 * k + z}\n"
+        for k in range(2)
+        for i, (x, y, z) in enumerate(
+            (x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))
+        )
+    )
+    for k, name in enumerate(("LOWER", "UPPER")):
+        numbers = ", ".join(str(8 * k + i + 1) for i in range(8))
+        brick += f"*ELEMENT, TYPE=C3D8, ELSET={name}\n{k + 1}, {numbers}\n"
+        brick += f"*SURFACE, NAME=END_{name}, TYPE=ELEMENT\n{k + 1}, S{2 - k}\n"
+    (tmp_path / "bricks.inp").write_text(brick)
+    body = "geometry: {{mesh: {{file: bricks.inp, unit: mm}}}}\n    material: {{{}: steel}}\n"
+    case = CASE[: CASE.index("bodies:")] + "bodies:\n"
+    case += "  pin:\n    " + body.format("UPPER")
+    case += "  block:\n    " + body.format("LOWER") + "    fixed: [{surface: END_LOWER}]\n"
+    case += CASE[CASE.index("contact:") :].replace("pin.foot", "pin.END_UPPER")
+    (tmp_path / "case.yaml").write_text(case.replace("block.head", "block.END_LOWER"))
+
+    assert main(["inspect", str(tmp_path / "case.yaml")]) == 0
+    pin, block = " ".join(capsys.readouterr().out.split()).split("block what")
+    assert "volume 1 mm^3" in pin
+    assert "UPPER" in pin
+    assert "LOWER" not in pin
+    assert "UPPER" not in block

@@ -17,6 +17,7 @@ from klack.mesh.ansys_shapes import SHAPES, faces_of, shapes_of
 from klack.mesh.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.mesh_model import FileMaterial, MeshModel
 from klack.mesh.number_ranges import within
+from klack.mesh.plausible import SAY_UNIT
 
 __all__ = ["read_ansys_archive"]
 
@@ -98,14 +99,14 @@ def _unit(path: Path, archive: Archive) -> float:
                     f"{archive.lines.place(row)}: /UNITS",
                     got=f"'{label}'",
                     expected=f"one of: {', '.join(_UNITS)}",
-                    hint="add 'unit: mm' (or the unit of your model) beside the file.",
+                    hint=SAY_UNIT,
                 )
             return _UNITS[label]
     raise InputError(
         str(path),
         got="no unit of length, and no /UNITS in the file",
         expected="the unit of its coordinates",
-        hint="add 'unit: mm' (or the unit of your model) beside the file.",
+        hint=SAY_UNIT,
     )
 
 

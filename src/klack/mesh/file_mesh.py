@@ -16,6 +16,7 @@ from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, Mesh
 from klack.mesh.mesh_model import FileMaterial, MeshModel
 from klack.mesh.named_faces import MarkedFaces, named_faces
+from klack.mesh.plausible import SAY_UNIT
 from klack.mesh.quality import require_positive_jacobians
 
 __all__ = ["FileElements", "FileMesh", "mesh_model", "require_unit"]
@@ -314,6 +315,6 @@ def require_unit(path: Path, unit_length: float | None) -> float:
             str(path),
             got="no unit of length",
             expected="the unit of its coordinates: such files do not say",
-            hint="add 'unit: mm' (or the unit of your model) beside the file.",
+            hint=SAY_UNIT,
         )
     return unit_length

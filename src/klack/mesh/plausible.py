@@ -6,7 +6,10 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.units import format_si
 
-__all__ = ["LARGEST_BODY", "SMALLEST_BODY", "require_plausible_size"]
+__all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size"]
+
+SAY_UNIT = "add 'unit: mm' (or your unit) beside the file; for klack inspect, --unit mm."
+"""What to do about a mesh file that names no unit of length."""
 
 LARGEST_BODY = 2.0
 """Largest extent [m] of a body that klack takes from a file."""

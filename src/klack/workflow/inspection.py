@@ -87,7 +87,8 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
             yield name, assembled_body(case, name).rows()
         elif body.geometry.mesh is not None:
             mesh = body.geometry.mesh
-            yield name, tuple(_mesh_rows(read_mesh_file(mesh.file, mesh.unit)))
+            solids = tuple(body.material) if isinstance(body.material, dict) else None
+            yield name, tuple(_mesh_rows(read_mesh_file(mesh.file, mesh.unit, solids=solids)))
         elif body.geometry.step is not None:
             yield name, tuple(_step_rows(body.geometry.step.file))
         else:
