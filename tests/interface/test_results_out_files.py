@@ -5,6 +5,7 @@ netCDF4-python, Octave, asammdf, the csv module, and klack's own reader of measu
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -440,7 +441,7 @@ def test_files_are_whole_or_as_before(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(os, "replace", full)
     with pytest.raises(InputError, match="No space left"):
         WRITERS[name](table, path)
 

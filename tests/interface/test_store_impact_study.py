@@ -98,13 +98,27 @@ def test_an_interrupted_save_leaves_the_old_result(
     assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
 
 
-def test_an_end_between_the_two_renames_loses_nothing(
-    lonely_study: ImpactStudy, tmp_path: Path
+def test_a_result_exchanged_while_it_is_read_is_read_again(
+    impact_study: ImpactStudy,
+    lonely_study: ImpactStudy,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    save_study(lonely_study, tmp_path)
-    (tmp_path / RESULT_NAME).rename(tmp_path / f"{RESULT_NAME}.old")
+    """No numbers of two results may mix: checksums alone would not see it."""
+    save_study(impact_study, tmp_path)
+    usual, times = record_store._load, []
 
-    assert load_study(tmp_path).case == "demo"
+    def exchanged(path: Path, form: record_store.RecordFormat) -> object:
+        record = usual(path, form)
+        if not times:
+            save_study(lonely_study, tmp_path)
+        times.append(path)
+        return record
+
+    monkeypatch.setattr(record_store, "_load", exchanged)
+
+    assert list(load_study(tmp_path).levels) == ["reduced"]
+    assert len(times) == 2
 
 
 def test_no_result_is_refused(tmp_path: Path) -> None:

@@ -137,29 +137,38 @@ def test_an_interrupted_study_goes_on_with_the_same_numbers(study, alone):
 
 def test_a_log_of_another_study_is_not_used(tmp_path: Path, alone):
     mark = shots_mark(CASE, 1, None)
-    log = shot_log(tmp_path, mark)
-    for outcome in alone:
-        log.add(outcome.index, outcome)
+    with shot_log(tmp_path, mark) as log:
+        for outcome in alone:
+            log.add(outcome.index, outcome)
 
-    assert set(shot_log(tmp_path, mark).done) == {0, 1, 2, 3}
+    with shot_log(tmp_path, mark) as again:
+        assert set(again.done) == {0, 1, 2, 3}
     assert shots_mark(CASE, 2, None) != mark
-    assert shot_log(tmp_path, shots_mark(CASE, 2, None)).done == {}
+    with shot_log(tmp_path, shots_mark(CASE, 2, None)) as other:
+        assert other.done == {}
     assert SHOT_LOG.count(tmp_path) == 0
 
 
 def test_a_line_cut_off_costs_one_shot(tmp_path: Path, alone):
-    log = shot_log(tmp_path, "mark")
-    for outcome in alone:
-        log.add(outcome.index, outcome)
+    with shot_log(tmp_path, "mark") as log:
+        for outcome in alone:
+            log.add(outcome.index, outcome)
     path = tmp_path / SHOT_LOG.file
     path.write_bytes(path.read_bytes()[:-40])
 
-    again = shot_log(tmp_path, "mark")
-    assert set(again.done) == {0, 1, 2}
-    again.add(3, alone[3])
-    whole = shot_log(tmp_path, "mark")
-    assert set(whole.done) == {0, 1, 2, 3}
+    with shot_log(tmp_path, "mark") as again:
+        assert set(again.done) == {0, 1, 2}
+        again.add(3, alone[3])
+    with shot_log(tmp_path, "mark") as whole:
+        assert set(whole.done) == {0, 1, 2, 3}
     same(columns_of(list(whole.done.values())), columns_of(alone))
+
+
+def test_two_processes_do_not_share_a_log(tmp_path: Path):
+    """Both would compute the same shots, and one would cut off what the other just writes."""
+    with shot_log(tmp_path, "mark"), pytest.raises(InputError, match="another klack writes to"):
+        shot_log(tmp_path, "mark")
+    shot_log(tmp_path, "mark").close()
 
 
 def test_a_failing_shot_is_named(model, draws):

@@ -188,7 +188,9 @@ class _Plain:
         if isinstance(node, CommentedSeq):
             result = []
             for i, value in enumerate(node):
-                self.lines.values[(*key, i)] = node.lc.item(i)[0] + 1
+                where = node.lc.data.get(i) if node.lc.data else None  # not of an !!omap
+                if where is not None:
+                    self.lines.values[(*key, i)] = where[0] + 1
                 result.append(self.of(value, (*key, i)))
             return result
         if node is None or isinstance(node, bool):

@@ -10,14 +10,13 @@ from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_t
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
+from klack.cli.stopping import stop_code
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
     from klack.workflow.calibration_study import CalibrationStudy
 
 __all__ = ["calibrate"]
-
-_STOPPED = 130
 
 _Files = Annotated[
     list[Path],
@@ -103,10 +102,10 @@ def calibrate(
                 threads=threads,
             )
             failure = write_result(study, folder, save, report=report, progress=progress)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         kept = f"{TRIAL_LOG.count(folder)} computed strokes are kept in {folder / TRIAL_LOG.file}"
         print(f"klack calibrate: stopped; {kept}, the same command goes on.", file=sys.stderr)
-        return _STOPPED
+        return stop_code(stop)
     TRIAL_LOG.remove(folder)
     if not quiet:
         made = report and failure is None

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from klack.cli.options import Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder
+from klack.cli.stored import is_result
 from klack.errors import InputError
 
 __all__ = ["export"]
@@ -135,7 +136,7 @@ def export(
             "--time-limit": time_limit,
         },
     )
-    if _is_result(source):
+    if is_result(source):
         _export_stored(source, to, out, quiet=quiet)
         return 0
 
@@ -184,10 +185,6 @@ def _require_used(to: str, options: Mapping[str, object]) -> None:
                 expected=f"it with --to {' or '.join(_USED_BY[name])} only",
                 hint=f"leave {name} out.",
             )
-
-
-def _is_result(path: Path) -> bool:
-    return any((place / "zarr.json").is_file() for place in (path, path / "result.zarr"))
 
 
 def _export_stored(source: Path, to: str, out: Path | None, *, quiet: bool) -> None:

@@ -10,6 +10,7 @@ code  meaning
 2     bad input: one message that names file, line, key, what came, what was expected
 70    a mistake of klack itself; the traceback is printed
 130   stopped by Ctrl-C; nothing half written is left
+143   stopped by SIGTERM; the same
 ===== =================================================================================
 """
 
@@ -39,11 +40,13 @@ from klack.cli import (
     stroke,
     verify,
 )
+from klack.cli.stopping import stop_code, terminable
+from klack.cli.surroundings import close_quietly, in_words, prepare_compiling, prepare_streams
 from klack.errors import AccuracyWarning, CacheWarning, ConvergenceError, KlackError
 
 __all__ = ["app", "main"]
 
-EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_BUG, EXIT_STOPPED = 0, 1, 2, 70, 130
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_BUG = 0, 1, 2, 70
 
 app = App(
     name="klack",
@@ -77,10 +80,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv : sequence of str
         Arguments after ``klack``; those of the process by default.
     """
+    prepare_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = " ".join(["klack", *(a for a in arguments[:1] if not a.startswith("-"))])
     try:
-        return _run(arguments, name)
+        with terminable():
+            return _run(arguments, name)
     except CycloptsError as error:
         return _complain(f"{name}: {_one_line(error)}\nTry: {_help_of(name)}", EXIT_BAD_INPUT)
     except ConvergenceError as error:
@@ -90,16 +95,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError:
         text = "the memory of this machine is used up.\nTry: larger elements, or fewer modes."
         return _complain(f"{name}: {text}", EXIT_BAD_INPUT)
-    except KeyboardInterrupt:
-        return _complain(f"{name}: stopped; nothing was written.", EXIT_STOPPED)
+    except KeyboardInterrupt as stop:
+        return _complain(f"{name}: stopped; nothing was written.", stop_code(stop))
     except BrokenPipeError:
         # the reader of our output went away (klack schema | head); python would complain at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
+    except OSError as error:
+        close_quietly()
+        said = in_words(error)
+        return _bug(name) if said is None else _complain(f"{name}: {said}", EXIT_BAD_INPUT)
     except Exception:  # a bug: show all of it, but keep the code apart from the others
-        traceback.print_exc()
-        text = "this is a mistake of klack itself, not of your input; please report the text above."
-        return _complain(f"{name}: {text}", EXIT_BUG)
+        return _bug(name)
 
 
 def _run(arguments: list[str], name: str) -> int:
@@ -111,9 +118,17 @@ def _run(arguments: list[str], name: str) -> int:
 
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, note
+        if arguments and not arguments[0].startswith("-"):
+            prepare_compiling()
         code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
     sys.stdout.flush()
     return code if isinstance(code, int) else EXIT_OK
+
+
+def _bug(name: str) -> int:
+    traceback.print_exc()
+    text = "this is a mistake of klack itself, not of your input; please report the text above."
+    return _complain(f"{name}: {text}", EXIT_BUG)
 
 
 def _complain(text: str, code: int) -> int:

@@ -11,6 +11,7 @@ from klack.cli.options import Json, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import Progress, show_progress
 from klack.cli.reports import REPORTS, write_result
+from klack.cli.stored import is_result
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
@@ -86,17 +87,12 @@ def noise(
     return 0
 
 
-def _is_result(path: Path) -> bool:
-    """Tell a folder with a result from a case."""
-    return (path / "result.zarr").is_dir() or (path / "zarr.json").is_file()
-
-
 def _require_known(paths: Sequence[Path]) -> None:
     """Find every path before the long work begins."""
     from klack.case.shipped import find_case
 
     for path in paths:
-        if not _is_result(path):
+        if not is_result(path):
             find_case(path)
 
 
@@ -116,7 +112,7 @@ def _sources(
     """Forces and bodies of a stored result, or of a case that is run now."""
     from klack.workflow.noise_source import load_sources, run_sources
 
-    if _is_result(path):
+    if is_result(path):
         progress("result", 0.0)
         return load_sources(path, names)
 

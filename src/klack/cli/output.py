@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from klack.errors import InputError
-from klack.whole_file import whole_files
+from klack.whole_file import whole_file, whole_files
 
 __all__ = [
     "listing",
@@ -51,14 +51,13 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     if path.exists() and not path.is_file():  # /dev/stdout, a named pipe
         path.write_text(text, encoding="utf-8")
         return
-    new = path.with_name(f".{path.name}.{os.getpid()}.new")
-    try:
+
+    def refuse(place: Path, error: OSError) -> InputError:
+        reason = error.strerror or str(error)
+        return _refuse("--json", place, f"an error: {reason}", "a writable file")
+
+    with whole_file(path, refuse) as new:
         new.write_text(text, encoding="utf-8")
-        os.replace(new, path)
-    except OSError as error:
-        raise _refuse("--json", path, f"an error: {error.strerror}", "a writable file") from None
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def require_folder(folder: Path) -> None:

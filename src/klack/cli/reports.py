@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from klack.cli.output import staged_folder
+from klack.errors import InputError
+from klack.whole_file import outdated
 
 if TYPE_CHECKING:
     from klack.report.study_content import Study
@@ -48,14 +50,19 @@ def write_result(
             progress("report", 0.0)
             try:
                 write_reports(study, stage)
+            except OSError as error:
+                failure = _no_report(folder, error)
             except Exception as error:
                 failure = error
         if failure or not report:
-            _remove_reports(stage)
-            _remove_reports(folder)
+            outdated(stage, REPORTS)
     return failure
 
 
-def _remove_reports(folder: Path) -> None:
-    for name in REPORTS:
-        (folder / name).unlink(missing_ok=True)
+def _no_report(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        f"report in {folder}",
+        got=f"an error: {error.strerror or error}",
+        expected="a place to write to, and one for temporary files",
+        hint="the result itself is kept: make room, then run klack report on it.",
+    )

@@ -10,14 +10,13 @@ from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_t
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
+from klack.cli.stopping import stop_code
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
     from klack.workflow.shots_study import ShotsStudy
 
 __all__ = ["shots"]
-
-_STOPPED = 130
 
 _Count = Annotated[
     int | None, Parameter(name="--shots", help="Number of shots. [default: as in the case]")
@@ -90,10 +89,10 @@ def shots(
                 threads=threads,
             )
             failure = write_result(study, folder, save_shots, report=report, progress=progress)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
         print(f"klack shots: stopped; {kept}, the same command goes on.", file=sys.stderr)
-        return _STOPPED
+        return stop_code(stop)
     SHOT_LOG.remove(folder)
     if not quiet:
         made = report and failure is None

@@ -3,10 +3,17 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from klack.whole_file import standing
+
 if TYPE_CHECKING:
     from klack.report.study_content import Study
 
-__all__ = ["load_stored"]
+__all__ = ["is_result", "load_stored"]
+
+
+def is_result(path: Path) -> bool:
+    """Tell a folder with a result, or a store itself, from a case."""
+    return standing(path, "result.zarr").is_dir() or (path / "zarr.json").is_file()
 
 
 def load_stored(result: Path) -> "Study":

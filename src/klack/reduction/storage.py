@@ -1,6 +1,5 @@
 """Files of named arrays: versioned, without pickle, written completely or not at all."""
 
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -11,14 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.whole_file import whole_file
 
 __all__ = ["read_arrays", "write_arrays"]
 
 Arrays = dict[str, NDArray[Any]]
 
+# a count that cannot be held, a password, an unknown packing
+_OTHERS = (MemoryError, RuntimeError, NotImplementedError, KeyError, SyntaxError)
+
 
 def write_arrays(path: Path, kind: str, version: int, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays to ``path`` through a temporary neighbour and one rename.
+    """Write arrays to ``path``, all of them or none.
 
     Parameters
     ----------
@@ -30,14 +33,8 @@ def write_arrays(path: Path, kind: str, version: int, arrays: Mapping[str, NDArr
         Numbers or text.
     """
     contents: Arrays = {"format": np.array(kind), "version": np.array(version), **arrays}
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("wb") as stream:
-            np.savez(stream, **contents)  # type: ignore[arg-type]
-        os.replace(temporary, path)
-    except BaseException:  # also Ctrl-C: never leave the part file behind
-        temporary.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as new, new.open("wb") as stream:
+        np.savez(stream, **contents)  # type: ignore[arg-type]
 
 
 def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) -> Arrays:
@@ -59,7 +56,7 @@ def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) ->
         raise InputError(
             where, got="no such file", expected=f"a {kind} file", hint="check the path."
         ) from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, *_OTHERS) as error:
         raise InputError(
             where,
             got=f"something unreadable ({type(error).__name__})",

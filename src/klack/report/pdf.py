@@ -15,16 +15,17 @@ import typst
 
 from klack.report.chart import BarChart, Chart
 from klack.report.content import Content, Section
-from klack.report.output import write_whole
 from klack.report.printed import svg_bars, svg_chart
 from klack.report.study_content import Study, study_content
+from klack.whole_file import whole_file
 
 __all__ = ["render_pdf", "write_pdf"]
 
 
 def write_pdf(study: Study, path: Path) -> None:
     """Write the report of a study as a PDF file (A4)."""
-    write_whole(path, render_pdf(study_content(study)))
+    with whole_file(path) as new:
+        new.write_bytes(render_pdf(study_content(study)))
 
 
 def render_pdf(content: Content) -> bytes:

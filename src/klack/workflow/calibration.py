@@ -132,10 +132,10 @@ def run_calibration(
     _require_channels(strokes, section)
     measurement = case.measurement or CaseMeasurement()
     clock = StageClock(progress)
-    log = trial_log(folder, calibration_mark(case, strokes))
-    resumed = len(log.done)
     workers = available_cores() if workers is None else workers
-    with collected_warnings() as notes:
+    mark = calibration_mark(case, strokes)
+    with trial_log(folder, mark) as log, collected_warnings() as notes:
+        resumed = len(log.done)
         model = _motion_model(case, tree, parameters, strokes, measurement, clock, threads)
         with TrialPool(model, workers, log) as pool:
             clock("first strokes", 0.0)

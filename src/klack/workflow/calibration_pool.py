@@ -9,7 +9,14 @@ from typing import Self
 from klack.errors import ConvergenceError
 from klack.workflow.calibration_log import TrialKey, TrialLog
 from klack.workflow.calibration_motion import Motion, MotionModel
-from klack.workflow.workers import Failure, answer, shared, unwrapped, worker_pool
+from klack.workflow.workers import (
+    Failure,
+    answer,
+    deaf_to_interrupts,
+    shared,
+    unwrapped,
+    worker_pool,
+)
 
 __all__ = ["TrialPool"]
 
@@ -66,7 +73,8 @@ class TrialPool:
         if self._pool is None:
             self._pool = worker_pool(self.workers, self.model)
         try:
-            jobs = {self._pool.submit(_run, key): key for key in keys}
+            with deaf_to_interrupts():
+                jobs = {self._pool.submit(_run, key): key for key in keys}
             for job in as_completed(jobs):
                 self._keep(jobs[job], job.result())
         except BrokenProcessPool:

@@ -2,11 +2,11 @@
 
 Every record is a group, every array an array with its unit as an attribute, numbers and words are
 attributes of the group.  Nothing is pickled.  A checksum beside each array finds lost chunks, which
-a Zarr reader would silently take for zeros.
+a Zarr reader would silently take for zeros, and one of each group finds damaged words and numbers.
 """
 
-import os
-import shutil
+import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
@@ -20,10 +20,13 @@ import numpy as np
 import zarr
 
 from klack.errors import InputError
+from klack.whole_file import standing, whole_file
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 
 RESULT_NAME = "result.zarr"
+_TRIES = 5
+_LARGEST = 4_000_000_000  # bytes; the largest results have some 100 MB
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,21 +61,11 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     Path
         Of the store.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    target, old = folder / RESULT_NAME, folder / f"{RESULT_NAME}.old"
-    new = folder / f".{RESULT_NAME}.{os.getpid()}.new"
-    try:
+    with whole_file(folder / RESULT_NAME) as new:
         root = zarr.open_group(new, mode="w", zarr_format=3)
         root.attrs.put({"format": form.name, "format_version": form.version})
         _write(root, "study", record, form.units)
-        if target.exists():
-            shutil.rmtree(old, ignore_errors=True)
-            target.rename(old)
-        new.rename(target)
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
-    shutil.rmtree(old, ignore_errors=True)
-    return target
+    return folder / RESULT_NAME
 
 
 def load_record(folder: Path, form: RecordFormat) -> Any:
@@ -88,8 +81,25 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
     ------
     InputError
         If there is no result, it comes from something else, or a part of it is missing.
+
+    Notes
+    -----
+    A result that another process replaces meanwhile is read again: no numbers of two results mix.
     """
-    path = _find(folder)
+    for _ in range(_TRIES):
+        path, mark = _find(folder)
+        try:
+            record = _load(path, form)
+        except InputError:
+            if _find(folder) == (path, mark):
+                raise
+        else:
+            if _find(folder) == (path, mark):
+                return record
+    raise _damaged(folder, "a result that is written again and again while it is read")
+
+
+def _load(path: Path, form: RecordFormat) -> Any:
     root, attributes = _open(path)
     if attributes.get("format") != form.name:
         raise InputError(
@@ -107,6 +117,7 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
             hint="read it with the klack that wrote it, or run the case again.",
         )
     try:
+        _require_size(root)
         record = _read(root, "study", form.kind)
     except InputError as error:
         raise _damaged(path, error.got) from error
@@ -121,7 +132,7 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
 
 def stored_format(folder: Path) -> str:
     """Name of the format of the result in a folder."""
-    return str(_open(_find(folder))[1].get("format"))
+    return str(_open(_find(folder)[0])[1].get("format"))
 
 
 def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
@@ -132,11 +143,16 @@ def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
         raise _damaged(path, f"a store that does not open ({error})") from error
 
 
-def _find(folder: Path) -> Path:
-    # the second name holds the earlier result while save_study exchanges the two
-    for path in (folder / RESULT_NAME, folder / f"{RESULT_NAME}.old", folder):
-        if (path / "zarr.json").is_file():
-            return path
+def _find(folder: Path) -> tuple[Path, int]:
+    """Place of a store, and the number by which the file system knows this very one."""
+    if folder.name == RESULT_NAME:
+        folder = folder.absolute().parent
+    for path in (standing(folder, RESULT_NAME), folder):
+        try:
+            if (path / "zarr.json").is_file():
+                return path, path.stat().st_ino
+        except OSError:  # moved at this moment, or not for this user
+            continue
     raise InputError(
         f"result {folder}",
         got="no klack result" if folder.exists() else "a folder that does not exist",
@@ -161,7 +177,7 @@ def _damaged(path: Path, got: str) -> InputError:
 def _write(parent: zarr.Group, name: str, value: Any, units: Mapping[str, str]) -> None:
     """Store a value that is or holds arrays or records as a child of ``parent``."""
     if isinstance(value, np.ndarray):
-        attributes: dict[str, Any] = {"crc32": _checksum(value)}
+        attributes: dict[str, Any] = {"crc32": _checksum(value), "stored": _kind(value)}
         if name in units:
             attributes["unit"] = units[name]
         parent.create_array(name, data=np.ascontiguousarray(value), attributes=attributes)
@@ -180,7 +196,8 @@ def _write(parent: zarr.Group, name: str, value: Any, units: Mapping[str, str]) 
         else:
             plain[key] = _plain(member)
     # the order of a mapping is part of it, and a zarr group does not keep it
-    group.attrs.put({"values": plain, "order": list(members)})
+    order = list(members)
+    group.attrs.put({"values": plain, "order": order, "crc32": _words_checksum(plain, order)})
 
 
 def _has_arrays(value: Any) -> bool:
@@ -208,20 +225,49 @@ def _checksum(array: np.ndarray) -> int:
     return crc32(np.ascontiguousarray(array).tobytes())
 
 
+def _kind(array: np.ndarray) -> str:
+    """Type and shape: the same bytes mean other numbers in another one."""
+    return f"{array.dtype.str} {'x'.join(map(str, array.shape))}"
+
+
+def _words_checksum(values: Mapping[str, Any], order: list[str]) -> int:
+    # the shortest text of a double is read back exactly, so that this text is the same again
+    return crc32(json.dumps([values, order], sort_keys=True).encode())
+
+
 # --------------------------------------------------------------------------- reading
+
+
+def _require_size(root: zarr.Group) -> None:
+    """Look at all sizes before memory is asked for: a lost or packed chunk may stand for a lot."""
+    total = 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # zarr's, about parts that are lost: reading says it better
+        members = root.members(max_depth=None)
+    for _, node in members:
+        if isinstance(node, zarr.Array):
+            total += node.nbytes
+            if total > _LARGEST:
+                raise _incomplete(f"arrays of more than {_LARGEST / 1e9:.3g} GB")
 
 
 def _read(parent: zarr.Group, name: str, hint: Any) -> Any:
     node = parent[quote(name, safe=" ")]
     if isinstance(node, zarr.Array):
         values = np.asarray(node[...])
-        if _checksum(values) != node.attrs.get("crc32"):
+        marks = dict(node.attrs)
+        # results of klack 0.1 before this mark was written have none
+        kept = marks.get("stored", _kind(values)) == _kind(values)
+        if not kept or _checksum(values) != marks.get("crc32"):
             raise _incomplete(f"damaged numbers in '{node.path}'")
         return values
     attributes = dict(node.attrs)
     plain, order = attributes.get("values"), attributes.get("order")
     if not isinstance(plain, dict) or not isinstance(order, list):
         raise _incomplete(f"no values in '{node.path}'")
+    mark = _words_checksum(plain, order)
+    if attributes.get("crc32", mark) != mark:
+        raise _incomplete(f"damaged values in '{node.path}'")
     if is_dataclass(hint):
         return _read_record(node, hint, plain, order)
     kinds = [_element(hint, i) for i in range(len(order))]

@@ -82,9 +82,9 @@ def run_shots(
     count = stated.count if count is None else count
     seed = stated.seed if seed is None else seed
     workers = available_cores() if workers is None else workers
-    log = shot_log(folder, shots_mark(case, seed, threads))
     clock = StageClock(progress, result_cache())
-    with collected_warnings() as notes:
+    mark = shots_mark(case, seed, threads)
+    with shot_log(folder, mark) as log, collected_warnings() as notes:
         model = build_shots(case, clock, threads=threads)
         draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
         resumed = sum(draw.index in log.done for draw in draws)

@@ -9,7 +9,14 @@ from klack.workflow.progress import Progress
 from klack.workflow.shot_draw import ShotDraw
 from klack.workflow.shot_run import ShotOutcome, ShotSetup, run_shot
 from klack.workflow.shots_log import ShotLog
-from klack.workflow.workers import Failure, answer, shared, unwrapped, worker_pool
+from klack.workflow.workers import (
+    Failure,
+    answer,
+    deaf_to_interrupts,
+    shared,
+    unwrapped,
+    worker_pool,
+)
 
 __all__ = ["run_shots_on"]
 
@@ -40,7 +47,8 @@ def run_shots_on(
         return
     pool = worker_pool(workers, setup)
     try:
-        jobs = {pool.submit(_run, draw): draw.index for draw in left}
+        with deaf_to_interrupts():
+            jobs = {pool.submit(_run, draw): draw.index for draw in left}
         for job in as_completed(jobs):
             log.add(jobs[job], unwrapped(_name(jobs[job]), job.result()))
             progress("shots", len(log.done) / total)

@@ -1,7 +1,8 @@
 """Finished parts of long work on disk while others still run, so that interrupted work goes on.
 
 A text file: the first line says what is computed, each further one holds one part as JSON.  It is
-only read by the same klack for the same work; otherwise it starts anew.
+only read by the same klack for the same work; otherwise it starts anew.  A line that was cut off by
+a crash, and all behind it, is cut off and computed again.
 """
 
 import json
@@ -10,11 +11,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import Generic, TypeVar
+from types import TracebackType
+from typing import Generic, Self, TypeVar
 
 import klack
 from klack.case.bodies import CaseBody
 from klack.errors import InputError
+from klack.folder_lock import FolderLock, try_lock
 
 __all__ = ["LogForm", "UnfinishedLog", "fingerprint"]
 
@@ -53,11 +56,21 @@ class LogForm(Generic[Key, Part]):
 
     def remove(self, folder: Path) -> None:
         """Remove the file: the work is complete and stored elsewhere."""
-        (folder / self.file).unlink(missing_ok=True)
+        path = folder / self.file
+        try:
+            lock = try_lock(path)
+            if lock is None:  # another process goes on with the same work
+                return
+            path.unlink(missing_ok=True)
+            lock.close()
+        except OSError:  # it is not there, or stays: the same command finds everything in it
+            return
 
 
 class UnfinishedLog(Generic[Key, Part]):
     """Finished parts in a file; those of an earlier, interrupted run are there.
+
+    One process at a time: the file is locked until :meth:`close`.
 
     Parameters
     ----------
@@ -72,23 +85,80 @@ class UnfinishedLog(Generic[Key, Part]):
         self.form = form
         self.done: dict[Key, Part] = {}
         self.path = folder / form.file if folder is not None else None
+        self._lock: FolderLock | None = None
         if self.path is None:
             return
-        header = json.dumps({"format": form.format, "fingerprint": mark}) + "\n"
+        header = (json.dumps({"format": form.format, "fingerprint": mark}) + "\n").encode()
         try:
-            lines = self.path.read_bytes().split(b"\n") if self.path.is_file() else []
-            if lines and lines[0] + b"\n" == header.encode():
-                self._take_over(self.path, lines)
-                return
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text(header, encoding="utf-8")
+            self._lock = self._own(self.path)
+            with self.path.open("rb") as file:
+                known = file.read(len(header)) == header
+            if known:
+                self._take_over(self.path, self.path.read_bytes().split(b"\n"))
+            else:
+                self.path.write_bytes(header)
         except OSError as error:
-            raise InputError(
-                str(self.path),
-                got=f"a file that cannot be written ({error.strerror})",
-                expected=f"a place for {form.parts}",
-                hint="check the folder given to --out and the space that is left.",
-            ) from error
+            self.close()
+            raise self._refuse(self.path, error) from error
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let other processes have the file."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def add(self, key: Key, part: Part) -> None:
+        """Keep a finished part.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written; what was written before is kept.
+        """
+        self.done[key] = part
+        if self.path is None:
+            return
+        try:
+            with self.path.open("ab") as file:
+                file.write(self.form.line(key, part).encode() + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise self._refuse(self.path, error) from error
+
+    def _own(self, path: Path) -> FolderLock:
+        """Lock the file, which is made if it is not there."""
+        while True:
+            path.open("ab").close()
+            lock = try_lock(path)
+            if lock is None:
+                raise InputError(
+                    str(path),
+                    got="a file that another klack writes to",
+                    expected="one process at a time for one work",
+                    hint="wait for it, or give this one another folder with --out.",
+                )
+            try:
+                if lock.handle is None or path.stat().st_ino == os.fstat(lock.handle).st_ino:
+                    return lock
+            except FileNotFoundError:  # removed by the one that had the lock
+                pass
+            lock.close()
 
     def _take_over(self, path: Path, lines: list[bytes]) -> None:
         """Read what an earlier run left, up to the first damaged line, and cut off the rest."""
@@ -102,15 +172,14 @@ class UnfinishedLog(Generic[Key, Part]):
         with path.open("r+b") as file:
             file.truncate(whole)
 
-    def add(self, key: Key, part: Part) -> None:
-        """Keep a finished part."""
-        self.done[key] = part
-        if self.path is None:
-            return
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(self.form.line(key, part) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+    def _refuse(self, path: Path, error: OSError) -> InputError:
+        return InputError(
+            str(path),
+            got=f"a file that cannot be written ({error.strerror or error})",
+            expected=f"a place for {self.form.parts}",
+            hint="check the folder given to --out and the space that is left; the same command "
+            "goes on from what is there.",
+        )
 
 
 def fingerprint(bodies: Iterable[CaseBody], parts: Iterable[bytes]) -> str:

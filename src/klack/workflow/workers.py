@@ -3,8 +3,10 @@
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -12,7 +14,15 @@ from threadpoolctl import threadpool_limits
 
 from klack.errors import ConvergenceError, InputError, KlackError
 
-__all__ = ["Failure", "answer", "available_cores", "shared", "unwrapped", "worker_pool"]
+__all__ = [
+    "Failure",
+    "answer",
+    "available_cores",
+    "deaf_to_interrupts",
+    "shared",
+    "unwrapped",
+    "worker_pool",
+]
 
 Result = TypeVar("Result")
 
@@ -70,7 +80,32 @@ def unwrapped(name: str, found: Result | Failure) -> Result:
     raise ConvergenceError(f"{name}: {found.parts[0]}")
 
 
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C, from their first moment on: they inherit it.
+
+    One that comes meanwhile is heard at the end.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that asked is gone; killed, it could not say so."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 def _start(given: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     threadpool_limits(limits=1)
     _shared[:] = [given]

@@ -1,6 +1,5 @@
 """Put an FMU together: sources, binaries, model description, documentation, in one zip file."""
 
-import os
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -21,6 +20,7 @@ from klack.exchange.fmu.data_header import data_header
 from klack.exchange.fmu.documentation import documentation_files
 from klack.exchange.fmu.model_description import SOURCE_FILES, model_description
 from klack.exchange.modal_model import ModalModel
+from klack.whole_file import whole_file
 
 __all__ = ["build_fmu", "source_texts"]
 
@@ -126,20 +126,9 @@ def _binaries(
 
 def _write(path: Path, files: Mapping[str, bytes]) -> None:
     """Write beside the place first, then move: nobody finds half an FMU."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    half = Path(name)
-    try:
-        with (
-            os.fdopen(handle, "wb") as stream,
-            zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
-        ):
-            for inside in sorted(files):
-                archive.writestr(_entry(inside), files[inside])
-        half.chmod(0o644)
-        half.replace(path)
-    finally:
-        half.unlink(missing_ok=True)
+    with whole_file(path) as new, zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
+        for inside in sorted(files):
+            archive.writestr(_entry(inside), files[inside])
 
 
 def _entry(name: str) -> zipfile.ZipInfo:

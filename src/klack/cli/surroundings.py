@@ -1,0 +1,83 @@
+"""What a command finds around it: streams, folders for temporary and compiled files, full disks."""
+
+import errno
+import os
+import sys
+from collections.abc import Mapping
+from io import TextIOWrapper
+from pathlib import Path
+from typing import TextIO
+
+__all__ = ["close_quietly", "in_words", "prepare_compiling", "prepare_streams"]
+
+_WORDS: Mapping[int, str] = {
+    errno.ENOSPC: "no space is left on the disk.\nTry: make room, or give another folder (--out; "
+    "TMPDIR for temporary files).",
+    errno.EDQUOT: "your share of the disk is used up.\nTry: make room, or give another folder "
+    "(--out; TMPDIR for temporary files).",
+    errno.EROFS: "a folder may only be read.\nTry: another folder (--out; TMPDIR for temporary "
+    "files).",
+    errno.EFBIG: "a file grew larger than the system allows.\nTry: ulimit -f unlimited.",
+    errno.EMFILE: "too many files are open.\nTry: ulimit -n 4096.",
+    errno.ENFILE: "too many files are open.\nTry: close other programs.",
+    errno.EIO: "the disk or the network drive failed.\nTry: another folder (--out).",
+}
+
+
+def prepare_streams() -> None:
+    """Let every letter be printed, and closed streams swallow what is printed.
+
+    A terminal that has no umlaut shows its number; a program started with its output closed would
+    otherwise get the first file that it opens for its output.
+    """
+    for name in ("stdin", "stdout", "stderr"):
+        stream: TextIO | None = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))
+        elif name != "stdin" and isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def prepare_compiling() -> None:
+    """Switch the store of compiled functions off where numba finds no place for it.
+
+    It looks beside the package, then in the home of the user, and gives up if neither can be
+    written to; then every command compiles anew.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    package = Path(__file__).parents[1]
+    home = Path(os.path.expanduser("~"), ".cache")
+    if not all(map(_writable, package.rglob("__pycache__"))) and not _writable(home):
+        import atexit
+        import shutil
+        from tempfile import mkdtemp
+
+        place = mkdtemp(prefix="klack-compiled-")  # not a shared one: numba runs what it finds
+        atexit.register(shutil.rmtree, place, ignore_errors=True)
+        os.environ["NUMBA_CACHE_DIR"] = place
+        print(
+            "klack: note: compiled functions cannot be kept (no writable home), so that every "
+            "command compiles them again.",
+            file=sys.stderr,
+        )
+
+
+def in_words(error: OSError) -> str | None:
+    """Say what is wrong around klack; None where the error is one of klack itself."""
+    if "No usable temporary directory" in str(error):
+        return "no folder for temporary files can be written to.\nTry: set TMPDIR to one."
+    return _WORDS.get(error.errno or 0)
+
+
+def close_quietly() -> None:
+    """Give up an output that takes no more; Python would complain about it at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _writable(folder: Path) -> bool:
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    return existing.is_dir() and os.access(existing, os.W_OK)

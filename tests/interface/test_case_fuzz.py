@@ -1,0 +1,237 @@
+"""Damaged and hostile case files: a case, or one clear error in bounded time and memory.
+
+Every shipped case is changed as text (lines, indentation, numbers, bytes) and as a tree (each value
+in turn becomes something nasty).  Longer: ``KLACK_LONG=100``, another ``KLACK_SEED=2``.
+"""
+
+import json
+import os
+import random
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from klack.case import shipped_cases
+from klack.case.valve_reader import load_any_case, read_any_case
+from klack.errors import InputError
+
+LONGER = int(os.environ.get("KLACK_LONG", "1"))
+SEED = int(os.environ.get("KLACK_SEED", "1"))
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+CASES = [*shipped_cases().values(), *sorted(HOW_TO.glob("*.yaml"))]
+PATIENCE = 20.0  # s of processor time, on a slow machine; usual are 0.05 s
+
+NASTY = [
+    ".nan", ".inf", "-.inf", "1e400", "-1", "0", "1e-320", "'0 mm'", "'-5 um'", "'1e400 mm'",
+    "'nan m'", "'inf bar'", "'1e308 km'", "1e308", "99999999999999999999999999", "null", "~",
+    "true", "''", "' '", "[]", "{}", "[[[[1]]]]", "{kind: {kind: x}}", "{type: spring}",
+    "[1, two, .nan]",
+    "2024-01-01", "0x1F", "0o17", "1_000", "'\u0663 mm'", "'1 mm\\0'", "\"1 mm\\0\"", "\"\\ud800\"",
+    "'../../../../../../etc/passwd'", "/dev/zero", "'~nobody/x'", "'a\\nb'", "'{0.__class__}'",
+    "'%s%n'", "'" + "9" * 5000 + "'", "'" + "((" * 500 + "'", "!!python/object/apply:os.abort []",
+    "!!python/name:os.system", "!!binary aGFsbG8=", "!!set {a, b}", "!!omap [a: 1]", "!<x> y",
+    "*nothing", "&a [*a]", "'[a.b, c.d]'", "needle", "ground", "'needle.tip'", "-0.0", "1e-400",
+]  # fmt: skip
+
+ODD = ["\t", "\r\n", "\ufeff", "\x00", "\x85", "\u2028", "- ", ": ", "{", "}", "[", "]", "'", '"',
+       "|", ">", "&a ", "*a", "!!x ", "#", "%YAML 3.0\n", "---\n", "...\n", "<<: *a", "? ", "@",
+       "`", "\U0001f600", "e9", ".nan", "-", "1e999", "é"]  # fmt: skip
+
+
+def outcome(read: Any) -> None:
+    """Read; only our own error may come out, with a place, and it may not take for ever."""
+    begin = time.process_time()
+    said: InputError | None = None
+    try:
+        read()
+    except InputError as error:
+        said = error
+    if said is not None:
+        assert all((said.where, said.got, said.expected, said.hint))
+        assert "valve.yaml" in said.where, str(said)
+        assert len(str(said)) < 3000, str(said)
+    assert time.process_time() - begin < PATIENCE
+
+
+def leaves(tree: Any, path: tuple = ()) -> Iterator[tuple]:
+    """Paths of everything in a tree: sections, lists and single values."""
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    for key, value in items:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from leaves(value, (*path, key))
+
+
+def changed(tree: Any, path: tuple, text: str) -> str:
+    """Give the case as YAML, with other text in the place of one value."""
+    whole = json.loads(json.dumps(tree))
+    place = whole
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = "@@"
+    return json.dumps(whole).replace('"@@"', text)
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_each_value_becomes_something_nasty(path: Path):
+    """Not all pairs of value and place in every run: another ten for each case."""
+    tree = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    places = list(leaves(tree))
+    draw = random.Random(f"{path}{SEED}")
+    for _ in range(12 * LONGER):
+        text = changed(tree, draw.choice(places), draw.choice(NASTY))
+        outcome(lambda text=text: read_any_case(text, path.with_name("valve.yaml")))
+
+
+def test_each_key_goes_or_comes_twice():
+    path = shipped_cases()["demo-stroke"]
+    tree = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    draw = random.Random(SEED)
+    for place in draw.sample(list(leaves(tree)), min(20 * LONGER, 150)):
+        whole = json.loads(json.dumps(tree))
+        section = whole
+        for key in place[:-1]:
+            section = section[key]
+        value = section.pop(place[-1])
+        outcome(lambda whole=whole: read_any_case(json.dumps(whole), path.with_name("valve.yaml")))
+        if isinstance(section, dict):
+            section[f"{place[-1]}x"] = value
+            outcome(lambda w=whole: read_any_case(json.dumps(w), path.with_name("valve.yaml")))
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> tuple[Path, str]:
+    """Text of a case with some lines left out, doubled, moved, indented or changed."""
+    path = draw(st.sampled_from(CASES))
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    for _ in range(draw(st.integers(1, 4))):
+        i = draw(st.integers(0, len(lines) - 1))
+        j = draw(st.integers(0, len(lines) - 1))
+        how = draw(st.sampled_from(["drop", "double", "move", "indent", "outdent", "put", "cut"]))
+        if how == "drop" and len(lines) > 2:
+            del lines[i]
+        elif how == "double":
+            lines.insert(j, lines[i])
+        elif how == "move":
+            lines.insert(j, lines.pop(i))
+        elif how == "indent":
+            lines[i] = draw(st.sampled_from([" ", "  ", "\t", " " * 60])) + lines[i]
+        elif how == "outdent":
+            lines[i] = lines[i].lstrip()
+        else:
+            at = draw(st.integers(0, len(lines[i])))
+            put = draw(st.sampled_from([*ODD, *NASTY])) if how == "put" else ""
+            lines[i] = lines[i][:at] + put + lines[i][at + draw(st.integers(0, 9)) :]
+    return path, "".join(lines)
+
+
+@seed(SEED)
+@settings(
+    max_examples=80 * LONGER,
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+@given(damaged())
+def test_damaged_text(given_case: tuple[Path, str]):
+    path, text = given_case
+    outcome(lambda: read_any_case(text, path.with_name("valve.yaml")))
+
+
+@seed(SEED)
+@settings(max_examples=60 * LONGER, deadline=None, database=None)
+@given(st.data())
+def test_damaged_bytes(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject):
+    raw = bytearray(data.draw(st.sampled_from(CASES)).read_bytes()[:3000])
+    for _ in range(data.draw(st.integers(1, 5))):
+        raw[data.draw(st.integers(0, len(raw) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path_factory.getbasetemp() / "valve.yaml"
+    path.write_bytes(data.draw(st.sampled_from([b"", b"\xef\xbb\xbf", b"\xff\xfe"])) + raw)
+    outcome(lambda: load_any_case(path))
+
+
+HOSTILE = {
+    "laughs": "a: &a [x, x, x, x, x, x, x, x, x]\n"
+    + "".join(f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n" for a, b in pairwise("abcdefghi")),
+    "merged laughs": "a: &a {k0: 1}\n"
+    + "".join(
+        f"{b}: &{b}\n  <<: [{', '.join(['*' + a] * 9)}]\n  k{b}: {{<<: *{a}}}\n"
+        for a, b in pairwise("abcdefghijklmnopqrstuvwx")
+    ),
+    "itself": "a: &a\n  b: *a\n",
+    "deep lists": "a: " + "[" * 20_000,
+    "deep closed lists": "a: " + "[" * 3_000 + "]" * 3_000,
+    "deep blocks": "".join(f"{' ' * i}a:\n" for i in range(900)),
+    "long key": "? " + "k" * 500_000 + "\n: 1\n",
+    "long number": "klack: " + "9" * 400_000,
+    "long quantity": "motion: {speed: '" + "9" * 400_000 + " m/s'}",
+    "many keys": "".join(f"k{i}: 1\n" for i in range(60_000)),
+    "many documents": "---\na: 1\n" * 50_000,
+    "comments": "# \n" * 300_000 + "klack: 1\n",
+    "anchors": "".join(f"- &a{i} 1\n" for i in range(50_000)),
+    "code": 'klack: !!python/object/apply:os.system ["touch hacked"]\n',
+    "new code": 'klack: !!python/object/new:os.system ["touch hacked"]\n',
+    "module": "klack: !!python/module:antigravity\n",
+    "directive": "%TAG ! tag:yaml.org,2002:python/\n---\nklack: !object/apply:os.abort []\n",
+    "colons": "a" + ": b" * 100_000,
+    "quotes": "a: '" + "''" * 200_000,
+    "spaces": "a:" + " " * 900_000 + "1",
+    "tabs": "a:\n" + "\t" * 900_000 + "b: 1",
+    "folded": "a: >\n" + "  x\n\n" * 100_000,
+}
+
+
+def confined() -> None:
+    """Half a gigabyte beyond the program itself, and a minute."""
+    resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30, 2 * 2**30))
+    resource.setrlimit(resource.RLIMIT_CPU, (120, 120))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
+def test_hostile_files_in_a_confined_process(tmp_path: Path):
+    """Bombs of aliases, depth and length, and tags that would run code."""
+    for name, text in HOSTILE.items():
+        (tmp_path / f"{name}.yaml").write_text(text[:990_000], encoding="utf-8")
+    (tmp_path / "too large.yaml").write_bytes(b"klack: 1\n" * 1_200_000)
+    program = (
+        "import sys, time, pathlib\n"
+        "from klack.case.valve_reader import load_any_case\n"
+        "from klack.errors import InputError\n"
+        "for path in sorted(pathlib.Path('.').glob('*.yaml')):\n"
+        "    begin = time.process_time()\n"
+        "    try:\n"
+        "        load_any_case(path)\n"
+        "        print(path, 'READ')\n"
+        "    except InputError as error:\n"
+        "        assert path.name in error.where and len(str(error)) < 3000, str(error)[:500]\n"
+        "    except Exception as error:\n"
+        "        print(path, 'READ', repr(error)[:200])\n"
+        "    took = time.process_time() - begin\n"
+        "    print(path.stem, f'{took:.1f}', 'SLOW' if took > 20 else '')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        preexec_fn=confined,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert done.returncode == 0, done.stderr[-2000:] + done.stdout[-300:]
+    assert "READ" not in done.stdout, done.stdout
+    assert len(done.stdout.splitlines()) == len(HOSTILE) + 1
+    assert "SLOW" not in done.stdout, done.stdout
+    assert not (tmp_path / "hacked").exists()

@@ -1,0 +1,287 @@
+"""Killed, stopped and crashed runs; truth = the result before, or that of an undisturbed run.
+
+Longer: ``KLACK_LONG=20`` crashes commands at twenty times as many points.
+"""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from klack.errors import InputError
+from klack.folder_lock import locked, try_lock
+from klack.whole_file import standing, whole_file, whole_files
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and forks")
+
+DATA = Path(__file__).parents[1] / "data"
+NEEDLE = Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml"
+LONGER = int(os.environ.get("KLACK_LONG", "1"))
+ALONE = {**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+def crashes(*words: str) -> dict:
+    program = [sys.executable, str(DATA / "crash_points.py"), *words]
+    done = subprocess.run(program, env=ALONE, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+# --------------------------------------------------------------------------- every single operation
+
+
+def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path: Path):
+    found = crashes("small", str(tmp_path / "small"))
+
+    rows = found["rows"]
+    assert len(rows) == found["operations"] > 20
+    assert {row["code"] for row in rows} == {99}
+    words = [row["found"] for row in rows]
+    turn = words.index(["new"])
+    assert 5 < turn < len(rows) - 5
+    assert words == [["old"]] * turn + [["new"]] * (len(rows) - turn)  # whole, and never back again
+    for row in rows:
+        assert row["next"] == ["newer"]
+        assert row["left"] == ["mine.txt", "page", "store"]  # no stage, no note of the time before
+        assert row["twice"] == sorted({row["found"][0], "newer"})
+
+
+@pytest.mark.parametrize(
+    ("words", "points"),
+    [
+        (["impact", str(DATA / "tiny_rods.yaml"), "--no-report"], 8),
+        (["export", str(DATA / "tiny_rods.yaml"), "--to", "csv"], 6),
+    ],
+    ids=["impact", "export"],
+)
+def test_a_crash_of_a_command_costs_nothing(words: list[str], points: int, tmp_path: Path):
+    """The former result can be read or the new one is there; the next run makes the same numbers.
+
+    One thread: to the last digit.
+    """
+    found = crashes(json.dumps(words), str(tmp_path), str(points * LONGER))
+
+    assert found["operations"] > 20
+    assert len(found["rows"]) >= min(points * LONGER, found["operations"]) - 2
+    for row in found["rows"]:
+        assert row["code"] == 99, row
+        assert row["readable"], row
+        assert row["torn"] == [], row
+        assert (row["next"], row["same"]) == (0, True), row
+        assert row["left"] == row["beside"] == [], row
+
+
+# --------------------------------------------------------------------------- kill -9
+
+
+def start(*words: str, folder: Path) -> "subprocess.Popen[str]":
+    """Start klack as the first process of a group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "klack", *words],
+        cwd=folder,
+        env=ALONE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def members(group: int) -> list[int]:
+    """Living processes of a group."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = entry.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group and fields[0] != "Z":
+            found.append(int(entry.parent.name))
+    return found
+
+
+def wait_until(condition: object, seconds: float) -> bool:
+    assert callable(condition)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+SHOTS = ("shots", str(NEEDLE), "--shots", "6", "--workers", "2", "--threads", "1", "--no-report")
+LOG = "shots.unfinished.jsonl"
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory) -> dict:
+    folder = tmp_path_factory.mktemp("undisturbed")
+    process = start(*SHOTS, "--out", "out", "--json", "n.json", folder=folder)
+    process.communicate(timeout=120)
+    assert process.returncode == 0
+    return json.loads((folder / "n.json").read_text())
+
+
+def lines(path: Path) -> int:
+    return path.read_bytes().count(b"\n") - 1 if path.exists() else 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+def test_shots_go_on_after_kill_9(undisturbed: dict, tmp_path: Path):
+    """Killed alone, it takes its workers with it; killed twice, it still gives the same numbers."""
+    for least in (1, 3):
+        process = start(*SHOTS, "--out", "out", folder=tmp_path)
+        assert wait_until(lambda least=least: lines(tmp_path / "out" / LOG) >= least, 60)
+        os.kill(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        assert wait_until(lambda group=process.pid: not members(group), 20)
+
+    process = start(*SHOTS, "--out", "out", "--json", "n.json", folder=tmp_path)
+    process.communicate(timeout=120)
+
+    assert process.returncode == 0
+    assert names(tmp_path / "out") == ["result.zarr"]
+    found = json.loads((tmp_path / "n.json").read_text())
+    for key in ("shots", "centric", "rule"):
+        assert found.get(key) == undisturbed.get(key)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stopped_run_says_so_and_takes_its_workers_with_it(number, code, tmp_path: Path):
+    process = start(*SHOTS, "--out", "out", "--quiet", folder=tmp_path)
+    assert wait_until(lambda: lines(tmp_path / "out" / LOG) >= 1, 60)
+    if number == signal.SIGINT:  # a terminal tells all of them
+        os.killpg(process.pid, number)
+    else:
+        os.kill(process.pid, number)
+    _, err = process.communicate(timeout=60)
+
+    assert process.returncode == code, err
+    assert err.count("\n") == 1, err
+    assert "the same command goes on" in err
+    assert wait_until(lambda: not members(process.pid), 20)
+    assert names(tmp_path / "out") == [LOG]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_run_stopped_at_any_time_leaves_the_former_result(number, code, tmp_path: Path):
+    random.seed(int(number))
+    words = ("impact", str(DATA / "tiny_rods.yaml"), "--no-report", "--out", "out")
+    begin = time.monotonic()
+    start(*words, folder=tmp_path).communicate(timeout=120)
+    duration = time.monotonic() - begin
+    mark = (tmp_path / "out" / "result.zarr" / "zarr.json").stat().st_ino
+    for _ in range(2 * LONGER):
+        process = start(*words, folder=tmp_path)
+        time.sleep(0.3 + random.random() * duration)  # before that, Python itself just starts
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+
+        assert names(tmp_path / "out") == ["result.zarr"]
+        stopped = process.returncode == code and err.endswith("nothing was written.\n")
+        kept = (tmp_path / "out" / "result.zarr" / "zarr.json").stat().st_ino == mark
+        early = process.returncode in (-number, 1) and "klack" not in err.split("Error")[0][-20:]
+        assert (stopped and kept) or process.returncode == 0 or (early and kept), err
+        mark = (tmp_path / "out" / "result.zarr" / "zarr.json").stat().st_ino
+
+
+# --------------------------------------------------------------------------- stages and locks
+
+
+def test_the_stage_of_a_living_process_stays(tmp_path: Path):
+    with whole_files(tmp_path) as first:
+        (first / "a").write_text("first")
+        with whole_files(tmp_path) as second:
+            (second / "b").write_text("second")
+        assert (first / "a").read_text() == "first"
+        assert (tmp_path / "b").read_text() == "second"
+
+    assert names(tmp_path) == ["a", "b"]
+
+
+def test_of_two_writers_the_last_one_stays_as_a_whole(tmp_path: Path):
+    for both in (("1", "2"), ("same", "same")):
+        with whole_files(tmp_path) as first:
+            (first / "x").write_text(both[0])
+            (first / "y").write_text(both[0])
+            with whole_files(tmp_path) as second:
+                (second / "x").write_text(both[1])
+                (second / "y").write_text(both[1])
+        assert [(tmp_path / name).read_text() for name in "xy"] == [both[0]] * 2
+
+
+def test_a_result_that_is_ready_counts_before_it_is_moved(tmp_path: Path):
+    """What a process leaves that is killed between its two steps."""
+    (tmp_path / "r").write_text("old")
+    ready = tmp_path / ".klack-dead" / "ready"
+    ready.mkdir(parents=True)
+    (ready / "r").write_text("new")
+
+    assert standing(tmp_path, "r").read_text() == "new"
+    with whole_file(tmp_path / "other") as new:
+        new.write_text("something else")
+    assert (tmp_path / "r").read_text() == "new"
+    assert names(tmp_path) == ["other", "r"]
+
+
+def test_what_cannot_be_replaced_leaves_all_as_it_was(tmp_path: Path, monkeypatch):
+    for name in "ab":
+        (tmp_path / name).write_text("old")
+    replace = os.replace
+
+    def refused(source: Path, target: Path) -> None:
+        if Path(source).name == "b" and Path(source).parent.name == "ready":
+            raise PermissionError(1, "Operation not permitted")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", refused)
+
+    def write() -> None:
+        with whole_files(tmp_path) as stage:
+            for name in "abc":
+                (stage / name).write_text("new")
+
+    with pytest.raises(InputError, match="not permitted"):
+        write()
+
+    assert [(tmp_path / name).read_text() for name in "ab"] == ["old", "old"]
+    assert names(tmp_path) == ["a", "b"]
+
+
+def test_a_folder_takes_the_place_of_a_file_and_of_a_link(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to("elsewhere")
+    with whole_files(tmp_path) as stage:
+        for name in ("file", "link"):
+            (stage / name).mkdir()
+            (stage / name / "inside").write_text(name)
+
+    assert (tmp_path / "file" / "inside").exists()
+    assert not (tmp_path / "link").is_symlink()
+    assert names(tmp_path / "elsewhere") == []
+
+
+def test_a_lock_is_waited_for_and_not_for_ever(tmp_path: Path):
+    lock = try_lock(tmp_path)
+    assert lock is not None
+    assert try_lock(tmp_path) is None
+    with pytest.raises(OSError, match="another process writes"), locked(tmp_path, patience=0.05):
+        pass
+    lock.close()
+    with locked(tmp_path):
+        pass
