@@ -3,17 +3,23 @@
 Runs ccx on the deck of a case for every step and penalty asked for, the full order of klack on the
 same mesh for every step, and prints both convergences, the energy balances, and the times.  Runs of
 ccx that are finished in the folder are read instead.  Processor times (one thread each) are what to
-compare on a shared machine.
+compare on a shared machine.  As a part of ``run.py`` there is one run of each, with the energy kept
+equally well by both.
 """
 
 import argparse
 import json
 import resource
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter, process_time
+
+from number import Number, Size
+from solid_valve import coarse_witness
 
 from klack.acoustics.comparison import compare_histories
 from klack.case import find_case, load_case
@@ -27,6 +33,66 @@ from klack.exchange.calculix_run import run_calculix
 from klack.transient.full_order import simulate_full_order
 from klack.workflow.compare import energy_balance
 from klack.workflow.problem import ContactProblem, build_problem
+
+_PENALTY = 1e18  # [N/m^3]
+_STEPS: dict[Size, tuple[float, float]] = {  # of CalculiX and of klack [s]
+    "smallest": (400e-9, 100e-9),
+    "quick": (200e-9, 50e-9),
+    "full": (100e-9, 25e-9),
+}
+
+
+def numbers(size: Size) -> list[Number]:
+    """Processor times of both on the witness, and their ratio; nothing without ``ccx``."""
+    if shutil.which("ccx") is None:
+        return []
+    theirs, ours = _STEPS[size]
+    case = load_case(find_case("witness")) if size == "full" else coarse_witness()
+    used = process_time()
+    problem = build_problem(case, lambda stage, fraction: None, threads=1)
+    problem.close()
+    used = process_time() - used
+    own = run_klack(case, problem, ours)
+    impact = calculix_impact(case, lambda stage, fraction: None)
+    with tempfile.TemporaryDirectory() as folder:
+        other = run_witness(case, impact, own.history, Path(folder), theirs, _PENALTY)
+    apart = compare_histories(own.history, other.history).history_l2
+    dofs = len(problem.pair.upper.free) + len(problem.pair.lower.free)
+    label = f"witness of {dofs} dof"
+    found = [
+        Number(
+            name=f"{label}: {row.program} at {row.step_ns:g} ns, processor time",
+            value=row.processor_s,
+            unit="s",
+            accuracy=row.energy_swing,
+            accuracy_of="energy at any time",
+        )
+        for row in (other, own)
+    ]
+    return [
+        *found,
+        Number(
+            name=f"{label}: matrices and static contact of klack, processor time",
+            value=used,
+            unit="s",
+        ),
+        Number(
+            name="CalculiX over klack: impact of the witness",
+            value=other.processor_s / own.processor_s,
+            unit="-",
+            goal=20.0 if size == "full" else None,
+            at_least=True,
+            accuracy=apart,
+            accuracy_of="force histories apart",
+            series="ratio",
+        ),
+        Number(
+            name="CalculiX over klack: with matrices and static contact",
+            value=other.processor_s / (own.processor_s + used),
+            unit="-",
+            series="ratio",
+        ),
+    ]
 
 
 @dataclass(frozen=True)

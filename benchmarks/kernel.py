@@ -8,6 +8,7 @@ several runs.
 import time
 
 import numpy as np
+from number import Number, Size
 
 from klack.contact.laws import ElasticLaw, LinearLaw, TableLaw
 from klack.contact.restitution import measure_impact
@@ -15,20 +16,52 @@ from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate, simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem
 
-__all__ = ["error_at_20_ns", "kernel_ns_per_step", "two_rods"]
+__all__ = ["error_at_20_ns", "kernel_ns_per_step", "numbers", "two_rods"]
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 
 
+def numbers(size: Size) -> list[Number]:
+    """Speed in flight and in contact, and the error at the step that was timed."""
+    repeats = {"smallest": 2, "quick": 30, "full": 60}[size]
+    errors = error_at_20_ns()
+    found = []
+    for closed in (False, True):
+        words = "contact" if closed else "flight"
+        found.append(
+            Number(
+                name=f"kernel, 60 modes, {words}",
+                value=kernel_ns_per_step(closed=closed, repeats=repeats),
+                unit="ns/step",
+                goal=50.0,
+                accuracy=abs(errors["peak force"]),
+                accuracy_of="peak force at 20 ns",
+            )
+        )
+    goals = {"peak force": 1e-3, "contact time": 1e-3, "impulse": 1e-3, "energy residual": 1e-9}
+    found += [
+        Number(
+            name=f"kernel, 20 ns against 1.25 ns, {key}", value=abs(errors[key]), unit="-", goal=g
+        )
+        for key, g in goals.items()
+    ]
+    return found
+
+
 def two_rods(
-    law: ElasticLaw, *, gap: float, damping: float = 0.0, press: float = 0.0
+    law: ElasticLaw,
+    *,
+    gap: float,
+    damping: float = 0.0,
+    press: float = 0.0,
+    modes: tuple[int, int] = (20, 40),
 ) -> ReducedSystem:
     """Needle 40 x 4 mm (1 + 19 modes) above a rod 100 x 10 mm held at its bottom (40 modes)."""
     needle = rod_body(
         "needle",
         length=0.04,
         area=np.pi * 4e-6,
-        elastic_modes=19,
+        elastic_modes=modes[0] - 1,
         damping=damping,
         **STEEL,
     )
@@ -36,7 +69,7 @@ def two_rods(
         "seat",
         length=0.1,
         area=np.pi * 25e-6,
-        elastic_modes=40,
+        elastic_modes=modes[1],
         support="bottom",
         damping=damping,
         **STEEL,
@@ -56,6 +89,7 @@ def kernel_ns_per_step(
     closed: bool = False,
     table: bool = False,
     damping: float = 0.0,
+    modes: tuple[int, int] = (20, 40),
     steps: int = 20_000,
     steps_per_record: int = 5,
     repeats: int = 60,
@@ -72,12 +106,14 @@ def kernel_ns_per_step(
     table : bool
         Table law instead of the linear one.
     damping : float [-]
+    modes : pair of int
+        Of needle (one of them rigid) and seat.
     steps, steps_per_record, repeats : int
     """
     d = np.linspace(0.0, 8e-6, 41)[1:]
     law = TableLaw(d, 4e8 * d + 3e14 * d**2) if table else LinearLaw(1e9)
     gap, press, speed = (0.0, 2000.0, 0.01) if closed else (1.0, 0.0, 0.5)
-    system = two_rods(law, gap=gap, damping=damping, press=press)
+    system = two_rods(law, gap=gap, damping=damping, press=press, modes=modes)
     best = {steps: np.inf, 2 * steps: np.inf}
     for _ in range(repeats):
         for count in best:

@@ -1,226 +1,147 @@
-"""The numbers that klack promises, measured: ``uv run python benchmarks/run.py --json FILE``.
+"""Everything that klack promises about speed, measured: ``uv run python benchmarks/run.py``.
 
-``--quick`` leaves out what takes more than some minutes: the full order with 250 000 degrees of
-freedom, the reduction of 150 000, and the three-dimensional demo valve in its variants.
+Each part is a file of this folder and runs in a process of its own, so that its peak memory is its
+own.  Results of former runs are not used: the cache of results is off.
+
+A table goes to the terminal.  With ``--out FOLDER`` the folder gets ``numbers.json``, the figures,
+and ``summary.md`` with both.  ``--quick`` takes smaller meshes and less than three minutes on two
+quiet cores, all of it half an hour at most.  ``--compare OTHER.json`` says by which factor every
+number has changed since a former run.  Numbers of a machine that is busy are worth little: the load
+at the start of each part is written beside it.
 """
 
 import argparse
 import json
-import resource
+import os
+import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+import tempfile
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from time import perf_counter
+from typing import Any, get_args
 
-from kernel import error_at_20_ns, kernel_ns_per_step
+from machine import describe_machine, peak_gigabytes
+from number import Number, Size, number_of
 
-from klack.case import load_case, shipped_cases
-from klack.case.schema import Case
-from klack.contact.restitution import Deviation
-from klack.workflow.impact import run_impact
-from klack.workflow.study import ImpactStudy
+__all__ = ["PARTS", "changes", "main", "measure"]
 
-LEVELS = ("reduced-none", "reduced-attachment", "reduced-participation", "reduced", "full")
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measured number."""
-
-    name: str
-    value: float
-    unit: str
-    goal: float | None = None
-
-    def entry(self) -> dict[str, float | str | None]:
-        """As the JSON holds it."""
-        return {"value": self.value, "unit": self.unit, "goal": self.goal}
-
-
-def kernel_rows() -> list[Row]:
-    """Speed and accuracy of the reduced time integration."""
-    errors = error_at_20_ns()
-    return [
-        Row("kernel_ns_per_step", kernel_ns_per_step(), "ns", 50.0),
-        Row("kernel_ns_per_step_in_contact", kernel_ns_per_step(closed=True), "ns"),
-        Row("kernel_error_at_20_ns", abs(errors["peak force"]), "of the peak force", 1e-3),
-        Row("kernel_energy_residual", abs(errors["energy residual"]), "-", 1e-9),
-    ]
-
-
-def deviation_rows(name: str, deviation: Deviation, *, history_goal: float | None) -> list[Row]:
-    """Reduced against full order; goals only where they are promised."""
-    promised = history_goal is not None
-    goals = (0.005, 0.01, 0.005, 0.002, history_goal, 1.0)
-    fields = ("peak_force", "contact_time", "impulse", "restitution", "history_l2")
-    units = ("-", "-", "-", "absolute", "of the peak force", "dB")
-    return [
-        Row(
-            f"{name}_{field}",
-            abs(float(getattr(deviation, field))),
-            unit,
-            goal if promised else None,
-        )
-        for field, unit, goal in zip((*fields, "third_octave_max_dB"), units, goals, strict=True)
-    ]
-
-
-def case_rows(name: str, *, history_goal: float) -> tuple[list[Row], ImpactStudy]:
-    """One shipped case at all levels."""
-    case = load_case(shipped_cases()[name])
-    study = run_impact(case, levels=LEVELS, progress=_say)
-    key = name.replace("-", "_")
-    rows = [
-        Row(f"{key}_energy_residual", abs(study.levels["reduced"].energy_residual), "-", 1e-9),
-        Row(f"{key}_full_energy_loss", _loss(study), "-", 1e-3),
-    ]
-    for level, deviation in study.deviations.items():
-        goal = history_goal if level == "reduced" else None
-        rows += deviation_rows(f"{key}_{level.replace('-', '_')}", deviation, history_goal=goal)
-    return rows, study
-
-
-def _loss(study: ImpactStudy) -> float:
-    ledger = study.levels["full"].history.ledger
-    return ledger.contact_dissipation / ledger.initial
-
-
-def whole_rim(case: Case) -> Case:
-    """The same case with every support closed round the circumference."""
-    bodies = {}
-    for name, body in case.bodies.items():
-        fixed = body.fixed and tuple(s.model_copy(update={"sectors": None}) for s in body.fixed)
-        bodies[name] = body.model_copy(update={"fixed": fixed})
-    return case.model_copy(update={"bodies": bodies})
-
-
-def axisymmetric_twin(case: Case) -> Case:
-    """The same meridian meshes as axisymmetric bodies."""
-    bodies = {}
-    for name, body in case.bodies.items():
-        geometry = body.geometry.model_copy(update={"model": "axisymmetric", "layers": None})
-        bodies[name] = body.model_copy(update={"geometry": geometry})
-    return case.model_copy(update={"bodies": bodies})
-
-
-def solid_against_axisymmetric() -> list[Row]:
-    """Full order of one valve, three-dimensional and axisymmetric, held all round."""
-    from klack.acoustics.comparison import compare_histories
-
-    solid = whole_rim(load_case(shipped_cases()["demo-valve"]))
-    twin = axisymmetric_twin(solid)
-    runs = [run_impact(case, levels=("full",), progress=_say) for case in (twin, solid)]
-    deviation = compare_histories(*(run.levels["full"].history for run in runs))
-    goals = {"peak_force": 0.005, "contact_time": 0.01, "restitution": 0.003, "history_l2": None}
-    return [
-        Row(f"solid_against_axisymmetric_{field}", abs(getattr(deviation, field)), "-", goal)
-        for field, goal in goals.items()
-    ]
-
-
-def finer(case: Case, scale: float, layers: int) -> Case:
-    """The same case with smaller elements everywhere but at the contact."""
-    bodies = {}
-    for name, body in case.bodies.items():
-        mesh = body.mesh and body.mesh.model_copy(update={"size": body.mesh.size * scale})
-        geometry = body.geometry.model_copy(update={"layers": layers})
-        bodies[name] = body.model_copy(update={"mesh": mesh, "geometry": geometry})
-    return case.model_copy(update={"bodies": bodies})
-
-
-def reduction_rows() -> list[Row]:
-    """Reduction of 150 000 degrees of freedom to 50 modes each, with the local law."""
-    from klack.workflow.levels import first_stiffness, mode_pools, own_pair
-    from klack.workflow.problem import build_problem
-
-    case = finer(load_case(shipped_cases()["demo-valve"]), 0.55, 28)
-    begin = perf_counter()
-    problem = build_problem(case, _say)
-    pools = mode_pools(problem, at_least=50, progress=_say)
-    own_pair(problem, pools, stiffness=first_stiffness(problem))
-    seconds = perf_counter() - begin
-    problem.close()
-    dofs = problem.pair.upper.dof_count + problem.pair.lower.dof_count
-    return [
-        Row("reduction_degrees_of_freedom", dofs, "-"),
-        Row("reduction_seconds", seconds, "s", 60.0),
-        Row("reduction_peak_memory", _peak_memory(), "GB", 3.0),
-    ]
-
-
-def large_full_order_rows() -> list[Row]:
-    """Full order with 250 000 degrees of freedom and 1000 steps."""
-    case = finer(load_case(shipped_cases()["demo-valve"]), 0.45, 40)
-    run = case.run.model_copy(update={"duration": 1000 * case.run.full_step})
-    study = run_impact(case.model_copy(update={"run": run}), levels=("full",), progress=_say)
-    full = study.levels["full"]
-    return [
-        Row("large_full_order_degrees_of_freedom", full.degrees_of_freedom, "-"),
-        Row("large_full_order_steps", full.steps, "-"),
-        Row("large_full_order_seconds", full.setup_time + full.wall_time, "s", 600.0),
-        Row("large_full_order_peak_memory", _peak_memory(), "GB", 8.0),
-    ]
-
-
-def _peak_memory() -> float:
-    """Largest resident size of this process so far [GB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
-
-
-def _say(stage: str, fraction: float) -> None:
-    print(f"\r  {stage:<24}{100 * fraction:4.0f} %", end="", file=sys.stderr, flush=True)
-
-
-def quick() -> list[Row]:
-    """Everything within some minutes."""
-    rows = kernel_rows()
-    rows += case_rows("demo-valve-axisymmetric", history_goal=0.015)[0]
-    rows += case_rows("sphere-on-rod", history_goal=0.015)[0]
-    return rows
-
-
-# What needs its own process, since the peak memory of a process never falls again.
-SLOW: dict[str, Callable[[], list[Row]]] = {
-    "reduction": reduction_rows,
-    "demo-valve": lambda: case_rows("demo-valve", history_goal=0.01)[0],
-    "solid-against-axisymmetric": solid_against_axisymmetric,
-    "large-full-order": large_full_order_rows,
+PARTS = {
+    "start_up": "klack --help, import, first small impact",
+    "kernel": "the reduced time integration, beside its error",
+    "modes": "the kernel over the number of modes",
+    "limit": "bytes moved against the bandwidth of the machine",
+    "reduced_peers": "solve_ivp, CVODE and FMPy on the same reduced model",
+    "ngsolve_peer": "NGSolve: assembly and modes on the same mesh",
+    "calculix": "CalculiX: an impact in 3-D on the same mesh",
+    "growth": "every stage over degrees of freedom",
+    "stroke": "a whole valve in time; CVODE beside a small one",
+    "accuracy": "reduced against full order on the shipped cases",
+    "reduction": "from a case to two reduced bodies",
+    "full_order": "the impact with every degree of freedom",
+    "demo": "klack demo as a whole",
 }
+"""Parts in the order of a run, and what they measure."""
 
 
-def main() -> None:
-    """Measure, print a table, write the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="leave out the long ones")
-    parser.add_argument("--only", choices=("quick", *SLOW), help="one part alone")
-    parser.add_argument("--json", type=Path, help="write {name: {value, unit, goal}}")
-    args = parser.parse_args()
-    if args.only is not None and args.only != "quick":
-        rows = SLOW[args.only]()
-    else:
-        rows = quick()
-        if not args.quick and args.only is None:
-            rows += [row for name in SLOW for row in _in_own_process(name)]
-    print("", file=sys.stderr)
-    for row in rows:
-        goal = "" if row.goal is None else f"goal {row.goal:g}"
-        verdict = "" if row.goal is None else ("ok" if row.value <= row.goal else "MISSED")
-        print(f"{row.name:<62}{row.value:>12.4g} {row.unit:<20}{goal:<14}{verdict}")
+def measure(part: str, size: Size) -> list[Number]:
+    """Measure one part in this process, and its peak memory."""
+    found = import_module(part).numbers(size)
+    return [*found, Number(name=f"part {part}: peak memory", value=peak_gigabytes(), unit="GB")]
+
+
+def changes(now: list[Number], before: dict[str, Any]) -> list[str]:
+    """Lines that lay the numbers of a former run beside those that it has as well."""
+    lines = []
+    for number in now:
+        entry = before["numbers"].get(number.name)
+        if entry is None or not entry["value"]:
+            continue
+        was = number_of(number.name, entry)
+        values = f"{was.value:>11.4g}{number.value:>11.4g} {number.unit:<8}"
+        lines.append(f"{number.name:<66}{values}{number.value / was.value:>7.3f}")
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure all parts, print a table, write what was asked for."""
+    args = _arguments(arguments)
+    size: Size = "quick" if args.quick else args.size
+    if args.write is not None:  # a process for one part
+        _write(args.write, {number.name: number.entry() for number in measure(args.only[0], size)})
+        return 0
+    result: dict[str, Any] = {"machine": describe_machine(), "size": size, "parts": {}}
+    numbers: list[Number] = []
+    for part in args.only or PARTS:
+        found, about = _in_own_process(part, size)
+        result["parts"][part] = about
+        print(f"\n{part}: {PARTS[part]} ({about['seconds']:.0f} s, load {about['load']:.1f})")
+        print("\n".join(f"  {number.line()}" for number in found))
+        if "left_out" in about:
+            print(f"  {about['left_out']}")
+        sys.stdout.flush()
+        numbers += found
+    result["numbers"] = {number.name: number.entry() for number in numbers}
+    goals = [number for number in numbers if number.goal is not None]
+    missed = [number for number in goals if not number.met]
+    print(f"\n{len(goals) - len(missed)} goals met, {len(missed)} missed")
+    print("\n".join(f"  {number.line()}" for number in missed))
+    if args.compare is not None:
+        print(f"\nbefore, now, now over before ({args.compare})")
+        print("\n".join(changes(numbers, json.loads(args.compare.read_text()))))
     if args.json is not None:
-        args.json.write_text(json.dumps({row.name: row.entry() for row in rows}, indent=1) + "\n")
+        _write(args.json, result)
+    if args.out is not None:
+        from summary import write_summary
+
+        write_summary(args.out, result)
+        _write(args.out / "numbers.json", result)
+        print(f"\n{args.out / 'summary.md'}")
+    return int(any("left_out" in about for about in result["parts"].values()))
 
 
-def _in_own_process(name: str) -> list[Row]:
-    import subprocess
-    import tempfile
+def _arguments(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="the short set: --size quick")
+    parser.add_argument("--size", choices=get_args(Size), default="full")
+    parser.add_argument(
+        "--only", choices=tuple(PARTS), nargs="+", metavar="PART", help=f"of {', '.join(PARTS)}"
+    )
+    parser.add_argument("--json", type=Path, help="write all numbers to this file")
+    parser.add_argument("--out", type=Path, help="folder for numbers, figures and summary")
+    parser.add_argument("--compare", type=Path, help="numbers.json of a former run")
+    parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
+    return parser.parse_args(arguments)
 
+
+def _in_own_process(part: str, size: Size) -> tuple[list[Number], dict[str, Any]]:
+    """Numbers of a part, and how it was run; the run goes on without a part that fails."""
+    load, begin = os.getloadavg()[0], perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "rows.json"
-        command = [sys.executable, __file__, "--only", name, "--json", str(target)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        return [Row(key, **entry) for key, entry in json.loads(target.read_text()).items()]
+        target = Path(folder) / "numbers.json"
+        command = [sys.executable, str(Path(__file__).resolve()), "--only", part, "--size", size]
+        run = subprocess.run(
+            [*command, "--write", str(target)],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"KLACK_CACHE": "off"},
+        )
+        about = {"load": round(load, 2), "seconds": round(perf_counter() - begin, 1)}
+        if run.returncode or not target.exists():
+            last = (run.stderr.strip() or f"exit code {run.returncode}").splitlines()[-1]
+            return [], about | {"left_out": f"failed: {last}"}
+        entries = json.loads(target.read_text())
+    found = [number_of(name, entry) for name, entry in entries.items()]
+    return [replace(number, part=part) for number in found], about
+
+
+def _write(path: Path, content: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=1) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

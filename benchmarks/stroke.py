@@ -14,12 +14,13 @@ Times are the best of several runs, in one process, after compilation.
 import argparse
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+from number import Number, Size
 from small_valve import Motion, by_cvode, by_klack, network
 
 from klack.magnetics.voltage_step import VoltageStep
@@ -28,7 +29,7 @@ from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.verification.whole_valve import peak_and_hold, whole_valve
 
-__all__ = ["books_rows", "cvode_rows", "main", "speed_rows", "step_rows"]
+__all__ = ["books_rows", "cvode_rows", "main", "numbers", "speed_rows", "step_rows"]
 
 STEP, COARSE, RECORD = 20e-9, 16, 1.28e-6
 STROKE = 10e-3
@@ -36,24 +37,35 @@ STEPS = (80e-9, 40e-9, 20e-9, 10e-9, 5e-9)
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 
 
-@dataclass(frozen=True)
-class Row:
-    """One measured number."""
+def numbers(size: Size) -> list[Number]:
+    """Speed and energy of the valve; in full also its step sizes, and CVODE beside a small one."""
+    if size == "smallest":
+        valve = valves()["dry"]
+        return [_row("dry: fine step", ns_per_step(valve, coarse=1, steps=500, repeats=1), "ns")]
+    books = books_rows()
+    found = _with_accuracy(speed_rows(), books) + books
+    if size == "full":
+        found += step_rows() + cvode_rows()
+    return [replace(number, name=f"stroke, {number.name}") for number in found]
 
-    name: str
-    value: float
-    unit: str
-    goal: float | None = None
-    at_least: bool = False
 
-    def line(self) -> str:
-        """As printed."""
-        if self.goal is None:
-            return f"{self.name:<58}{self.value:>12.4g} {self.unit}"
-        met = self.value >= self.goal if self.at_least else self.value <= self.goal
-        word = "goal >=" if self.at_least else "goal <="
-        verdict = "ok" if met else "MISSED"
-        return f"{self.name:<58}{self.value:>12.4g} {self.unit:<8}{word} {self.goal:g}  {verdict}"
+def _with_accuracy(speeds: list[Number], books: list[Number]) -> list[Number]:
+    """Times, each with the energy residual of its valve."""
+    worst = {
+        name: max(b.value for b in books if b.name.startswith(name)) for name in ("dry", "wet")
+    }
+    return [
+        replace(number, accuracy=worst[number.name[:3]], accuracy_of="energy residual")
+        if number.unit in ("ns", "s")
+        else number
+        for number in speeds
+    ]
+
+
+def _row(
+    name: str, value: float, unit: str, goal: float | None = None, *, at_least: bool = False
+) -> Number:
+    return Number(name=name, value=float(value), unit=unit, goal=goal, at_least=at_least)
 
 
 def valves(*, damping: float = 0.01, end: float = 2.5e-3) -> dict[str, Network]:
@@ -92,37 +104,37 @@ def closed_ns_per_step(*, wet: bool, steps: int = 20_000, repeats: int = 25) -> 
     return ns_per_step(valve if wet else valve.dry(), coarse=1, steps=steps, repeats=repeats)
 
 
-def speed_rows() -> list[Row]:
+def speed_rows() -> list[Number]:
     """Speed of fine steps, and of a stroke of 10 ms."""
     rows = []
     goals = {"dry": 75.0, "wet": 140.0}
     for name, valve in valves().items():
-        rows.append(Row(f"{name}: fine step", ns_per_step(valve, coarse=1), "ns", goals[name]))
+        rows.append(_row(f"{name}: fine step", ns_per_step(valve, coarse=1), "ns", goals[name]))
         rows.append(
-            Row(f"{name}: fine step, closed at rest", closed_ns_per_step(wet=name == "wet"), "ns")
+            _row(f"{name}: fine step, closed at rest", closed_ns_per_step(wet=name == "wet"), "ns")
         )
     for name, valve in valves().items():
         runs = [stroke(valve, STROKE, coarse=COARSE) for _ in range(7)]
         best = min(runs, key=lambda result: result.wall_time)
         goal = 0.1 if name == "wet" else None
-        rows.append(Row(f"{name}: 10 ms, open and close", best.wall_time, "s", goal))
-        rows.append(Row(f"{name}: real-time factor", best.wall_time / STROKE, "-"))
-        rows.append(Row(f"{name}: fine steps", best.fine_steps, "-"))
-        rows.append(Row(f"{name}: coarse steps (16 fine ones)", best.coarse_steps, "-"))
-        rows.append(Row(f"{name}: impacts", len(best.events), "-"))
+        rows.append(_row(f"{name}: 10 ms, open and close", best.wall_time, "s", goal))
+        rows.append(_row(f"{name}: real-time factor", best.wall_time / STROKE, "-"))
+        rows.append(_row(f"{name}: fine steps", best.fine_steps, "-"))
+        rows.append(_row(f"{name}: coarse steps (16 fine ones)", best.coarse_steps, "-"))
+        rows.append(_row(f"{name}: impacts", len(best.events), "-"))
         alone = min(stroke(valve, STROKE, coarse=1).wall_time for _ in range(3))
-        rows.append(Row(f"{name}: 10 ms in fine steps only", alone, "s"))
+        rows.append(_row(f"{name}: 10 ms in fine steps only", alone, "s"))
     return rows
 
 
-def books_rows() -> list[Row]:
+def books_rows() -> list[Number]:
     """Energy residual of undamped valves that open and close, over the throughput."""
     rows = []
     for name, valve in valves(damping=0.0, end=1e-3).items():
         for coarse in (1, COARSE):
             result = stroke(valve, 3e-3, coarse=coarse)
             label = f"{name}: energy residual, 3 ms, coarse {coarse}"
-            rows.append(Row(label, result.books.relative_residual, "-", 1e-9))
+            rows.append(_row(label, result.books.relative_residual, "-", 1e-9))
     return rows
 
 
@@ -134,7 +146,7 @@ def first_impacts(events: tuple[ImpactEvent, ...]) -> dict[str, ImpactEvent]:
     return found
 
 
-def step_rows() -> list[Row]:
+def step_rows() -> list[Number]:
     """First impacts over step sizes against 5 ns; fine steps only, and with coarse ones at 20 ns.
 
     The driver ends 0.35 ms after the first touch, before bounces have become chaotic.
@@ -162,13 +174,13 @@ def step_rows() -> list[Row]:
                 if step == STEP:
                     kind = ", coarse" if coarse > 1 else ""
                     where = f"{name}: {stop}, 20 ns{kind} against 5 ns"
-                    rows.append(Row(f"{where}, peak", 100 * abs(peak), "%", 0.1))
-                    rows.append(Row(f"{where}, time", 1e6 * abs(late), "us", 0.05))
+                    rows.append(_row(f"{where}, peak", 100 * abs(peak), "%", 0.1))
+                    rows.append(_row(f"{where}, time", 1e6 * abs(late), "us", 0.05))
     print("\n".join(table))
     return rows
 
 
-def cvode_rows() -> list[Row]:
+def cvode_rows() -> list[Number]:
     """Time of klack and of CVODE at equal error of the state, on one small valve."""
     rows = []
     for name, modes in product(("dry", "wet"), (5, 20, 80)):
@@ -183,15 +195,15 @@ def cvode_rows() -> list[Row]:
         peer = min(enough or theirs[-1:], key=lambda run: run.seconds)
         label = f"{name}, {modes} modes"
         rows += [
-            Row(
+            _row(
                 f"{label}: state at 20 ns against CVODE 1e-11",
                 error,
                 "-",
                 1e-4 if modes == 5 else None,
             ),
-            Row(f"{label}: time of CVODE at that error or better", peer.seconds, "s"),
-            Row(f"{label}: time of klack", at_20.seconds, "s"),
-            Row(
+            _row(f"{label}: time of CVODE at that error or better", peer.seconds, "s"),
+            _row(f"{label}: time of klack", at_20.seconds, "s"),
+            _row(
                 f"{label}: time ratio CVODE / klack",
                 peer.seconds / at_20.seconds,
                 "-",
@@ -246,10 +258,7 @@ def main() -> None:
             result += rows
             print("\n".join(row.line() for row in rows))
     if args.json is not None:
-        entries = {
-            row.name: {"value": float(row.value), "unit": row.unit, "goal": row.goal}
-            for row in result
-        }
+        entries = {row.name: row.entry() for row in result}
         args.json.write_text(json.dumps(entries, indent=1) + "\n")
 
 

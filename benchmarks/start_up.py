@@ -1,0 +1,52 @@
+"""Time until klack answers: its help, its import, a first small impact."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+from number import Number, Size
+
+__all__ = ["numbers"]
+
+_KLACK = [sys.executable, "-m", "klack"]
+
+
+def numbers(size: Size) -> list[Number]:
+    """Wall-clock of fresh processes; the interpreter's own start is part of all but the import."""
+    repeats = {"smallest": 1, "quick": 3, "full": 7}[size]
+    bare = _best([sys.executable, "-c", "pass"], repeats)
+    found = [
+        Number(name="klack --help", value=_best([*_KLACK, "--help"], repeats), unit="s", goal=0.5),
+        Number(
+            name="import klack",
+            value=max(_best([sys.executable, "-c", "import klack"], repeats) - bare, 0.0),
+            unit="s",
+            goal=0.3,
+        ),
+    ]
+    if size != "smallest":
+        impact = [*_KLACK, "impact", "two-rods", "--level", "reduced", "--quiet"]
+        name = "klack impact two-rods, reduced, with the report"
+        found.append(Number(name=name, value=_with_output(impact, repeats), unit="s"))
+    if size == "full":
+        with tempfile.TemporaryDirectory() as cache:
+            seconds = _with_output(impact, 1, NUMBA_CACHE_DIR=cache)
+        found.append(Number(name="the same with nothing compiled yet", value=seconds, unit="s"))
+    return found
+
+
+def _best(command: list[str], repeats: int, **variables: str) -> float:
+    best = float("inf")
+    for _ in range(repeats):
+        begin = perf_counter()
+        subprocess.run(command, check=True, capture_output=True, env=os.environ | variables)
+        best = min(best, perf_counter() - begin)
+    return best
+
+
+def _with_output(command: list[str], repeats: int, **variables: str) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        return _best([*command, "--out", str(Path(folder) / "out")], repeats, **variables)
