@@ -155,7 +155,7 @@ def _linear() -> list[Check]:
             "linkage after ramps and jumps of voltage inside steps [Wb]",
             expected=0.5 * 3e-6 * 30.0 - 0.5 * 5.3e-6 * 6.0,
             computed=linkage,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="Faraday: linkage = integral of the voltage; 1.7 us steps",
         ),
     ]
@@ -197,7 +197,7 @@ def _switching() -> list[Check]:
             "peak and hold: current after the peak, largest deviation [A]",
             expected=0.0,
             computed=float(np.max(np.abs(peak.current[settled] - line))),
-            tolerance=1e-10,
+            tolerance=5e-13,
             source="R = 0: rise by 65 V to 10 A, then a line by -0.7 V",
         ),
         compare(
@@ -205,7 +205,7 @@ def _switching() -> list[Check]:
             "upper current of settled pulse-width modulation [A]",
             expected=most,
             computed=float(ripple.current[-600:].max()),
-            tolerance=1e-6,
+            tolerance=5e-9,
             source="u/R (1 - exp(-d T/tau))/(1 - exp(-T/tau)); 50 us, duty 0.3",
         ),
     ]
@@ -237,7 +237,7 @@ def _eddy() -> list[Check]:
             "main flux behind a shorted turn after 0.2 ms [Wb]",
             expected=float(exact[0]),
             computed=float(run.flux[-1]),
-            tolerance=1e-7,
+            tolerance=1e-8,
             source="matrix exponential of the two fluxes",
         ),
         compare(
@@ -356,7 +356,7 @@ def _motion() -> list[Check]:
             "force of a settled current [N]",
             expected=-rest.force,
             computed=float(held.force[-1]),
-            tolerance=1e-10,
+            tolerance=5e-13,
             source="static circuit at 5 A",
         ),
     ]
@@ -364,9 +364,9 @@ def _motion() -> list[Check]:
 
 def _energy() -> list[Check]:
     cases = (
-        ("peak and hold, opening and closing, 20 ns", injector(), 20e-9, 1e-12),
-        ("the same at 1 us", injector(), 1e-6, 1e-12),
-        ("the same without eddy currents", injector(0.0), 50e-9, 1e-12),
+        ("peak and hold, opening and closing, 20 ns", injector(), 20e-9, 2e-13),
+        ("the same at 1 us", injector(), 1e-6, 1e-13),
+        ("the same without eddy currents", injector(0.0), 50e-9, 1e-13),
     )
     out = []
     for name, circuit, step, tolerance in cases:
@@ -447,7 +447,7 @@ def _map() -> list[Check]:
             "energy residual of a coil known by a map [-]",
             expected=0.0,
             computed=runs[1].residual,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source=IDENTITY,
         ),
         compare(

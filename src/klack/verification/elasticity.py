@@ -28,7 +28,7 @@ _RITZ = (
 )
 _AXIAL = {1: 86117.56, 2: 171706.49, 4: 338712.02, 8: 623091.92, 12: 752468.26}
 """Circumferential order 0: number of the mode -> frequency [Hz]."""
-_AXIAL_TOLERANCE = {1: 1e-6, 2: 1e-6, 4: 2e-6, 8: 2e-5, 12: 1e-4}
+_AXIAL_TOLERANCE = {1: 1e-6, 2: 5e-8, 4: 2e-6, 8: 2e-5, 12: 1e-4}
 """Error of the mesh, which grows with the fourth power of the wave number."""
 _BENDING = {1: 19587.12, 2: 50362.64, 3: 90819.01}
 """Circumferential order 1; each is a pair."""
@@ -159,7 +159,7 @@ def _free_rod() -> Iterator[Check]:
         "free-free rod, elastic static compliance of its end [L/(E A)]",
         expected=1 / 3,
         computed=static * spring,
-        tolerance=1e-8,
+        tolerance=1e-11,
         source="-cot(k L)/(E A k) + 1/(m w^2) at w = 0: L/(3 E A)",
     )
     carried = np.cumsum((unit @ modes.shapes) ** 2 / modes.omega**2)
@@ -179,6 +179,7 @@ def _free_rod() -> Iterator[Check]:
             computed=(static - float(carried[count - 1])) * spring,
             tolerance=1e-4,
             source="L/(E A) (1/3 - 2/pi^2 sum of 1/n^2, n = 1..N)",
+            reason="one tolerance for 1, 5 and 10 modes; the error grows with the wave number",
             curve=curve,
         )
 
@@ -201,8 +202,9 @@ def _bent_beam() -> Iterator[Check]:
             f"beam in pure bending, deflection of its end, {family} [m]",
             expected=-curvature * length**2 / 2,
             computed=float(u[middle, 0]),
-            tolerance=1e-8,
+            tolerance=5e-10,
             source="Euler-Bernoulli, M L^2/(2 E I), exact for nu = 0",
+            reason="round-off of the solution; one tolerance for all element families",
         )
 
 
@@ -220,7 +222,7 @@ def _solvers() -> Iterator[Check]:
                 f"direct solver {name} against superlu, largest difference of displacement",
                 expected=0.0,
                 computed=float(np.abs(answer - reference).max() / np.abs(reference).max()),
-                tolerance=1e-10,
+                tolerance=5e-12,
                 source="the same linear system, another factorisation",
             )
 

@@ -43,9 +43,10 @@ GROUP = "exchange"
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 UNITS = unit_system("mm t s")
 MODES = 20
-EXACT, ROUNDED = 1e-8, 1e-6
-_ROUNDING_MATRICES = ("DMIG", "OUTPUT4, binary, single")
-_ROUNDING_MESHES = ("ANSYS .cdb", "Nastran .bdf")
+SAME, EXACT, ROUNDED, SINGLE = 5e-14, 2e-12, 2e-8, 2e-6
+"""Every digit kept; rows in another order; ten digits; single precision."""
+_MATRIX_TOLERANCES = {"DMIG": ROUNDED, "OUTPUT4, binary, single": SINGLE}
+_MESH_TOLERANCES = {"ANSYS .cdb": EXACT, "Nastran .bdf": ROUNDED}
 SPEED, DURATION = 0.4, 40e-6  # [m/s], [s]
 FINE, USUAL = 1e-9, 20e-9  # [s]
 
@@ -95,7 +96,7 @@ def _meshes(body: ElasticBody, frequencies: NDArray[np.float64], folder: Path) -
         model = read_mesh_file(path, None if form == "ANSYS .cdb" else 1e-3)
         materials = dict.fromkeys(model.mesh.solids, STEEL)
         found = eigenmodes(elastic_body("block", model.mesh, materials), count=MODES).frequency
-        tolerance = ROUNDED if form in _ROUNDING_MESHES else EXACT
+        tolerance = _MESH_TOLERANCES.get(form, SAME)
         yield _frequency_check(f"mesh, {form}", found, frequencies, tolerance)
 
 
@@ -116,7 +117,7 @@ def _matrices(body: ElasticBody, frequencies: NDArray[np.float64], folder: Path)
             "block", body.mesh, placed.K * UNITS.stiffness, placed.M * UNITS.mass, fixed_nodes=()
         )
         found = eigenmodes(given, count=MODES).frequency
-        tolerance = ROUNDED if form in _ROUNDING_MATRICES else EXACT
+        tolerance = _MATRIX_TOLERANCES.get(form, EXACT)
         yield _frequency_check(f"matrices, {form}", found, frequencies, tolerance)
 
 
@@ -133,7 +134,7 @@ def _calculix(folder: Path) -> Iterator[Check]:
         f"CalculiX on the same mesh: its first {MODES} frequencies, largest relative deviation",
         expected=0.0,
         computed=_largest(found, expected),
-        tolerance=1e-4,
+        tolerance=2e-5,
         source="CalculiX, *FREQUENCY",
     )
 
@@ -184,7 +185,7 @@ def _models(folder: Path) -> Iterator[Check]:
             f"state space, {form}: frequencies, largest relative deviation",
             expected=0.0,
             computed=_largest(back.omega[elastic], rod.omega[elastic]),
-            tolerance=EXACT,
+            tolerance=SAME,
             source="the rod that left",
         )
         omega = 2.0 * np.pi * np.geomspace(1e3, 1e6, 400)
@@ -270,11 +271,21 @@ def _fmus(folder: Path) -> Iterator[Check]:
     except KlackError:
         return
     runs = (
-        ("co-simulation, steps of 20 ns, against the native run", USUAL, "CoSimulation", 1e-9),
-        ("model exchange with CVODE, against the native run in 1 ns", FINE, "ModelExchange", 1e-4),
+        (
+            "co-simulation, steps of 20 ns, against the native run",
+            USUAL,
+            "CoSimulation",
+            (5e-13, 5e-13),
+        ),
+        (
+            "model exchange with CVODE, against the native run in 1 ns",
+            FINE,
+            "ModelExchange",
+            (5e-8, 2e-7),
+        ),
     )
     for fmi in (2, 3):
-        for words, step, kind, tolerance in runs:
+        for words, step, kind, (of_force, of_lift) in runs:
             if fmi == 3 and kind == "ModelExchange":
                 continue  # the same core; one run through a second wrapper is enough here
             peak, lift = _native(step)
@@ -285,14 +296,15 @@ def _fmus(folder: Path) -> Iterator[Check]:
                 f"{where}: peak force [N]",
                 expected=peak,
                 computed=found,
-                tolerance=tolerance,
+                tolerance=of_force,
                 source="klack.simulation, the same rods",
+                reason="another compiler may fuse products and sums",
             )
             yield compare(
                 GROUP,
                 f"{where}: lift at the end [m]",
                 expected=lift,
                 computed=height,
-                tolerance=1e-9 if kind == "CoSimulation" else 1e-6,
+                tolerance=of_lift,
                 source="klack.simulation, the same rods",
             )

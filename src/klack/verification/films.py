@@ -85,7 +85,7 @@ def _geometry() -> list[Check]:
             "conical land, axial force times speed [W]",
             expected=_cone_dissipation(cone, 2e-6, 0.3, 4e-4),
             computed=_film_force(cone.film_row(4e-4, 1e5), 2e-6, 0.3) * 0.3,
-            tolerance=1e-10,
+            tolerance=5e-14,
             source="viscous dissipation of squeeze and shear flow, by quadrature",
         ),
     ]
@@ -121,7 +121,7 @@ def _roughness() -> list[Check]:
             "flow factor of a rough film of equal impulse [-]",
             expected=0.5 / lowest**2 / inverse,
             computed=mean_flow_factor(lowest),
-            tolerance=1e-9,
+            tolerance=5e-13,
             source="quadrature of 1/(phi h^3); phi of Patir and Cheng (1978)",
         )
     ]
@@ -208,7 +208,7 @@ def _mass() -> list[Check]:
             "energy residual of a cavitating film [-]",
             expected=0.0,
             computed=parting.residual,
-            tolerance=1e-10,
+            tolerance=5e-12,
             source=IDENTITY,
         ),
     ]
@@ -295,7 +295,7 @@ def _rods() -> list[Check]:
             "energy residual of film, damped asperities and compliance [-]",
             expected=0.0,
             computed=both.residual,
-            tolerance=1e-10,
+            tolerance=5e-12,
             source=IDENTITY,
         ),
         _film_that_vanishes(a, b),
@@ -318,7 +318,7 @@ def _film_that_vanishes(a: ReducedBody, b: ReducedBody) -> Check:
         "a film that vanishes against no film, largest difference of the force [-]",
         expected=0.0,
         computed=worst,
-        tolerance=1e-6,
+        tolerance=1e-8,
         source="contact loop without films",
     )
 

@@ -77,7 +77,7 @@ def _hertz() -> list[Check]:
             "Hertz contact time [s]",
             expected=duration,
             computed=m.contact_time,
-            tolerance=1e-6,
+            tolerance=2e-7,
             source=where,
             curve=curve,
         ),
@@ -95,7 +95,7 @@ def _hertz() -> list[Check]:
             "Hertz restitution [-]",
             expected=1.0,
             computed=m.restitution,
-            tolerance=1e-10,
+            tolerance=5e-13,
             source="elastic law",
         ),
     ]
@@ -141,7 +141,7 @@ def _st_venant() -> list[Check]:
             "force plateau of two rods, Z v/2 [N]",
             expected=0.5 * Z,
             computed=float(np.mean(soft.force[inside])),
-            tolerance=1e-4,
+            tolerance=2e-9,
             source=source,
             curve=curve,
         ),
@@ -191,6 +191,7 @@ def _needle_on_spring() -> list[Check]:
                     tolerance=tolerance,
                     source=NEEDLE_SOURCE,
                     absolute=absolute,
+                    reason="stiffer springs need more of the 200 modes; one tolerance for all",
                 )
             )
     return out

@@ -100,7 +100,7 @@ def _closure() -> list[Check]:
             "instant closure, pressure rise [Pa]",
             expected=jump,
             computed=run.pressure[0, 1],
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="Joukowsky: rho a v; Wylie & Streeter 1993, ch. 1",
         ),
         compare(
@@ -108,7 +108,7 @@ def _closure() -> list[Check]:
             "50 periods of 4 L/a after it, largest difference from a square wave [-]",
             expected=0.0,
             computed=float(np.max(np.abs(run.pressure[:, 1] - square))) / jump,
-            tolerance=1e-10,
+            tolerance=5e-14,
             source="d'Alembert; no friction, no decay",
             curve=curve,
         ),
@@ -143,7 +143,7 @@ def _slow_closure() -> list[Check]:
             "linear closure in 6 L/a, largest difference from the sum of echoes [-]",
             expected=0.0,
             computed=float(np.max(np.abs(run.pressure[:, 1] - exact))) / bound,
-            tolerance=1e-12,
+            tolerance=1e-13,
             source="Wylie & Streeter 1993, ch. 3: characteristics without friction",
             curve=curve,
         ),
@@ -174,7 +174,7 @@ def _piston() -> list[Check]:
             "moving face in front of a line, force until the echo [N]",
             expected=exact,
             computed=float(np.mean(force[: 2 * STEPS])),
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="rho a A_n^2 / A v: a dashpot",
         ),
         compare(
@@ -182,7 +182,7 @@ def _piston() -> list[Check]:
             "moving face in front of a line, time of the echo [s]",
             expected=2.0 * LENGTH / SPEED,
             computed=until * STEP,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="2 L / a",
         ),
     ]
@@ -211,7 +211,7 @@ def _pulse() -> list[Check]:
             "pulse through 130.37 steps of both lengths, volume that arrives [m^3]",
             expected=sent,
             computed=arrived,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="means with weights that add up to one",
         ),
         compare(
@@ -372,7 +372,7 @@ def _cavity() -> list[Check]:
             "column separation, largest cavity [m^3]",
             expected=largest,
             computed=float(np.max(run.cavity)),
-            tolerance=1e-10,
+            tolerance=5e-13,
             source="characteristics: 2 (p_v - p + 2 Z q) / Z over L/a",
         ),
         compare(
@@ -380,7 +380,7 @@ def _cavity() -> list[Check]:
             "column separation, pressure after the collapse [Pa]",
             expected=wave + Z * into,
             computed=float(run.pressure[seen, 1]),
-            tolerance=1e-10,
+            tolerance=1e-12,
             source="characteristics: the columns meet, the wave returns as from a wall",
         ),
         compare(
@@ -388,7 +388,7 @@ def _cavity() -> list[Check]:
             "column separation, volume that does not balance [-]",
             expected=0.0,
             computed=run.volume_residual,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="inflow = compression - cavity",
         ),
     ]
@@ -418,7 +418,7 @@ def _books() -> list[Check]:
             "energy residual, friction, interpolation and cavities [-]",
             expected=0.0,
             computed=run.energy_residual,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="work at both ends = change of store + losses",
         ),
         compare(
@@ -434,7 +434,7 @@ def _books() -> list[Check]:
             "volume that does not balance, the same run [-]",
             expected=0.0,
             computed=run.volume_residual,
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="inflow = compression - cavities",
         ),
     ]

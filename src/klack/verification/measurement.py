@@ -44,7 +44,7 @@ def _sensor() -> list[Check]:
             "delay of a ramp behind a sensor of 50 kHz [s]",
             expected=1.0 / (2.0 * pi * BANDWIDTH),
             computed=float(late[-1]),
-            tolerance=1e-9,
+            tolerance=5e-14,
             source="1 / (2 pi f)",
         ),
         compare(
@@ -90,7 +90,7 @@ def _velocity() -> list[Check]:
             "largest error of the velocity of a cubic [m/s]",
             expected=0.0,
             computed=float(np.max(np.abs(cubic - exact))),
-            tolerance=1e-9,
+            tolerance=1e-12,
             source="d/dt",
             absolute=True,
             curve=polynomial,
@@ -100,7 +100,7 @@ def _velocity() -> list[Check]:
             "amplitude of the velocity of a sine of 15 kHz over the true one [-]",
             expected=1.0 + float(sine.amplitude_error(15e3)),
             computed=float(rate @ sine.velocity[inside] / (rate @ rate)),
-            tolerance=1e-9,
+            tolerance=5e-14,
             source="Savitzky & Golay 1964, frequency response of the weights",
             curve=tone,
         ),
@@ -131,14 +131,14 @@ def _flights() -> list[Check]:
             absolute=True,
         )
         for name, expected, computed, tolerance in (
-            ("exact drop: first touch [s]", DROP.touches[0], hit.time, 0.1e-6),
-            ("exact drop: approach speed [m/s]", 0.5, hit.approach_speed, 1e-3),
+            ("exact drop: first touch [s]", DROP.touches[0], hit.time, 2e-11),
+            ("exact drop: approach speed [m/s]", 0.5, hit.approach_speed, 5e-8),
             ("exact drop: restitution [-]", 0.6, hit.restitution, 1e-3),
             (
                 "exact drop: rebound height [m]",
                 w**2 / (2.0 * DROP.acceleration),
                 hit.rebound_height,
-                20e-9,
+                1e-9,
             ),
         )
     ]
@@ -185,12 +185,12 @@ def _maximum() -> list[Check]:
             f"expected largest of {n} normal draws [standard deviations]",
             expected=exact,
             computed=expected_maximum(n),
-            tolerance=1e-6,
+            tolerance=tolerance,
             source=source,
         )
-        for n, exact, source in (
-            (2, 1.0 / sqrt(pi), "1 / sqrt(pi)"),
-            (3, 1.5 / sqrt(pi), "3 / (2 sqrt(pi))"),
-            (10, 1.5387527, "table of normal order statistics"),
+        for n, exact, tolerance, source in (
+            (2, 1.0 / sqrt(pi), 5e-14, "1 / sqrt(pi)"),
+            (3, 1.5 / sqrt(pi), 5e-14, "3 / (2 sqrt(pi))"),
+            (10, 1.5387527, 5e-8, "table of normal order statistics"),
         )
     ]

@@ -158,10 +158,10 @@ def _rubs() -> list[Check]:
     lost = dry.books.losses["part loss"]
     return [
         _check(
-            "viscous friction, speed after 6 ms [m/s]", slowed, _speed(viscous)[-1], 1e-8, NEWTON
+            "viscous friction, speed after 6 ms [m/s]", slowed, _speed(viscous)[-1], 1e-9, NEWTON
         ),
-        _check("dry friction, way to rest [m]", way, float(_place(dry)[-1]), 1e-6, NEWTON),
-        _check("dry friction, booked loss [J]", 0.5 * MASS * v**2, lost, 1e-9, "all of it"),
+        _check("dry friction, way to rest [m]", way, float(_place(dry)[-1]), 5e-9, NEWTON),
+        _check("dry friction, booked loss [J]", 0.5 * MASS * v**2, lost, 5e-12, "all of it"),
     ]
 
 
@@ -209,7 +209,7 @@ def _two_bodies() -> list[Check]:
             "two masses on a spring, drift of their momentum [-]",
             0.0,
             float(np.abs(momentum / (MASS * 0.5) - 1.0).max()),
-            1e-12,
+            5e-13,
             "conservation",
         ),
     ]

@@ -71,7 +71,7 @@ def _rod_on_wall() -> list[Check]:
             "rod on rigid wall: impulse against change of momentum [N s]",
             expected=history.mass_a * (history.velocity_a[-1] + _SPEED),
             computed=history.impulse,
-            tolerance=1e-11,
+            tolerance=5e-14,
             source="Newton's second law",
         ),
         compare(
@@ -79,7 +79,7 @@ def _rod_on_wall() -> list[Check]:
             "rod on rigid wall: energy ledger, residual over impact energy",
             expected=0.0,
             computed=history.ledger.residual,
-            tolerance=1e-11,
+            tolerance=5e-14,
             source="energy theorem of the scheme: losses -lam.g0 and -2 mu.g1 / h^2 are booked",
         ),
         compare(
