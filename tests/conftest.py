@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 import pytest
 
 os.environ["KLACK_CACHE"] = "off"  # every test computes; those of the cache take a folder of theirs
+
+sys.path.append(str(Path(__file__).parent))  # worker processes look there as well
+from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy books)
 
 SOURCE = Path(__file__).parent / "data" / "spring_damper.c"
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from energy_ledger import allowed
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
 from klack.exchange.fmu.build import source_texts
@@ -272,7 +273,8 @@ def test_two_contacts_with_films_follow_the_network(tmp_path):
         unit.fmu.doStep(i * span, span)
         own[i] = unit.get("velocity", "mean_contact_force_stop_0", "mean_contact_force_stop_1")
 
-    native = network_run(system, films, (50.0, -50.0), half * span, span)
+    with allowed("simulate_network", 1e-6):  # stiff stops: what the forces do not settle, 2e-7
+        native = network_run(system, films, (50.0, -50.0), half * span, span)
     for column, channel in enumerate(native):
         assert np.max(np.abs(channel)) > 0.05
         # the network's forces settle to 1e-12 m only

@@ -94,8 +94,19 @@ class EnergyLedger:
         """Energy that appeared from nowhere, relative to the energy turned over [-]."""
         held = sum(body.total for body in self.bodies) + self.contact + self.spring
         lost = self.contact_dissipation + self.damping
-        turned_over = max(self.initial, abs(self.work))
-        return (held + lost - self.initial - self.work) / turned_over if turned_over else 0.0
+        scale = self.turned_over
+        return (held + lost - self.initial - self.work) / scale if scale else 0.0
+
+    @property
+    def turned_over(self) -> float:
+        """Scale of the residual [J]: initial energy, work done, or change of the springs."""
+        return max(self.initial, abs(self.work), abs(self.spring))
+
+    @property
+    def least_loss(self) -> float:
+        """Smaller one of the two losses, relative to the energy turned over [-]."""
+        scale = self.turned_over
+        return min(self.contact_dissipation, self.damping) / scale if scale else 0.0
 
     def parts(self) -> dict[str, float]:
         """Return every entry by its name in words [J], the initial energy first."""

@@ -2,11 +2,11 @@ r"""From bodies and contacts to the flat arrays of the kernel.
 
 Three things happen on the way, all exact:
 
-- a spring to ground joins the modes of its body: :math:`\mathrm{diag}(\omega^2) +
-k\varphi\varphi^T` is
-  diagonalised again through the singular values of :math:`[\mathrm{diag}(\omega); \sqrt
-  k\varphi^T]` (twice the digits of an eigenvalue solver), so it costs nothing per step; of the
-  modal damping, the small off-diagonal part that this creates is dropped;
+- a spring to ground joins the modes of its body:
+  :math:`\mathrm{diag}(\omega^2) + k\varphi\varphi^T` is diagonalised again through the singular
+  values of :math:`[\mathrm{diag}(\omega); \sqrt k\varphi^T]` (twice the digits of an eigenvalue
+  solver), so it costs nothing per step; of the modal damping, the small off-diagonal part that
+  this creates is dropped;
 - elastic modes are counted from their rest position under the constant forces, where they start;
 - constant forces on the rigid modes become a constant increment per step.
 """
@@ -204,6 +204,8 @@ def _stiffest(law: object, speed: float, yielding: float) -> float:
     """Tangent stiffness at the depth that would store all energy of approach."""
     energy = 0.5 * speed**2 / yielding if yielding else 0.5e-3 * speed**2
     depth = 1e-9
+    while law.potential(depth) > energy > 0.0:  # type: ignore[attr-defined]
+        depth /= 1.25
     while law.potential(depth) < energy:  # type: ignore[attr-defined]
         depth *= 1.25
     depths = depth * np.linspace(1e-3, 1.0, 50)

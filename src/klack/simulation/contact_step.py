@@ -24,8 +24,8 @@ __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 Vector = NDArray[np.float64]
 
 _LINEAR, _HERTZ, _TABLE = LAW_LINEAR, LAW_HERTZ, LAW_TABLE
-_FORCE_LEFT = 1e-9  # [N] accepted error of a force
-_UNKNOWN = 1e16  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-13 m
+_FORCE_LEFT = 1e-11  # accepted error of a force over the force
+_STEP_LEFT = 3e-7  # last Newton step over the indentation; what is left of the force is its square
 _NEWTON_LIMIT = 60
 
 
@@ -134,7 +134,7 @@ def mean_force(
         K, n = p[start], p[start + 1]
         low, high = min(d0, d1), max(d0, d1)
         mean = _hertz_mean(K, n, max(low, 0.0), high)
-        if high - low < 1e-16:
+        if high - low < 1e-8 * high:
             return mean, 0.5 * n * mean / high, hint
         mean *= (high - max(low, 0.0)) / (high - low)
         return mean, (K * _power(max(d1, 0.0), n) - mean) / (d1 - d0), hint
@@ -190,13 +190,19 @@ def solve_step(
         if kind == _TABLE and chi_over_h == 0.0 and _within(p, start, i, d0, d1):
             force, slope = _cubic_mean(p, i, d0 - p[i], d1 - p[i])  # the usual case, no call
             curvature = abs(p[i + 3]) + abs(p[i + 4]) * (d0 + 3.0 * d1 - 4.0 * p[i])
+            excess = d1 - df + G * force
+            step = excess / (1.0 + G * slope)
+            last = curvature * step * step <= _FORCE_LEFT * force
         else:
             force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, d1, hint)
-            curvature = _UNKNOWN
-        excess = d1 - df + G * force
-        step = excess / (1.0 + G * slope)
+            excess = d1 - df + G * force
+            step = excess / (1.0 + G * slope)
+            deep = max(d0, d1)
+            if chi_over_h * deep > 1.0:
+                deep = 1.0 / chi_over_h
+            last = abs(step) <= _STEP_LEFT * deep
         # taken without a look back, and before the bracket test: both its ends are round-off then
-        if curvature * step * step < _FORCE_LEFT:
+        if last:
             force = max(force - slope * step, 0.0)
             d1 -= step
             break

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
@@ -16,6 +17,8 @@ from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
 
 __all__ = ["SystemRecord", "simulate", "simulate_impact"]
+
+_BALANCE = 1e-9  # energy residual that every run keeps, whatever its step
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,6 +114,11 @@ def simulate(
     ------
     ConvergenceError
         When the forces of several contacts do not settle.
+
+    Warns
+    -----
+    AccuracyWarning
+        When the energy balance does not close to 1e-9 (:mod:`klack.energy_balance`).
     """
     require_positive("simulate: step", step, "s")
     require_positive("simulate: duration", duration, "s")
@@ -186,6 +194,14 @@ def simulate(
         own = slice(block.first, block.last)
         positions.append(block.basis @ (q[own] + block.rest))
         speeds.append(block.basis @ v[own])
+    ledger = _ledger(flat, positions, speeds, books)
+    energy_balance.check_energy_balance(
+        "simulate",
+        ledger.residual,
+        ledger.least_loss,
+        limit=_BALANCE,
+        advice="a shorter step; bodies and laws whose numbers lie far apart cost digits",
+    )
     return SystemRecord(
         system=system,
         integration_step=float(step),
@@ -198,7 +214,7 @@ def simulate(
         external_force=_external_forces(system, flat, records, step * steps_per_record, out_v),
         final_position=tuple(positions),
         final_velocity=tuple(speeds),
-        ledger=_ledger(flat, positions, speeds, books),
+        ledger=ledger,
     )
 
 

@@ -5,7 +5,8 @@ One step of length ``h`` (or ``M h`` while nothing touches):
 1. Every mode moves exactly, without the forces of this step.
 2. Sweeps: all elements, then all pressures (Newton), then all interfaces find their mean forces
    from the port displacements at both ends of the step; the forces move the ports by ``G F``;
-   again, until no port moves by more than :data:`SETTLED`.  Elements and fluid live on the
+   again, until no port moves by more than :data:`SETTLED`, nor by more than a small share of
+   the way in the step.  Elements and fluid live on the
    displacements that they saw last, so what is left of that change costs energy in second order.
 3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
    the modes.
@@ -64,6 +65,8 @@ Index = NDArray[np.int64]
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
 SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
 SETTLED_COARSE = 1e-14  # [m] the same for a coarse step, whose forces change more
+_SETTLED_SHARE = 1e-4  # and of the longest way of a port in the step: small valves, slow motion
+_UNSEEN = 1e-18  # [m] no change smaller than this is asked for
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
@@ -153,6 +156,17 @@ def _move(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> float:
         S[Y1 + p] = total
         moved = max(moved, abs(total - S[USED + p]))
     return moved
+
+
+@njit(cache=True)
+def _settled(S: Any, ports: int, moved: float, most: float) -> bool:
+    """Whether a change of displacements is below ``most`` and small against the step's way."""
+    if moved <= _UNSEEN or moved > most:
+        return moved <= most
+    way = 0.0
+    for p in range(ports):
+        way = max(way, abs(S[Y1 + p] - S[Y0 + p]))
+    return moved <= _SETTLED_SHARE * way
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -588,7 +602,8 @@ def run_network(
                         for i in range(body_first[low], body_last[low]):
                             S[Y1 + i] -= own_G[i * PORTS + low] * change
                             moved = max(moved, abs(S[Y1 + i] - S[USED + i]))
-                if moved <= (SETTLED if level == 0 else SETTLED_COARSE):
+                settled = _settled(S, ports, moved, SETTLED if level == 0 else SETTLED_COARSE)
+                if settled:
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
                     break
@@ -598,7 +613,7 @@ def run_network(
             S[FORCE + ports] = 0.0  # what pushes the ground moves nothing
             # a coarse step may not meet what it cannot see
             if level == 1 and not settle:
-                fits = moved <= SETTLED_COARSE
+                fits = settled
                 for c in range(count_interfaces):
                     closed = interface_since[c] < np.inf
                     if closed != (f_contact[c] > 0.0):

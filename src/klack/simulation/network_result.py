@@ -122,6 +122,19 @@ class EnergyBooks:
         """Residual over throughput [-]."""
         return abs(self.residual) / self.throughput if self.throughput > 0.0 else 0.0
 
+    @property
+    def least_loss(self) -> float:
+        """Smallest entry of the losses [J]; below zero it is a source."""
+        return min(self.losses.values(), default=0.0)
+
+    @property
+    def scale(self) -> float:
+        """What a residual is judged by [J]: throughput, or a thousandth of what is stored.
+
+        A valve at rest turns no energy over, but the round-off of what it stores is left.
+        """
+        return max(self.throughput, 1e-3 * sum(abs(x) for x in self.stores_after.values()))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from klack import energy_balance
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import impact_events
@@ -47,6 +48,7 @@ Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
+_BALANCE = 1e-6  # energy residual over throughput; 1e-9 is usual, forces settle to 1e-12 m
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
@@ -92,6 +94,12 @@ def simulate_network(
         For steps that do not fit, and for a state of another network.
     ConvergenceError
         When a step fails: time, component, its state, and what to try.
+
+    Warns
+    -----
+    AccuracyWarning
+        When the energy balance does not close to 1e-6 of the throughput
+        (:mod:`klack.energy_balance`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):
         require_positive(f"simulate_network: {name}", value, "s")
@@ -140,12 +148,21 @@ def simulate_network(
     time = step * np.arange(records + 1, dtype=float) * (per_record * block) + first_step * step
     channels = recorder.channels()
     interfaces = recorder.interfaces()
+    books = energy_books(network, before)
+    scale = books.scale or 1.0
+    energy_balance.check_energy_balance(
+        "simulate_network",
+        books.residual / scale,
+        books.least_loss / scale,
+        limit=_BALANCE,
+        advice="a shorter step",
+    )
     return NetworkResult(
         time=time,
         channels=channels,
         interfaces=interfaces,
         events=impact_events(rows, time, channels, interfaces),
-        books=energy_books(network, before),
+        books=books,
         step=step,
         fine_steps=int(clock[2] - done_before[0]),
         coarse_steps=int(clock[3] - done_before[1]),

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.contact.laws import LAW_LINEAR
-from klack.simulation.contact_step import solve_linear, solve_step
+from klack.simulation.contact_step import law_potential, solve_linear, solve_step
 from klack.simulation.kernel import FAST, SEPARATED, STATUS_FINE, push_on, watch_all
 
 __all__ = ["run_one_contact"]
@@ -208,7 +208,10 @@ def run_one_contact(
             if F > 0.0:
                 e = 2.0 * D * F - e
             elif e != 0.0:
+                # a clipped law is still pressed in: the way of the spring is now its own
                 release_loss += 0.5 * e * e / D
+                release_loss += law_potential(kind, law_data, start, e - after)
+                release_loss -= law_potential(kind, law_data, start, -after)
                 e = 0.0
             if after > SEPARATED:
                 approaching, chi = True, 0.0

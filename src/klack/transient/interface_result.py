@@ -82,8 +82,19 @@ class InterfaceEnergy:
     @property
     def residual(self) -> float:
         """Energy from nowhere over the largest of initial energy and work [-]."""
-        scale = max(abs(self.initial), abs(self.work), 1e-300)
-        return (self.final - self.initial + self.damping + self.guide - self.work) / scale
+        return (
+            self.final - self.initial + self.damping + self.guide - self.work
+        ) / self.turned_over
+
+    @property
+    def turned_over(self) -> float:
+        """Scale of the residual [J]: the larger one of initial energy and work."""
+        return max(abs(self.initial), abs(self.work), 1e-300)
+
+    @property
+    def least_loss(self) -> float:
+        """Smaller one of the two losses, relative to the energy turned over [-]."""
+        return min(self.damping, self.guide) / self.turned_over
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

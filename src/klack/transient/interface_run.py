@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -34,6 +35,7 @@ __all__ = ["Gaps", "simulate_interface"]
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
 
+_BALANCE = 1e-3  # energy residual that a run keeps at its usual step
 _CHUNK = 500
 _CLUSTER_TIME = 50e-6  # open for so long ends an impact [s]
 _DOUBLINGS = 9  # of the fine step in flight
@@ -107,6 +109,11 @@ def simulate_interface(
         Bad numbers; a contact that grows to the border of the candidate points.
     ConvergenceError
         When contact forces are not found.
+
+    Warns
+    -----
+    AccuracyWarning
+        When the energy balance does not close to 1e-3 (:mod:`klack.energy_balance`).
     """
     require_nonnegative("simulate_interface: speed", speed, "m/s")
     require_positive("simulate_interface: duration", duration, "s")
@@ -116,7 +123,15 @@ def simulate_interface(
         run = _Run(model, step, force, spring_stiffness, guide, gaps, points)
         run.place(offset, velocity, speed, height)
         run.go(duration, flight, impacts, progress)
-    return run.result(perf_counter() - begin)
+    result = run.result(perf_counter() - begin)
+    energy_balance.check_energy_balance(
+        "simulate_interface",
+        result.energy.residual,
+        result.energy.least_loss,
+        limit=_BALANCE,
+        advice="a shorter step",
+    )
+    return result
 
 
 @dataclass(frozen=True, slots=True)

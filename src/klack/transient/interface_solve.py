@@ -14,12 +14,13 @@ The contact points reach only a few rows of :math:`\hat Y` (a path through the e
 substitution already contains the forces.
 """
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.elasticity.condensation import Halves, reached_rows
 from klack.elasticity.factorization import Factorization
 
 __all__ = ["InterfaceSolve", "SplitSolve", "WholeSolve", "interface_solve"]
@@ -60,15 +61,6 @@ class InterfaceSolve(Protocol):
         ...
 
 
-@runtime_checkable
-class _Halves(Protocol):
-    """A factorisation L L^T that can substitute forwards and backwards apart."""
-
-    def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
-
-    def backward(self, Y: NDArray[np.float64]) -> NDArray[np.float64]: ...
-
-
 def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolve:
     """Choose the cheapest way that the factorisation offers.
 
@@ -78,7 +70,7 @@ def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolv
         Of S, shape (n, n) [N/m].
     G : sparse array, shape (nc, n) [-]
     """
-    if isinstance(factorization, _Halves):
+    if isinstance(factorization, Halves):
         return SplitSolve(factorization, G)
     return WholeSolve(factorization, G)
 
@@ -86,12 +78,10 @@ def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolv
 class SplitSolve:
     """One forward and one backward substitution per step."""
 
-    def __init__(self, factorization: _Halves, G: csr_array) -> None:
+    def __init__(self, factorization: Halves, G: csr_array) -> None:
         self._factorization = factorization
         self._G = G
-        # the rows that any point reaches: random weights leave no entry zero by chance
-        weights = np.random.default_rng(1).uniform(1.0, 2.0, G.shape[0])
-        self._rows = np.flatnonzero(factorization.forward(G.T @ weights))
+        self._rows = reached_rows(factorization, G)
         self._half = np.zeros((G.shape[0], len(self._rows)))  # memory is taken when written to
         self._known = np.empty(0, dtype=np.int64)
         self.compliance = np.zeros((G.shape[0],) * 2)

@@ -1,0 +1,50 @@
+"""Judge the energy books of a finished run: what does not close is told, not hidden."""
+
+import warnings
+
+from klack.errors import AccuracyWarning
+
+__all__ = ["check_energy_balance"]
+
+
+def check_energy_balance(
+    run: str, residual: float, least_loss: float, *, limit: float, advice: str
+) -> None:
+    """Warn when energy appeared from nowhere, went nowhere, or a loss gave energy back.
+
+    Every solver calls it once at the end of each run.
+
+    Parameters
+    ----------
+    run : str
+        What was run, start of the text.
+    residual : float [-]
+        Energy that the books do not explain, over the energy turned over.
+    least_loss : float [-]
+        Smallest entry of the losses, over the energy turned over; below zero it is a source.
+    limit : float [-]
+        What the solver promises.
+    advice : str
+        What to try, a clause without full stop.
+
+    Warns
+    -----
+    AccuracyWarning
+        When the residual is larger than the limit, or a loss is below its negative.
+
+    Examples
+    --------
+    >>> check_energy_balance("simulate", 3e-14, 0.0, limit=1e-9, advice="a shorter step")
+    """
+    faults = []
+    if not abs(residual) <= limit:  # nan as well
+        faults.append(f"does not close by {abs(residual):.1e} of the energy turned over")
+    if not least_loss >= -limit:
+        faults.append(f"has a loss that gave back {abs(least_loss):.1e} of it")
+    if faults:
+        warnings.warn(
+            f"{run}: the energy balance {' and '.join(faults)}, more than the {limit:.0e} that "
+            f"this solver keeps. Try: {advice}.",
+            AccuracyWarning,
+            stacklevel=3,
+        )

@@ -1,0 +1,102 @@
+"""Truth: conservation. Every run of the suite is judged; a run out of balance tells its user."""
+
+import warnings
+from pathlib import Path
+
+import energy_ledger
+import pytest
+
+from klack import energy_balance
+from klack.contact.laws import LinearLaw
+from klack.errors import AccuracyWarning
+from klack.simulation import impact
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.system import ContactPair, ReducedSystem
+
+SOLVERS = {
+    "simulate": "simulation/impact.py",
+    "simulate_network": "simulation/network_run.py",
+    "simulate_full_order": "transient/full_order.py",
+    "simulate_interface": "transient/interface_run.py",
+}
+
+
+def bounce() -> None:
+    pair = ContactPair(
+        body_a="a", port_a="contact", body_b="b", port_b="contact", law=LinearLaw(1e9), gap=1e-6
+    )
+    system = ReducedSystem(bodies=(rigid_mass_body("a", 1e-3), fixed_body("b")), contacts=(pair,))
+    impact.simulate_impact(system, speed=0.5, duration=20e-6)
+
+
+@pytest.fixture
+def leaking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kernel that loses a millionth of the speed in its last step."""
+    run = impact.run_one_contact
+
+    def spoiled(*arguments):
+        status = run(*arguments)
+        arguments[2][:] *= 1.0 - 1e-6
+        return status
+
+    monkeypatch.setattr(impact, "run_one_contact", spoiled)
+
+
+def test_a_leak_of_a_millionth_fails_the_test_that_ran_it(leaking):
+    with pytest.raises(AssertionError, match=r"a_leak_of_a_millionth.*a run of simulate leaves"):
+        bounce()
+
+
+def test_a_leak_can_be_allowed(leaking):
+    with energy_ledger.allowed("simulate", 1e-5):
+        bounce()
+    with pytest.raises(AssertionError):
+        bounce()
+
+
+@pytest.mark.usefixtures("as_for_a_user")
+def test_a_user_is_warned_of_a_leak(leaking):
+    with pytest.warns(AccuracyWarning, match=r"simulate: the energy balance does not close by 2"):
+        bounce()
+
+
+@pytest.mark.usefixtures("as_for_a_user")
+def test_a_user_is_not_warned_without_a_leak():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bounce()
+
+
+@pytest.mark.usefixtures("as_for_a_user")
+@pytest.mark.parametrize(
+    ("residual", "least_loss", "words"),
+    [
+        (float("nan"), 0.0, "does not close by nan"),
+        (0.0, -1e-3, r"has a loss that gave back 1\.0e-03 of it"),
+        (-2e-9, 0.0, r"does not close by 2\.0e-09 of the energy turned over, more than the 1e-09"),
+    ],
+)
+def test_what_a_user_is_told(residual, least_loss, words):
+    with pytest.warns(AccuracyWarning, match=words):
+        energy_balance.check_energy_balance("run", residual, least_loss, limit=1e-9, advice="x")
+
+
+def test_every_solver_is_judged():
+    """Each hands its books over, and the suite knows a limit for each."""
+    folder = Path(energy_balance.__file__).parent
+    for name, file in SOLVERS.items():
+        assert f'check_energy_balance(\n        "{name}"' in (folder / file).read_text(), name
+    assert set(energy_ledger.LIMITS) == set(SOLVERS)
+    calls = [path for path in folder.rglob("*.py") if "check_energy_balance(" in path.read_text()]
+    assert len(calls) == len(SOLVERS) + 1
+
+
+def test_worker_processes_judge_as_well():
+    """A run in a process of a pool fails in the same words."""
+    with energy_ledger.workers.worker_pool(1, None) as pool:
+        job = pool.submit(energy_balance_is_judged)
+        assert job.result(timeout=120) == "judge"
+
+
+def energy_balance_is_judged() -> str:
+    return energy_balance.check_energy_balance.__name__
