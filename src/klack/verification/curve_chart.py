@@ -14,7 +14,7 @@ __all__ = ["curve_chart"]
 
 _FEW = 25
 """So many points of a known curve are drawn as points: a table is quoted, not a function."""
-_COLUMNS = 500
+_COLUMNS = 300
 """Columns of pixels that a curve may use."""
 _LABEL = re.compile(r"^(.*?) ?\[([^\[\]]+)\]$")
 Floats = NDArray[np.float64]
