@@ -13,12 +13,12 @@ A change of flux enters a solid core from its surface.  With ``tau = mu sigma a^
 Both are continued fractions (Gauss) and therefore Cauer ladders: a shorted turn ``S_1``, beside it
 a reluctance ``R_1`` in series with the next shorted turn ``S_2``, and so on:
 
-========  ======================  ======================
-          ``S_k``                 ``R_k`` (k = 1, 2, ..)
-========  ======================  ======================
-cylinder  ``R tau/(8 k)``         ``(2 k + 1) R``
-sheet     ``R tau/(4 (4 k - 1))`` ``(4 k + 1) R``
-========  ======================  ======================
+========  =======================  ======================
+core      ``S_k``                  ``R_k`` (k = 1, 2, ..)
+========  =======================  ======================
+cylinder  ``R tau/(8 k)``          ``(2 k + 1) R``
+sheet     ``R tau/(4 (4 k - 1))``  ``(4 k + 1) R``
+========  =======================  ======================
 
 ``R tau = sigma l/pi`` for the cylinder: the shorted turns do not depend on the permeability, the
 reluctances do, so one term needs no permeability.  Error of ``|Theta/phi|`` of a cylinder at

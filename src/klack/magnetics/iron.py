@@ -4,18 +4,19 @@ With the flux as unknown a circuit needs ``H`` *of* ``B``, so every law is kept 
 with slopes, a cubic between them (C1), odd in ``B``, and beyond the last point a straight line.
 Energy density and co-energy follow exactly from the same cubics.
 
-====================== ===================================================================== =======
-law                    equation                                                              source
-====================== ===================================================================== =======
-:func:`froehlich`      ``B = mu0 H + H/(a + b H)``, ``1/a = mu0 (mu_r - 1)``, ``1/b = B_s``  [1]
-:func:`tanh_curve`     ``B = mu0 H + B_s tanh(mu0 (mu_r - 1) H / B_s)``                      [1]
-:func:`brauer`         ``H = (k1 exp(k2 B^2) + k3) B``                                       [2]
+====================== ========================================================================= ===
+law                    equation                                                                  ref
+====================== ========================================================================= ===
+:func:`froehlich`      ``B = mu0 H + H/(a + b H)``, ``1/a = mu0 (mu_r - 1)``, ``1/b = B_s``      [1]
+:func:`tanh_curve`     ``B = mu0 H + B_s tanh(mu0 (mu_r - 1) H / B_s)``                          [1]
+:func:`brauer`         ``H = (k1 exp(k2 B^2) + k3) B``                                           [2]
 :func:`rational_curve` ``H = B/(mu0 mu_r)``, ``mu_r = 1 + (mu_i - 1 + c_a b)/(1 + c_b b + b^n)`` [3]
-:func:`measured`       monotone cubic through points (Fritsch and Carlson 1980)
-====================== ===================================================================== =======
+:func:`measured`       monotone cubic through points                                             [4]
+====================== ========================================================================= ===
 
 [1] Bozorth, Ferromagnetism, 1951, ch. 11. [2] Brauer, IEEE Trans. Magn. 11 (1975) 81.
 [3] Roschke 2000, as used in the FluxTubes package of the Modelica Standard Library.
+[4] Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238.
 
 Limits: no hysteresis, no anisotropy, no temperature. Where a formula would fall below the slope of
 the vacuum (``dB/dH < mu0``, far above any use) the vacuum takes over.

@@ -1,7 +1,7 @@
 r"""Coordinate systems of a Nastran file: rectangular, cylindrical, spherical.
 
 A system is given by three points: A its origin, B on its z axis, C in its x-z plane.  Angles are
-in degrees; the spherical angle :math:`\\theta` is measured from the z axis.
+in degrees; the spherical angle :math:`\theta` is measured from the z axis.
 """
 
 from collections.abc import Callable

@@ -5,8 +5,8 @@ Far below the modes that are left out, the difference
 .. math:: H(\omega) - \sum_k \frac{\varphi_k \varphi_k^T}{\omega_k^2 - \omega^2
           + 2 i \zeta_k \omega_k \omega}
 
-is the real constant that belongs into the feedthrough.  It is fitted with weights 1/|sum|, so that
-the resonances, where five decimals of a frequency matter, have no say.
+is the real constant that belongs into the feedthrough.  It is fitted with weights ``1/|sum|``, so
+that the resonances, where five decimals of a frequency matter, have no say.
 """
 
 import numpy as np

@@ -9,7 +9,7 @@ clearance disc at the lowest guiding height, and one at the highest, each unifor
 
 .. math:: x(z) = p_1 + (p_2 - p_1)\frac{z - z_1}{z_2 - z_1}, \qquad |p_1|, |p_2| \le c .
 
-Its eccentricity is |x| at the height of first touch, its tilt the slope of x.
+Its eccentricity is ``|x|`` at the height of first touch, its tilt the slope of x.
 """
 
 from dataclasses import dataclass
