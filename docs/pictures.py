@@ -6,6 +6,9 @@ Of two results of ``klack impact CASE --level interface`` comes pressure.svg; th
 copies of ``demo-valve`` with titles of their own, the second with
 ``placement: {eccentricity: 1 um}`` under ``motion``.
 
+Of two results of ``klack impact CASE --level reduced,interface,full`` with the
+same two cases comes levels.svg.
+
 Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
 calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg.
 """
@@ -15,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from klack.report.calibration_figures import stroke_chart as calibration_chart
-from klack.report.chart import Chart
+from klack.report.chart import AxisSpec, Chart
 from klack.report.figures import force_chart
 from klack.report.noise_figures import click_charts
 from klack.report.pressure_figure import draw_pressure
@@ -37,6 +40,7 @@ IMAGES = Path(__file__).parent / "images"
 def main(results: list[Path]) -> None:
     """Write the pictures that belong to each result."""
     rings: list[PressureView] = []
+    compared: list[ImpactStudy] = []
     for result in results:
         form = stored_format(result)
         if form == STROKE_FORMAT.name:
@@ -52,12 +56,34 @@ def main(results: list[Path]) -> None:
             (IMAGES / "click.svg").write_bytes(svg_chart(chart))
             continue
         impact = load_study(result)
-        if impact.sections:
+        if {"interface", "full"} <= impact.levels.keys():
+            compared.append(impact)
+        elif impact.sections:
             _write_impact(impact)
         else:
             rings += _ring(impact)
     if len(rings) > 1:
         (IMAGES / "pressure.svg").write_bytes(draw_pressure(rings))
+    if len(compared) > 1:
+        (IMAGES / "levels.svg").write_bytes(svg_chart(levels_chart(compared)))
+
+
+def levels_chart(studies: list[ImpactStudy]) -> Chart:
+    """Force at the levels of several impacts, one panel each, under the titles of the cases."""
+    shown = ("full", "interface", "reduced")
+    charts = [
+        force_chart(replace(s, levels={k: v for k, v in s.levels.items() if k in shown}))
+        for s in studies
+    ]
+    panels = []
+    for study, chart in zip(studies, charts, strict=True):
+        curves = chart.panels[0].curves
+        if panels:  # the same words once
+            curves = tuple(replace(curve, listed=False) for curve in curves)
+        panels.append(
+            replace(chart.panels[0], y=AxisSpec(label=study.title, unit="N"), curves=curves)
+        )
+    return replace(charts[0], panels=tuple(panels), note="")
 
 
 def stroke_chart(study: StrokeStudy) -> Chart:

@@ -1,0 +1,59 @@
+"""Settings of the documentation: ``sphinx-build -W --keep-going docs docs/_build/html``.
+
+The built site needs no network: equations are MathML, styles, scripts and search are files of the
+site, and fonts are those of the reader's computer.
+"""
+
+import sys
+from pathlib import Path
+
+from klack import __version__
+
+sys.path.insert(0, str(Path(__file__).parent / "extensions"))
+
+project = "klack"
+author = "The klack founders"
+project_copyright = "the klack founders, BSD-3-Clause"
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    # of this folder
+    "mathml",
+    "repository_links",
+    "shelves",
+    "rooms",
+    "docstrings",
+    "lexers",
+]
+exclude_patterns = ["_build", "extensions", "**/__pycache__", "**/klack-results"]
+
+# pages
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
+myst_heading_anchors = 3  # links such as case.md#measurement
+myst_dmath_double_inline = True  # $$...$$ in the middle of a paragraph
+
+# docstrings
+napoleon_google_docstring = False
+napoleon_use_param = False  # types are words with shapes and units, not names to look up
+napoleon_use_rtype = False
+autodoc_typehints = "none"  # units and shapes stand in the text; types in the source beside it
+autodoc_class_signature = "separated"
+autosummary_generate = False  # tables only
+add_module_names = False
+python_use_unqualified_type_names = True
+
+# site
+html_theme = "furo"
+html_title = f"klack {version}"
+html_math_renderer = "mathml"
+html_static_path = ["static"]
+html_css_files = ["klack.css"]
+html_copy_source = False
+html_show_sourcelink = False
+pygments_style = "friendly"
+pygments_dark_style = "monokai"

@@ -1,0 +1,70 @@
+"""The shelves of the site: the table of the start page, as the tree beside every page.
+
+Each row of the table in ``index.md`` is a shelf, with the pages that it links to, in their order.
+A page that no row names goes to the shelf of its folder, so a new page is in the tree at once.
+"""
+
+import os.path
+import re
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.util.typing import ExtensionMetadata
+
+__all__ = ["setup", "shelves"]
+
+# folder of pages -> shelf of those that no row names
+_SHELF_OF_FOLDER = {
+    "tutorials": "tutorials",
+    "how-to": "how-to",
+    "theory": "theory",
+    "reference": "reference",
+    "project": "reference",
+}
+_ORDER = ("start", "tutorials")  # first, whether or not the table has them
+_ROW = re.compile(r"^\| *(?P<shelf>[^|]+?) *\| *(?P<pages>.*?) *\|$", re.MULTILINE)
+_PAGE = re.compile(r"\]\((?P<page>[^)#:]+)\.md\)")
+
+
+def shelves(index: str, pages: list[str]) -> dict[str, list[str]]:
+    """Pages of each shelf, in the order in which they are shown.
+
+    Parameters
+    ----------
+    index : str
+        The start page, whose links lead to pages of the site.
+    pages : list of str
+        All pages of the site, without ending.
+    """
+    tree: dict[str, list[str]] = {}
+    placed = {"index"}
+    for row in _ROW.finditer(index):
+        linked = [os.path.normpath(match["page"]) for match in _PAGE.finditer(row["pages"])]
+        named = [page for page in dict.fromkeys(linked) if page in pages and page not in placed]
+        if named:
+            tree[row["shelf"]] = named
+            placed.update(named)
+    for page in sorted(set(pages) - placed):
+        shelf = _SHELF_OF_FOLDER.get(page.split("/")[0], "reference")
+        if Path(page).parts[:2] != ("reference", "api"):  # in the tree below reference/api
+            tree.setdefault(shelf, []).append(page)
+    order = [shelf for shelf in _ORDER if shelf in tree]
+    return {shelf: tree[shelf] for shelf in dict.fromkeys([*order, *tree])}
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Put the tree below the text of the start page; after the links are those of the site."""
+    app.connect("source-read", _read, priority=600)
+    return {"parallel_read_safe": True}
+
+
+def _read(app: Sphinx, page: str, content: list[str]) -> None:
+    if page == "reference/api":
+        content[0] += "\n```{toctree}\n:hidden:\n:glob:\n\napi/*\n```\n"
+    if page != "index":
+        return
+    blocks = []
+    for shelf, pages in shelves(content[0], sorted(app.env.found_docs)).items():
+        lines = "\n".join(pages)
+        blocks.append(f"```{{toctree}}\n:hidden:\n:caption: {shelf.capitalize()}\n\n{lines}\n```\n")
+    content[0] += "\n" + "\n".join(blocks)

@@ -1,0 +1,85 @@
+"""The pages of keys are those of the schema, and the API page's five lines run.
+
+Truth: the pydantic classes that read a case, through ``klack schema``.
+"""
+
+import contextlib
+import importlib.util
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+from klack.case import case_schema
+from klack.case.valve_reader import valve_case_schema
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def load(name: str):
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+CASE_KEYS = load("case_keys")
+
+
+@pytest.mark.parametrize("name", list(CASE_KEYS.PAGES))
+def test_the_page_is_fresh(name):
+    title, about, schema = CASE_KEYS.PAGES[name]
+    stored = (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
+
+    assert CASE_KEYS.page(title, about, schema()) == stored, "run: python docs/case_keys.py"
+
+
+@pytest.mark.parametrize(
+    ("name", "schema"), [("case-keys", case_schema()), ("valve-keys", valve_case_schema())]
+)
+def test_every_key_of_every_section_has_its_row(name, schema):
+    text = (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
+    sections = [schema, *schema["$defs"].values()]
+
+    assert len(rows) >= sum(len(section["properties"]) for section in sections)
+    for section in sections:
+        assert set(section["properties"]) <= set(rows)
+
+
+def test_defaults_limits_and_units_are_told():
+    text = (DOCS / "reference" / "case-keys.md").read_text(encoding="utf-8")
+
+    assert "| `reduced_step` | time [s], as `40 us` | 20 ns | above 0 |" in text
+    assert "| `poisson` | number without unit, as `0.3` | *required* |" in text
+    assert re.search(r"\| `count` \| whole number \| .* \| at least 1 \|", text)
+
+
+def test_links_inside_a_page_lead_to_its_headings():
+    for name in CASE_KEYS.PAGES:
+        text = (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
+        anchors = re.findall(r"\]\(#([^)]+)\)", text)
+        heads = {CASE_KEYS.anchor(head) for head in re.findall(r"^## (.*)$", text, re.MULTILINE)}
+
+        assert len(anchors) > 20
+        assert set(anchors) <= heads
+
+
+@pytest.mark.slow
+def test_five_lines_of_python():
+    page = (DOCS / "reference" / "api.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(.*?)```", page, re.DOTALL)
+    assert code is not None
+    written = re.search(r"# ([\d.]+) N, ([\d.]+) us", code[1])
+    assert written is not None
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(compile(code[1], "api.md", "exec"), {})
+    peak, time = re.findall(r"[\d.]+", out.getvalue())
+
+    # the last digit may differ with the version of the mesher
+    assert float(peak) == pytest.approx(float(written[1]), rel=2e-3)
+    assert float(time) == pytest.approx(float(written[2]), rel=5e-3)
