@@ -22,6 +22,7 @@ from typing import TypeVar
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from klack.cache.content import content_key
 from klack.cache.entry import Entry
@@ -29,6 +30,7 @@ from klack.cache.remember import remembered
 from klack.cache.result_cache import ResultCache
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.closing import Closing
+from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
 from klack.errors import InputError
 
@@ -120,6 +122,33 @@ class Flexibility(Closing):
             for at in range(0, F.shape[1], _CHUNK):
                 U[:, at : at + _CHUNK] = self._solve_block(F[:, at : at + _CHUNK])
         return U
+
+    def condensed(self, G: csr_array) -> NDArray[np.float64]:
+        r"""Static compliance seen by given loads, G F G^T: half the work of solving for them.
+
+        Of a free body, with :math:`A = G R` and :math:`Z = K^+ M R` (six columns),
+
+        .. math:: G P^T K^+ P G^T = G K^+ G^T - A (G Z)^T - (G Z) A^T + A (R^T M Z) A^T .
+
+        Parameters
+        ----------
+        G : csr_array, shape (m, n_dof)
+            One load per row.
+
+        Returns
+        -------
+        array, shape (m, m) [m/N]
+            Symmetric.
+        """
+        kept = csr_array(G)[:, self._kept]
+        C = condensed_inverse(self.factorization, kept)
+        if self._R.shape[1]:
+            MR = self._MR[self._kept]
+            Z = self.factorization.solve(MR)
+            A, GZ = G @ self._R, kept @ Z
+            C += A @ (MR.T @ Z) @ A.T - A @ GZ.T - GZ @ A.T
+            C = (C + C.T) / 2.0
+        return C
 
     def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""

@@ -1,0 +1,81 @@
+r"""A factorised matrix condensed to a few loads, :math:`C = G A^{-1} G^T`.
+
+With a Cholesky factor :math:`A = L L^T` the forward substitution alone is enough,
+
+.. math:: \hat Y = L^{-1} G^T, \qquad C = \hat Y^T \hat Y,
+
+half the work of whole solves.  Loads that lie close together reach only a part of the rows of
+:math:`\hat Y` (a path through the elimination tree); the others are not kept.
+"""
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.elasticity.factorization import Factorization
+
+__all__ = ["Halves", "condensed_inverse", "reached_rows"]
+
+_CHUNK = 64
+"""Right-hand sides solved at once."""
+
+_LARGEST_HALF = 2**29
+"""Memory [byte] of the kept rows up to which the forward substitution is taken."""
+
+
+@runtime_checkable
+class Halves(Protocol):
+    """A factorisation L L^T that can substitute forwards and backwards apart."""
+
+    def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve L Y = B."""
+        ...
+
+    def backward(self, Y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve L^T X = Y."""
+        ...
+
+
+def reached_rows(factor: Halves, G: csr_array) -> NDArray[np.int64]:
+    """Rows of L^-1 G^T that are not zero."""
+    # random weights leave no entry zero by chance
+    weights = np.random.default_rng(1).uniform(1.0, 2.0, G.shape[0])
+    return np.flatnonzero(factor.forward(G.T @ weights))
+
+
+def condensed_inverse(
+    factor: Factorization, G: csr_array, *, largest: int = _LARGEST_HALF
+) -> NDArray[np.float64]:
+    """Condense the inverse of a factorised matrix.
+
+    Parameters
+    ----------
+    factor : Factorization
+        Of A, shape (n, n).
+    G : csr_array, shape (m, n)
+        One load per row.
+    largest : int [byte]
+        Memory up to which the cheaper way is taken.
+
+    Returns
+    -------
+    array, shape (m, m)
+        Symmetric.
+    """
+    if isinstance(factor, Halves) and G.shape[0]:
+        rows = reached_rows(factor, G)
+        if 8 * len(rows) * G.shape[0] <= largest:
+            half = np.empty((len(rows), G.shape[0]), order="F")
+            for block in _blocks(G.shape[0]):
+                half[:, block] = factor.forward(G[block].toarray().T)[rows]
+            return half.T @ half
+    C = np.empty((G.shape[0],) * 2)
+    for block in _blocks(G.shape[0]):
+        C[:, block] = G @ factor.solve(G[block].toarray().T)
+    return (C + C.T) / 2.0
+
+
+def _blocks(count: int) -> list[slice]:
+    return [slice(start, start + _CHUNK) for start in range(0, count, _CHUNK)]
