@@ -12,6 +12,9 @@ __all__ = [
 ]
 
 
+_LONGEST = 1200  # characters
+
+
 class KlackError(Exception):
     """Root of all errors that klack raises on purpose."""
 
@@ -30,8 +33,14 @@ class InputError(KlackError, ValueError):
     """
 
     def __init__(self, where: str, *, got: str, expected: str, hint: str) -> None:
+        where, got, expected, hint = map(_shortened, (where, got, expected, hint))
         self.where, self.got, self.expected, self.hint = where, got, expected, hint
         super().__init__(f"{where}: got {got}, expected {expected}.\nTry: {hint}")
+
+
+def _shortened(text: str) -> str:
+    """Leave out the middle of what is longer than a message should be: a line of a megabyte."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 300]} ... {text[-250:]}"
 
 
 class ConvergenceError(KlackError, RuntimeError):

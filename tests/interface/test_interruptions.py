@@ -58,7 +58,7 @@ def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path:
 @pytest.mark.parametrize(
     ("words", "points"),
     [
-        (["impact", str(DATA / "tiny_rods.yaml"), "--no-report"], 8),
+        (["impact", str(DATA / "tiny_rods.yaml"), "--no-report", "--no-certify"], 8),
         (["export", str(DATA / "tiny_rods.yaml"), "--to", "csv"], 6),
     ],
     ids=["impact", "export"],
@@ -180,7 +180,7 @@ def test_a_stopped_run_says_so_and_takes_its_workers_with_it(number, code, tmp_p
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_run_stopped_at_any_time_leaves_the_former_result(number, code, tmp_path: Path):
     random.seed(int(number))
-    words = ("impact", str(DATA / "tiny_rods.yaml"), "--no-report", "--out", "out")
+    words = ("impact", str(DATA / "tiny_rods.yaml"), "--no-report", "--no-certify", "--out", "out")
     begin = time.monotonic()
     start(*words, folder=tmp_path).communicate(timeout=120)
     duration = time.monotonic() - begin

@@ -40,6 +40,7 @@ from klack.cli import (
     stroke,
     verify,
 )
+from klack.cli.printable import printable
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import close_quietly, in_words, prepare_compiling, prepare_streams
 from klack.errors import AccuracyWarning, CacheWarning, ConvergenceError, KlackError
@@ -112,7 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: list[str], name: str) -> int:
     def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
         if issubclass(category, (AccuracyWarning, CacheWarning)):
-            print(f"{name}: note: {message}", file=sys.stderr)
+            print(printable(f"{name}: note: {message}"), file=sys.stderr)
         else:
             usual(message, category, *place, **more)
 
@@ -132,7 +133,7 @@ def _bug(name: str) -> int:
 
 
 def _complain(text: str, code: int) -> int:
-    print(text, file=sys.stderr)
+    print(printable(text), file=sys.stderr)
     return code
 
 

@@ -3,6 +3,8 @@
 import sys
 from collections.abc import Iterable, Sequence
 
+from klack.cli.printable import printable
+
 __all__ = ["print_table"]
 
 _WIDE = 160  # where no terminal limits the width
@@ -27,12 +29,12 @@ def print_table(
 
     stream = sys.stderr if to_stderr else sys.stdout
     console = Console(file=stream, width=None if stream.isatty() else _WIDE)
-    table = Table(title=Text(title), box=SIMPLE_HEAD, title_justify="left")
+    table = Table(title=Text(printable(title)), box=SIMPLE_HEAD, title_justify="left")
     for i, column in enumerate(columns):
         words = i < left
         table.add_column(Text(column), justify="left" if words else "right", overflow="fold")
     for row in rows:
-        table.add_row(*(Text(cell, style=_STYLES.get(cell, "")) for cell in row))
+        table.add_row(*(Text(printable(cell), style=_STYLES.get(cell, "")) for cell in row))
     console.print(table)
 
 

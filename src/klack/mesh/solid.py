@@ -21,6 +21,7 @@ from klack.mesh.occ import MM, box_mm, glue, revolved_solids
 from klack.mesh.profile import Profile
 from klack.mesh.quality import require_connected, require_positive_jacobians
 from klack.mesh.sizing import MeshSizing, Refinement, ball_points
+from klack.mesh.step_trial import require_readable_step
 
 __all__ = [
     "face_names",
@@ -112,7 +113,8 @@ def read_step(path: Path) -> Any:
             expected="a STEP file (.step, .stp)",
             hint="check the path; it is relative to where you started the program.",
         )
-    start = path.read_bytes()[:2048].lstrip()
+    with path.open("rb") as file:
+        start = file.read(2048).lstrip()
     if not start.startswith(b"ISO-10303-21"):
         raise InputError(
             str(path),
@@ -120,6 +122,7 @@ def read_step(path: Path) -> Any:
             expected="a STEP file, which starts with 'ISO-10303-21;'",
             hint="export the part as STEP (AP214 or AP242) from the CAD program.",
         )
+    require_readable_step(path)
     try:
         shape = OCCGeometry(str(path)).shape
     except Exception as error:  # OpenCASCADE raises plain exceptions of several types

@@ -1,0 +1,60 @@
+"""A first reading of a STEP file in a process of its own.
+
+OpenCASCADE reads whatever a file says.  Of files with a few wrong digits or a lost line one in six
+brought it to an end without a word (a segmentation fault), some keep it busy without end: that may
+not happen in the process that holds the work of a user.  The second reading, of a file that passed,
+takes as long as the first; meshing takes far longer.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from klack.errors import InputError
+
+__all__ = ["require_readable_step"]
+
+_PATIENCE = 600.0  # s; a part of 20 MB takes some seconds
+_PROGRAM = """
+import os, sys
+for stream in (1, 2):
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+from netgen.occ import OCCGeometry
+try:
+    len(OCCGeometry(sys.argv[1]).shape.solids)
+except Exception:
+    pass  # the reading that follows says what it is
+os._exit(0)
+"""
+
+
+def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
+    """Read a STEP file, and forget it.
+
+    Raises
+    ------
+    InputError
+        If OpenCASCADE breaks on it, or does not come to an end within ``patience`` [s].
+    """
+    if not sys.executable:  # inside of another program
+        return
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROGRAM, str(path.absolute())],
+            stdin=subprocess.DEVNULL,
+            timeout=patience,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise _refuse(path, f"a STEP file that takes longer than {patience:g} s to read") from None
+    if done.returncode != 0:
+        raise _refuse(path, "a damaged STEP file: OpenCASCADE breaks on it")
+
+
+def _refuse(path: Path, got: str) -> InputError:
+    return InputError(
+        str(path),
+        got=got,
+        expected="a whole STEP file (AP203, AP214 or AP242)",
+        hint="export it again; open it in a CAD program and repair it.",
+    )

@@ -1,0 +1,86 @@
+"""Damaged STEP files: solids or one clear error; OpenCASCADE itself breaks on one in six.
+
+Longer: ``KLACK_LONG=50``, another ``KLACK_SEED=2``.
+"""
+
+import os
+import random
+import re
+from pathlib import Path
+
+import pytest
+
+from klack.errors import InputError
+from klack.mesh import step_trial
+from klack.mesh.solid import read_step
+from klack.mesh.step_trial import require_readable_step
+
+LONGER = int(os.environ.get("KLACK_LONG", "1"))
+SEED = int(os.environ.get("KLACK_SEED", "1"))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    from netgen.occ import Box, Cylinder, Pnt, Z
+
+    path = tmp_path_factory.mktemp("step") / "part.step"
+    part = Box(Pnt(0, 0, 0), Pnt(1, 1, 1)) + Cylinder(Pnt(0.5, 0.5, 0), Z, r=0.3, h=2)
+    part.WriteStep(str(path))
+    return path.read_bytes()
+
+
+def damaged(raw: bytes, draw: random.Random) -> bytes:
+    """Change some digits or bytes, leave a line out, cut the end off, or change one number."""
+    data = bytearray(raw)
+    how = draw.choice(["digits", "bytes", "line", "cut", "number"])
+    if how == "line":
+        lines = raw.split(b"\n")
+        del lines[draw.randrange(len(lines))]
+        return b"\n".join(lines)
+    if how == "cut":
+        return raw[: draw.randrange(len(raw))]
+    if how == "number":
+        place = draw.choice(list(re.finditer(rb"-?\d+\.\d*", raw)))
+        value = draw.choice([b"nan", b"1e300", b"0.", b"-1.", b"inf"])
+        return raw[: place.start()] + value + raw[place.end() :]
+    places = [i for i, sign in enumerate(raw) if how == "bytes" or chr(sign).isdigit()]
+    for place in draw.sample(places, draw.randint(1, 5)):
+        data[place] = draw.randrange(256) if how == "bytes" else ord(draw.choice("0123456789"))
+    return bytes(data)
+
+
+@pytest.mark.slow
+def test_damaged_files(whole: bytes, tmp_path: Path):
+    """Unread, one of them would end the process of these tests."""
+    draw = random.Random(SEED)
+    path = tmp_path / "part.step"
+    refused = 0
+    for _ in range(10 * LONGER):
+        path.write_bytes(damaged(whole, draw))
+        try:
+            assert read_step(path).solids
+        except InputError:
+            refused += 1
+    assert 0 < refused
+
+
+def test_a_break_of_the_reader_is_an_error(whole: bytes, tmp_path: Path, monkeypatch):
+    path = tmp_path / "part.step"
+    path.write_bytes(whole)
+    monkeypatch.setattr(step_trial, "_PROGRAM", "import os\nos.abort()")
+    with pytest.raises(InputError, match="breaks on it"):
+        read_step(path)
+
+
+def test_a_file_that_is_read_for_ever_is_an_error(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(step_trial, "_PROGRAM", "import time\ntime.sleep(60)")
+    with pytest.raises(InputError, match=r"longer than 0\.2 s"):
+        require_readable_step(tmp_path / "part.step", patience=0.2)
+
+
+def test_the_trial_is_silent_and_starts_nothing_else(whole: bytes, tmp_path: Path, capfd):
+    path = tmp_path / "-part;touch hacked.step"
+    path.write_bytes(whole)
+    require_readable_step(path)
+    assert capfd.readouterr() == ("", "")
+    assert [item.name for item in tmp_path.iterdir()] == [path.name]
