@@ -23,11 +23,11 @@ _SHELF_OF_FOLDER = {
 }
 _ORDER = ("start", "tutorials")  # first, whether or not the table has them
 _ROW = re.compile(r"^\| *(?P<shelf>[^|]+?) *\| *(?P<pages>.*?) *\|$", re.MULTILINE)
-_PAGE = re.compile(r"\]\((?P<page>[^)#:]+)\.md\)")
+_PAGE = re.compile(r"\[(?P<name>[^\]]+)\]\((?P<page>[^)#:]+)\.md\)")
 
 
-def shelves(index: str, pages: list[str]) -> dict[str, list[str]]:
-    """Pages of each shelf, in the order in which they are shown.
+def shelves(index: str, pages: list[str]) -> dict[str, dict[str, str]]:
+    """Pages of each shelf with their names, in the order in which they are shown.
 
     Parameters
     ----------
@@ -35,19 +35,24 @@ def shelves(index: str, pages: list[str]) -> dict[str, list[str]]:
         The start page, whose links lead to pages of the site.
     pages : list of str
         All pages of the site, without ending.
+
+    Returns
+    -------
+    dict of shelf to dict of page to name
+        The name is that of the link; empty (the title of the page) where no row names it.
     """
-    tree: dict[str, list[str]] = {}
+    tree: dict[str, dict[str, str]] = {}
     placed = {"index"}
     for row in _ROW.finditer(index):
-        linked = [os.path.normpath(match["page"]) for match in _PAGE.finditer(row["pages"])]
-        named = [page for page in dict.fromkeys(linked) if page in pages and page not in placed]
-        if named:
-            tree[row["shelf"]] = named
-            placed.update(named)
+        for link in _PAGE.finditer(row["pages"]):
+            page = os.path.normpath(link["page"])
+            if page in pages and page not in placed:
+                tree.setdefault(row["shelf"], {})[page] = link["name"]
+                placed.add(page)
     for page in sorted(set(pages) - placed):
         shelf = _SHELF_OF_FOLDER.get(page.split("/")[0], "reference")
         if Path(page).parts[:2] != ("reference", "api"):  # in the tree below reference/api
-            tree.setdefault(shelf, []).append(page)
+            tree.setdefault(shelf, {})[page] = ""
     order = [shelf for shelf in _ORDER if shelf in tree]
     return {shelf: tree[shelf] for shelf in dict.fromkeys([*order, *tree])}
 
@@ -65,6 +70,6 @@ def _read(app: Sphinx, page: str, content: list[str]) -> None:
         return
     blocks = []
     for shelf, pages in shelves(content[0], sorted(app.env.found_docs)).items():
-        lines = "\n".join(pages)
+        lines = "\n".join(f"{name} <{page}>" if name else page for page, name in pages.items())
         blocks.append(f"```{{toctree}}\n:hidden:\n:caption: {shelf.capitalize()}\n\n{lines}\n```\n")
     content[0] += "\n" + "\n".join(blocks)
