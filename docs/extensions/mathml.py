@@ -5,6 +5,7 @@ read is a warning with its place, and a built site has no warnings.
 """
 
 import re
+from xml.etree import ElementTree
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
@@ -14,6 +15,9 @@ from sphinx.util.typing import ExtensionMetadata
 from sphinx.writers.html5 import HTML5Translator
 
 __all__ = ["mathml", "setup"]
+
+_SPACE = "http://www.w3.org/1998/Math/MathML"
+ElementTree.register_namespace("", _SPACE)
 
 # what LaTeX allows and the converter does not know, in words that it knows
 _SPELLINGS = (
@@ -28,7 +32,30 @@ def mathml(tex: str, *, block: bool) -> str:
     """Turn one LaTeX equation into a ``<math>`` element."""
     for spelling, known in _SPELLINGS:
         tex = spelling.sub(known, tex)
-    return str(tex2mathml(tex.strip(), as_block=block))
+    tree = ElementTree.fromstring(str(tex2mathml(tex.strip(), as_block=block)))
+    for parent in list(tree.iter()):
+        for place, child in enumerate(parent):
+            parent[place] = _index_beside(child)
+    return ElementTree.tostring(tree, encoding="unicode", short_empty_elements=False)
+
+
+def _index_beside(element: ElementTree.Element) -> ElementTree.Element:
+    r"""Put the index of an accented letter beside it: the converter sets ``\dot q_i`` below q."""
+    if element.tag != _tag("munderover"):
+        return element
+    letter, index, accent = element
+    if letter.tag == _tag("mo") or accent.tag != _tag("mo"):  # a sum with its limits
+        return element
+    over = ElementTree.Element(_tag("mover"), {"accent": "true"})
+    over.extend([letter, accent])
+    beside = ElementTree.Element(_tag("msub"))
+    beside.extend([over, index])
+    beside.tail = element.tail
+    return beside
+
+
+def _tag(name: str) -> str:
+    return f"{{{_SPACE}}}{name}"
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:

@@ -3,6 +3,7 @@
 Truth: the pages themselves; what they link to has to be there.
 """
 
+import importlib.util
 import re
 import subprocess
 import sys
@@ -124,6 +125,28 @@ def test_every_page_is_reached_from_the_start_page(site, pages):
     }
     assert sources <= pages.keys()
     assert sources - reached == set()
+
+
+@pytest.mark.parametrize(
+    ("tex", "shape"),
+    [
+        (r"\ddot q_i", "<msub><mover><mi>q</mi><mo>¨</mo></mover><mi>i</mi></msub>"),
+        (r"\tfrac12", "<mfrac><mn>1</mn><mn>2</mn></mfrac>"),
+        (r"\sum_i^n", "<munderover><mo>∑</mo><mi>i</mi><mi>n</mi></munderover>"),
+        ("20\\,°C", "<msup><mrow></mrow><mo>∘</mo></msup><mi>C</mi>"),
+    ],
+    ids=["index beside an accent", "fraction without braces", "limits of a sum", "degrees"],
+)
+def test_equations_that_the_converter_alone_gets_wrong(tex, shape):
+    """Truth: what LaTeX sets for them."""
+    spec = importlib.util.spec_from_file_location("mathml", DOCS / "extensions" / "mathml.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    bare = re.sub(r"\s*\n\s*|(?<=<)(\w+)(?: [^>]*)(?=>)", r"\1", module.mathml(tex, block=False))
+
+    assert shape in bare
 
 
 def test_links_of_the_pages_work_in_the_repository_too():
