@@ -1,0 +1,78 @@
+"""Pages on local laws, restitution and two materials: what they tell to change is run.
+
+Truth: the numbers written on the pages, from the same version: a change detector; the laws
+themselves are checked against the full order and exact impacts elsewhere.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from klack.case import find_case, load_case
+from klack.contact.restitution import ImpactMeasures
+from klack.workflow.impact import run_impact
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+SHOWN = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
+
+
+def block(page: str) -> dict:
+    (text,) = SHOWN.findall((HOW_TO / page).read_text(encoding="utf-8"))
+    return YAML(typ="safe").load(text)
+
+
+def row(page: str, start: str) -> list[str]:
+    (line,) = re.findall(
+        rf"^\| ({re.escape(start)}.*) \|$", (HOW_TO / page).read_text(encoding="utf-8"), re.M
+    )
+    return line.split(" | ")
+
+
+def measures_of(path: Path) -> ImpactMeasures:
+    return run_impact(load_case(path), levels=("reduced",)).levels["reduced"].measures
+
+
+def changed_demo(folder: Path, changes: dict) -> Path:
+    """Write the axisymmetric demo with the keys of a page laid over its own."""
+    yaml = YAML(typ="safe")
+    case = yaml.load(find_case("demo-valve-axisymmetric"))
+    for part, keys in changes.items():
+        if part == "bodies":
+            for body, more in keys.items():
+                case["bodies"][body] |= more
+        else:
+            case[part] |= keys
+    path = folder / "case.yaml"
+    with path.open("w", encoding="utf-8") as stream:
+        yaml.dump(case, stream)
+    return path
+
+
+def test_law_of_a_submodel_is_as_soft_as_the_page_says(tmp_path):
+    page = "which-local-law.md"
+    found = measures_of(changed_demo(tmp_path, block(page)))
+
+    written = float(row(page, "submodel of 0.3 mm")[1].split()[0])
+    assert found.peak_force == pytest.approx(written, rel=5e-3)  # versions of the mesher
+
+
+def test_needle_of_two_materials_hits_as_the_page_says():
+    page = "two-materials.md"
+    case = YAML(typ="safe").load(HOW_TO / "needle_of_two_materials.yaml")
+    shown = block(page)["bodies"]["needle"]
+    found = measures_of(HOW_TO / "needle_of_two_materials.yaml")
+
+    assert shown.items() <= case["bodies"]["needle"].items()
+    written = float(row(page, "soft iron")[1].split()[0])
+    assert found.peak_force == pytest.approx(written, rel=2e-3)  # versions of the mesher
+
+
+def test_damping_lowers_the_restitution_as_the_page_says(tmp_path):
+    page = "restitution-too-high.md"
+    found = measures_of(changed_demo(tmp_path, block(page)))
+
+    text = row(page, "losses in material")[2]
+    written = float(re.search(r" 1 %: ([\d.]+)", text)[1])
+    assert found.restitution == pytest.approx(written, abs=2e-4)  # versions of the mesher
