@@ -1,0 +1,182 @@
+"""``klack advise``: mesh sizes, modes and steps for a target, from measured convergence."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from klack.cli.options import CaseArgument, Json, Quiet, Threads, require_threads
+from klack.cli.output import require_json_target, write_json
+from klack.cli.progress import show_progress
+from klack.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from klack.workflow.advice import Advice
+
+__all__ = ["advise"]
+
+_MOST_ERROR = 0.2
+_MOST_LEVEL = 20.0
+
+_UpTo = Annotated[
+    str | None,
+    Parameter(
+        name="--up-to",
+        help="Highest frequency that matters, e.g. '40 kHz'. [default: third octaves of the "
+        "case's own force within 40 dB of the strongest]",
+    ),
+]
+_Error = Annotated[
+    str,
+    Parameter(
+        name="--error", help="Accepted for peak force, contact time and force history, e.g. '1 %'."
+    ),
+]
+_Bands = Annotated[
+    str, Parameter(name="--bands", help="Accepted in every third octave, e.g. '1 dB'.")
+]
+_Level = Annotated[
+    str | None,
+    Parameter(
+        name="--level",
+        help="reduced or interface, whose results shall be so good. [default: reduced, interface "
+        "off the axis]",
+    ),
+]
+_Write = Annotated[
+    Path | None,
+    Parameter(name="--write", help="Write the case with the advice to this new file."),
+]
+
+
+def advise(
+    case: CaseArgument,
+    /,
+    *,
+    up_to: _UpTo = None,
+    error: _Error = "1 %",
+    bands: _Bands = "1 dB",
+    level: _Level = None,
+    write: _Write = None,
+    confirm: Annotated[
+        bool, Parameter(help="Run the advised case and lay it over the finest run.")
+    ] = True,
+    json: Json = None,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> int:
+    """Advise mesh sizes, modes and step of a case, with the error expected of each."""
+    from klack.units import FREQUENCY, RATIO, parse_quantity
+
+    require_json_target(json)
+    require_threads(threads)
+    _require_new_file(write)
+    limit = _within("--error", error, parse_quantity(error, RATIO, "--error"), _MOST_ERROR, "1 %")
+    decibel = _within("--bands", bands, _decibel(bands), _MOST_LEVEL, "1 dB")
+    highest = None if up_to is None else parse_quantity(up_to, FREQUENCY, "--up-to")
+
+    from klack.case.case_tree import read_case_tree
+    from klack.case.shipped import find_case
+    from klack.case.valve_reader import read_any_case
+
+    tree = read_case_tree(find_case(case))
+    checked = read_any_case(tree.text, tree.path)
+
+    from klack import __version__
+    from klack.workflow.advice_any import advise_case
+    from klack.workflow.advice_summary import advice_to_json
+    from klack.workflow.advised_case import advice_yaml, advised_text, changed_values
+
+    with show_progress(quiet) as progress:
+        advice = advise_case(
+            checked,
+            error=limit,
+            level_error=decibel,
+            up_to=highest,
+            level=level,
+            confirm=confirm,
+            progress=progress,
+            threads=threads,
+        )
+    values = changed_values(tree, advice)
+    if write is not None:
+        _write_whole(write, advised_text(tree, advice, write, __version__))
+    if not quiet:
+        to_stderr = str(json) == "-"
+        _print_advice(advice, advice_yaml(tree, advice), write, to_stderr=to_stderr)
+    if json is not None:
+        write_json(json, advice_to_json(advice, values))
+    return 0
+
+
+def _within(option: str, text: str, value: float, most: float, example: str) -> float:
+    from klack.errors import InputError
+
+    if 0.0 < value <= most:
+        return value
+    unit = example.split()[1]
+    shown = 100.0 * most if unit == "%" else most
+    raise InputError(
+        option,
+        got=f"'{text}'",
+        expected=f"above 0 and at most {shown:g} {unit}",
+        hint=f"write the unit as well: '{example}'.",
+    )
+
+
+def _decibel(text: str) -> float:
+    from klack.errors import InputError
+
+    number = text.strip().removesuffix("dB").strip()
+    try:
+        return float(number)
+    except ValueError:
+        raise InputError(
+            "--bands", got=f"'{text}'", expected="a level in dB", hint="write '1 dB'."
+        ) from None
+
+
+def _require_new_file(path: Path | None) -> None:
+    from klack.errors import InputError
+
+    if path is None:
+        return
+    if path.exists():
+        raise InputError(
+            f"--write {path}",
+            got="a file that exists",
+            expected="the name of a new file",
+            hint="choose another name; the case itself is never changed.",
+        )
+    folder = path.absolute().parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(
+            f"--write {path}",
+            got="a folder that does not exist or may not be written to",
+            expected="a file in an existing folder",
+            hint="make the folder first.",
+        )
+
+
+def _write_whole(path: Path, text: str) -> None:
+    from klack.whole_file import whole_file
+
+    with whole_file(path) as new:
+        new.write_text(text, encoding="utf-8")
+
+
+def _print_advice(advice: "Advice", yaml: str, written: Path | None, *, to_stderr: bool) -> None:
+    from klack.workflow.advice_summary import ADVICE_COLUMNS, advice_lines, advice_rows
+
+    title = f"{advice.title}: advice for the {advice.level} level"
+    print_table(title, ADVICE_COLUMNS, advice_rows(advice), to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for line in advice_lines(advice):
+        print(line, file=stream)
+    if yaml:
+        print("\nIn place of the same keys of the case:\n", file=stream)
+        print(yaml, file=stream)
+    if written is not None:
+        print(f"The case with the advice: {written}", file=stream)

@@ -1,0 +1,625 @@
+"""``klack advise`` for one impact: mesh, modes and step, each from runs that differ in it alone."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any, Literal
+
+import numpy as np
+
+from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
+from klack.contact.restitution import measure_impact
+from klack.elasticity.eigen import Modes
+from klack.errors import InputError, KlackError
+from klack.input.problem import Key
+from klack.simulation.impact import simulate_impact
+from klack.units import format_si
+from klack.workflow.advice import Advice, Counsel, Fixed, Measured, settle
+from klack.workflow.advice_cost import fits, larger, memory_of, time_of
+from klack.workflow.advice_ladder import Measure
+from klack.workflow.advice_modes import (
+    counted,
+    explicit_modes,
+    history_ladder,
+    interface_history,
+    mode_ladder,
+    mode_setting,
+    modes_in_band,
+    richer_pools,
+)
+from klack.workflow.advice_regions import (
+    axisymmetric_twin,
+    layer_setting,
+    mesh_settings,
+    unmeshed_note,
+)
+from klack.workflow.advice_settings import Setting, SettingValue, applied
+from klack.workflow.advice_target import (
+    highest_band,
+    impact_errors,
+    impact_measures,
+    judged_up_to,
+)
+from klack.workflow.bodies import BodyPair, build_bodies
+from klack.workflow.interface_level import build_interface, simulate_case
+from klack.workflow.levels import (
+    ReducedPair,
+    first_stiffness,
+    impact_system,
+    mode_pools,
+    own_pair,
+)
+from klack.workflow.problem import ContactProblem, build_problem
+from klack.workflow.progress import Progress, silent
+from klack.workflow.stages import collected_warnings
+
+__all__ = ["AdviceLevel", "advise_impact"]
+
+AdviceLevel = Literal["reduced", "interface"]
+
+_STEPS = (1.0, 0.5, 0.25)
+_NEAR = (2.0, 1.0, 0.5)
+_REST = (1.0, 0.5, 0.25)
+_REST_OF_LARGE = (2.0, 1.0, 0.5)
+_LARGE = 50_000  # degrees of freedom of finest meshes that take seconds
+_GROWTH = 6  # of the degrees of freedom with a quarter of the size: 4 to 7 on shipped cases
+_COARSE = (1.5, 1.0)
+_LOOSER = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
+# lowest orders measured on shipped cases: contact of curved faces, corners of a body, the circle
+_CONTACT_ORDER, _REST_ORDER, _LAYER_ORDER = 1.4, 1.0, 2.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Base:
+    """The case as it is, ready for many runs."""
+
+    case: Case
+    level: AdviceLevel
+    problem: ContactProblem
+    pools: Mapping[str, Modes]
+    pair: ReducedPair
+    counts: Mapping[str, int]
+    time: float
+
+    @property
+    def dofs(self) -> int:
+        return _dofs(self.problem.pair)
+
+    @property
+    def step_key(self) -> Key:
+        return ("run", f"{self.level}_step")
+
+    @property
+    def step(self) -> float:
+        return _step_of(self.case, self.level)
+
+    def history(self, factor: float = 1.0) -> ImpactHistory:
+        """Impact at the level of the advice with another step."""
+        step = factor * self.step
+        if self.level == "reduced":
+            return _reduced(self.case, self.pair, step)
+        model = build_interface(self.problem, self.pools, ports=self.pair.ports)
+        return simulate_case(self.case, model, step=step).history
+
+    def interface(self, counts: Mapping[str, int], step: float) -> ImpactHistory:
+        return interface_history(self.problem, self.pools, self.pair.ports, counts, step=step)
+
+
+@dataclass(slots=True)
+class _Log:
+    """Notes, and how many cases were run."""
+
+    notes: list[str] = field(default_factory=list)
+    runs: int = 0
+
+
+def advise_impact(
+    case: Case,
+    *,
+    error: float = 0.01,
+    level_error: float = 1.0,
+    up_to: float | None = None,
+    level: AdviceLevel | None = None,
+    confirm: bool = True,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Advice:
+    """Measure what mesh, modes and step of a case cost in accuracy, and advise each.
+
+    Parameters
+    ----------
+    case : Case
+    error : float [-]
+        Accepted for peak force, contact time and force history.
+    level_error : float [dB]
+        Accepted for every third octave of the target band.
+    up_to : float, optional [Hz]
+        Target band; by default the highest third octave within 40 dB of the strongest.
+    level : str, optional
+        ``reduced`` or ``interface``, whose results shall be so good; by default reduced, and
+        interface for a case off its axis.
+    confirm : bool
+        Run the advised case and compare it with the finest run.
+    progress : callable
+    threads : int, optional
+
+    Raises
+    ------
+    InputError
+        For bodies without surfaces, a level that cannot be run, an impact that does not end or
+        that rings on its modes.
+    """
+    begin = perf_counter()
+    case = explicit_modes(case)
+    chosen = _level(case, level)
+    _require_surfaces(case)
+    log = _Log()
+    with collected_warnings() as warned:
+        base = _base(case, chosen, progress, threads)
+    log.notes += warned
+    log.runs += 1
+    with collected_warnings():
+        now = base.history()
+        _require_one_pulse(base, now)
+        wanted = highest_band(now) if up_to is None else up_to
+        judged = judged_up_to(now, wanted)
+        if up_to is not None and judged < up_to / 1.3:
+            log.notes.append(
+                f"Third octaves above {format_si(judged, 'Hz', 3)} are more than 40 dB below the "
+                f"strongest and are not judged, although the target band goes to "
+                f"{format_si(up_to, 'Hz', 3)}."
+            )
+        measures = impact_measures(error, level_error)
+        measured, fixed = _modes_and_step(base, wanted, judged, log, progress)
+        family = _family(base, log)
+        meshes, finest = _mesh_ladders(base, family, judged, log, progress, threads)
+        measured = [*meshes, *measured]
+        _unmeshed(case, log)
+        counsels, dofs = _affordable(base, family, measured, fixed, measures, log)
+        advice = Advice(
+            case=case.name,
+            title=case.title,
+            level=chosen,
+            measures=measures,
+            up_to=judged,
+            band_from_case=up_to is None,
+            counsels=counsels,
+            fixed=tuple(fixed),
+            dofs=(base.dofs, dofs),
+            times=(base.time, base.time * _growth(base, dofs)),
+        )
+        base.problem.close()
+        if confirm:
+            advice = _confirmed(base, family, finest, advice, log, progress, threads)
+    return replace(advice, notes=tuple(log.notes), runs=log.runs, wall_time=perf_counter() - begin)
+
+
+def _level(case: Case, asked: AdviceLevel | None) -> AdviceLevel:
+    if asked is not None:
+        if asked not in ("reduced", "interface"):
+            raise InputError(
+                "--level",
+                got=f"'{asked}'",
+                expected="reduced or interface",
+                hint="a full order has the meshes of both, and its step cannot be measured in "
+                "seconds: advise the interface level.",
+            )
+        return asked
+    centred = case.motion.placement.is_centred
+    only = all(name in ("interface", "full") for name in case.run.levels)
+    return "reduced" if centred and not (only and "interface" in case.run.levels) else "interface"
+
+
+def _require_surfaces(case: Case) -> None:
+    names = [name for name, body in case.bodies.items() if not body.has_surfaces]
+    if names:
+        raise InputError(
+            f"{case.path or 'case'}: bodies.{names[0]}",
+            got="a body without surfaces (a reduced model, or nodes alone)",
+            expected="two bodies with meshed surfaces",
+            hint="such a body brings its mesh error and its missing modes along, and nothing here "
+            "can measure them: compare klack impact of two such models, one from a finer mesh and "
+            "with more modes; for the step run the case again with half of run.reduced_step.",
+        )
+
+
+def _base(case: Case, level: AdviceLevel, progress: Progress, threads: int | None) -> _Base:
+    begin = perf_counter()
+    problem = build_problem(case, progress, threads=threads)
+    pools = mode_pools(problem, at_least=1, progress=progress)
+    spent = perf_counter() - begin
+    counts = {name: counted(case.reduction.choice(name), pool) for name, pool in pools.items()}
+    pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
+    return _Base(
+        case=case,
+        level=level,
+        problem=problem,
+        pools=richer_pools(problem, pools, progress),
+        pair=pair,
+        counts=counts,
+        time=spent,
+    )
+
+
+def _reduced(case: Case, pair: ReducedPair, step: float) -> ImpactHistory:
+    return simulate_impact(
+        impact_system(case, pair.upper, pair.lower, pair.law),
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=step,
+    )
+
+
+def _step_of(case: Case, level: AdviceLevel) -> float:
+    return case.run.reduced_step if level == "reduced" else case.run.interface_step
+
+
+def _dofs(pair: BodyPair) -> int:
+    return len(pair.upper.free) + len(pair.lower.free)
+
+
+def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
+    measures = measure_impact(history)
+    if not np.isfinite(measures.restitution):
+        raise InputError(
+            f"{base.case.path or 'case'}: run.duration",
+            got=f"{format_si(base.case.run.duration, 's')}, and the bodies do not part before",
+            expected="a time that holds the impact and the rebound",
+            hint="enlarge run.duration until klack impact prints a restitution.",
+        )
+    if measures.sub_contacts > 1:
+        raise InputError(
+            f"{base.case.path or 'case'}: level {base.level}",
+            got=f"an impact of {measures.sub_contacts} contacts: the force rings on the modes",
+            expected="one contact, whose peak and history converge",
+            hint="where faces meet all at once, only impulse, restitution and the plateau of the "
+            "full order converge: compare klack impact --level full on two meshes; where they do "
+            "not, take correction: consistent, or --level interface.",
+        )
+
+
+def _modes_and_step(
+    base: _Base, up_to: float, judged: float, log: _Log, progress: Progress
+) -> tuple[list[Measured], list[Fixed]]:
+    progress("modes and steps", 0.0)
+    measured: list[Measured] = []
+    step = min(base.case.run.interface_step, base.step)
+    twice = {name: 2 * count for name, count in base.counts.items()}
+    reference = base.interface(twice, step)
+    names = (base.case.contact.moving.body, base.case.contact.stop.body)
+    for i, name in enumerate(names):
+        choice = base.case.reduction.choice(name)
+        ladder = mode_ladder(
+            base.problem,
+            base.pools,
+            base.pair.ports,
+            base.counts,
+            name,
+            reference=reference,
+            step=step,
+            up_to=judged,
+        )
+        if ladder is None:
+            log.notes.append(
+                f"'{name}' has fewer modes in its mesh than twice those kept: no advice for them."
+            )
+            continue
+        limit = float("inf")
+        if choice.participation is None:
+            within = modes_in_band(base.pools[name], up_to)
+            limit = base.counts[name] / max(within, 1)
+            if within == len(base.pools[name].omega):
+                log.notes.append(
+                    f"Even {within} modes of '{name}' end at "
+                    f"{format_si(float(base.pools[name].frequency[-1]), 'Hz', 3)}, inside the "
+                    "target band: its upper end is a guess. Try: modes by participation from a "
+                    "larger pool."
+                )
+        measured.append(
+            Measured(
+                setting=mode_setting(name, choice, base.counts[name], base.pools[name]),
+                ladder=ladder,
+                runs=_runs_words("interface", ladder.factors, base.counts[name]),
+                at_least=limit,
+            )
+        )
+        progress("modes and steps", (i + 1) / 4)
+    histories = [base.history(factor) for factor in _STEPS]
+    value = SettingValue(key=base.step_key, value=base.step, unit="s")
+    measured.append(
+        Measured(
+            setting=Setting(name=f"step, {base.level} level", group="step", values=(value,)),
+            ladder=history_ladder(list(_STEPS), histories, judged, 2.0),
+            runs=f"{base.level}: h, h/2, h/4",
+        )
+    )
+    fixed: list[Fixed] = []
+    if base.level == "reduced":
+        points = base.interface(base.counts, step / 2.0)
+        fixed.append(
+            Fixed(
+                name="one pressure pattern",
+                errors=impact_errors(points, histories[-1], judged),
+                remedy="klack impact --level interface, which resolves the contact point by point",
+            )
+        )
+    progress("modes and steps", 1.0)
+    return measured, fixed
+
+
+def _runs_words(level: str, factors: Sequence[float], count: int) -> str:
+    return f"{level}: {', '.join(f'{round(count / f)}' for f in factors)} modes"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Family:
+    """Cases on which meshes are compared: the case itself, or its axisymmetric twin."""
+
+    case: Case
+    words: str
+    fine: bool
+    large: bool = False
+
+
+def _family(base: _Base, log: _Log) -> _Family:
+    case = base.case
+    if case.dimension == 2:
+        fine = fits(larger(base.dofs, 0.25, 2), 2)
+        if not fine:
+            log.notes.append(_too_big(base.dofs, 2))
+        return _Family(case=case, words="", fine=fine, large=_GROWTH * base.dofs > _LARGE)
+    highest = {
+        name: 1.001 * float(base.pools[name].frequency[base.counts[name] - 1])
+        for name in (case.contact.moving.body, case.contact.stop.body)
+    }
+    twin = axisymmetric_twin(case, highest)
+    if twin is None:
+        log.notes.append(
+            "The meshes of these solids were made coarser only, and an order was assumed: "
+            "their errors are less certain than those of swept or axisymmetric bodies."
+        )
+        return _Family(case=case, words="", fine=False)
+    words = ", axisymmetric half sections"
+    if any(s.sectors for b in case.bodies.values() for s in b.fixed or ()):
+        words += " held all round"
+    return _Family(case=twin, words=words, fine=True)
+
+
+def _too_big(dofs: int, dimension: int) -> str:
+    return (
+        f"Refining meshes of {dofs} degrees of freedom would take more memory than is free "
+        f"(estimated {memory_of(larger(dofs, 0.25, dimension), dimension) / 1e9:.2g} GB): they "
+        "were made coarser instead, and an order was assumed."
+    )
+
+
+def _mesh_ladders(
+    base: _Base,
+    family: _Family,
+    judged: float,
+    log: _Log,
+    progress: Progress,
+    threads: int | None,
+) -> tuple[list[Measured], dict[Key, float]]:
+    """Ladders of every region, the other regions at their finest; and these finest sizes."""
+    case = family.case
+    surfaces = (case.contact.moving, case.contact.stop)
+    wanted = {surface.body for surface in surfaces}
+    bodies = {name: body for name, body in case.bodies.items() if name in wanted}
+    settings = mesh_settings(bodies, surfaces)
+    factors = {s.name: _factors(s, family) for s in settings}
+    finest = {k: v for s in settings for k, v in s.at(factors[s.name][-1]).items()}
+    total = 1 + sum(len(f) - 1 for f in factors.values())
+    result: list[Measured] = []
+    base_run = base.history() if not family.fine else None
+    reference = base_run
+    if reference is None:
+        progress("meshes", 0.0)
+        reference = _run(applied(case, finest), base.level, threads)
+        log.runs += 1
+    done = 1
+    for setting in settings:
+        used: list[float] = []
+        runs: list[ImpactHistory] = []
+        for factor in factors[setting.name][:-1]:
+            try:
+                runs.append(
+                    _run(applied(case, {**finest, **setting.at(factor)}), base.level, threads)
+                )
+                used.append(factor)
+            except KlackError as error:
+                if factor <= 1.0:
+                    raise
+                log.notes.append(
+                    f"No run with '{setting.name}' {factor:g} times as coarse: "
+                    f"{str(error).splitlines()[0]}"
+                )
+            log.runs += 1
+            done += 1
+            progress("meshes", done / total)
+        if not used:
+            continue
+        used.append(factors[setting.name][-1])
+        order = _CONTACT_ORDER if setting.name.startswith("contact of") else _REST_ORDER
+        words = ", ".join(f"{factor:g}" for factor in used)
+        result.append(
+            Measured(
+                setting=setting,
+                ladder=history_ladder(used, [*runs, reference], judged, order),
+                runs=f"{base.level}{family.words}: sizes times {words}",
+            )
+        )
+    layers = layer_setting(base.case.bodies)
+    if layers is not None and min(v.at(_COARSE[0]) for v in layers.values) > 6:
+        progress("layers", 0.0)
+        coarse = _run(applied(base.case, layers.at(_COARSE[0])), base.level, threads)
+        log.runs += 1
+        ladder = history_ladder(list(_COARSE), [coarse, base.history()], judged, _LAYER_ORDER)
+        words = " and ".join(f"{v.at(_COARSE[0]):g}" for v in layers.values[:1])
+        result.append(
+            Measured(
+                setting=layers,
+                ladder=ladder,
+                runs=f"{base.level}: {layers.values[0].value:g} and {words} layers",
+            )
+        )
+    return result, finest
+
+
+def _factors(setting: Setting, family: _Family) -> tuple[float, ...]:
+    if not family.fine:
+        return _COARSE
+    if setting.name.startswith(("contact of", "growth in")):
+        return _NEAR
+    return _REST_OF_LARGE if family.large else _REST
+
+
+def _run(case: Case, level: AdviceLevel, threads: int | None) -> ImpactHistory:
+    """One impact from its meshes on."""
+    problem = build_problem(case, silent, threads=threads)
+    try:
+        pools = mode_pools(problem, at_least=1, progress=silent)
+        pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        if level == "reduced":
+            return _reduced(case, pair, case.run.reduced_step)
+        model = build_interface(problem, pools, ports=pair.ports)
+        return simulate_case(case, model).history
+    finally:
+        problem.close()
+
+
+def _unmeshed(case: Case, log: _Log) -> None:
+    for name in (case.contact.moving.body, case.contact.stop.body):
+        if case.bodies[name].mesh is None:
+            log.notes.append(unmeshed_note(name, case.bodies[name]))
+
+
+def _affordable(
+    base: _Base,
+    family: _Family,
+    measured: Sequence[Measured],
+    fixed: Sequence[Fixed],
+    measures: Sequence[Measure],
+    log: _Log,
+) -> tuple[tuple[Counsel, ...], int]:
+    """Advice whose meshes fit into the memory, for a looser target if need be; and their size."""
+    needed = 0
+    for looser in _LOOSER:
+        limits = [replace(measure, limit=looser * measure.limit) for measure in measures]
+        counsels = settle(measured, fixed, limits)
+        dofs = _size_with(base, family, {k: v for c in counsels for k, v in c.changes.items()})
+        needed = needed or dofs
+        if fits(dofs, base.case.dimension):
+            break
+    if looser > 1.0:
+        memory = memory_of(needed, base.case.dimension)
+        log.notes.append(
+            f"The meshes for this target would have about {needed:.2g} degrees of freedom and need "
+            f"{memory / 1e9:.2g} GB, more than half of what is free: the advice is for {looser:g} "
+            "times the target. Try: bodies as axisymmetric half sections where the support allows "
+            "it, or another machine."
+        )
+    return counsels, dofs
+
+
+def _size_with(base: _Base, family: _Family, changes: Mapping[Key, float]) -> int:
+    """Degrees of freedom of both bodies with other values; estimated for solids."""
+    meshes = {k: v for k, v in changes.items() if k[0] == "bodies"}
+    if not meshes:
+        return base.dofs
+    if base.case.dimension == 2:
+        return _dofs(build_bodies(applied(base.case, meshes), silent))
+    sections = {k: v for k, v in meshes.items() if k[-1] != "layers"}
+    layers = [
+        value / float(base.case.bodies[str(k[1])].geometry.layers or value)
+        for k, value in meshes.items()
+        if k[-1] == "layers"
+    ]
+    ratio = max(layers, default=1.0)
+    if family.case is not base.case:
+        before = _dofs(build_bodies(family.case, silent))
+        after = _dofs(build_bodies(applied(family.case, sections), silent))
+        return round(base.dofs * ratio * after / before)
+    factors = [v / _value_at(base.case, k) for k, v in sections.items()]
+    return round(larger(base.dofs, min(1.0, *factors), 3) * ratio)
+
+
+def _value_at(case: Case, key: Key) -> float:
+    node: Any = case
+    for part in key:
+        node = node[part] if isinstance(node, Mapping) else getattr(node, str(part))
+    return float(node)
+
+
+def _growth(base: _Base, dofs: int) -> float:
+    dimension = base.case.dimension
+    return time_of(dofs, dimension) / time_of(base.dofs, dimension)
+
+
+def _confirmed(
+    base: _Base,
+    family: _Family,
+    finest: Mapping[Key, float],
+    advice: Advice,
+    log: _Log,
+    progress: Progress,
+    threads: int | None,
+) -> Advice:
+    """Lay the case and the advised one over a run in which everything is finest."""
+    if not family.fine:
+        return replace(advice, check_words="not run again: no finer meshes were affordable")
+    progress("advised case", 0.0)
+    case = family.case
+    reference = _richest(applied(case, finest), base.step / 2.0, threads)
+    present = base.history() if case is base.case else _run(case, base.level, threads)
+    progress("advised case", 0.5)
+    advised = _run(_advised(base, case, advice.changes), base.level, threads)
+    log.runs += 2 + (case is not base.case)
+    progress("advised case", 1.0)
+    checked = (
+        impact_errors(reference, present, advice.up_to),
+        impact_errors(reference, advised, advice.up_to),
+    )
+    return replace(
+        advice,
+        checked=checked,
+        check_words=f"both run again{family.words}, against the interface level on the finest "
+        "meshes, with twice the modes and half the step",
+    )
+
+
+def _richest(case: Case, step: float, threads: int | None) -> ImpactHistory:
+    """Interface level with twice the modes."""
+    problem = build_problem(case, silent, threads=threads)
+    try:
+        pools = mode_pools(problem, at_least=1, progress=silent)
+        twice = {
+            name: 2 * counted(case.reduction.choice(name), pool) for name, pool in pools.items()
+        }
+        pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        richer = richer_pools(problem, pools, silent)
+        return interface_history(problem, richer, pair.ports, twice, step=step)
+    finally:
+        problem.close()
+
+
+def _advised(base: _Base, case: Case, changes: Mapping[Key, float]) -> Case:
+    """Apply the advice to the case, or to its twin as far as that knows it."""
+    if case is base.case:
+        return applied(case, changes)
+    known: dict[Key, float] = {}
+    for key, value in changes.items():
+        if key[-1] == "layers":
+            continue
+        if key[0] == "reduction":  # the twin keeps modes up to where the case does
+            frequency = base.pools[str(key[2])].frequency
+            top = (
+                value
+                if key[-1] == "frequency"
+                else frequency[min(round(value), len(frequency)) - 1]
+            )
+            known[(*key[:-1], "frequency")] = 1.001 * float(top)
+        else:
+            known[key] = value
+    return applied(case, known)

@@ -1,0 +1,182 @@
+"""Kept modes of each body as settings: by number, by frequency, or by participation."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from klack.acoustics.third_octave import band_edges
+from klack.case.bodies import ModeChoice
+from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
+from klack.elasticity.eigen import Modes
+from klack.reduction.ports import Port
+from klack.workflow.advice_ladder import Ladder
+from klack.workflow.advice_settings import Setting, SettingValue
+from klack.workflow.advice_target import HISTORY, impact_errors
+from klack.workflow.interface_level import build_interface, simulate_case
+from klack.workflow.levels import mode_pools
+from klack.workflow.problem import ContactProblem
+from klack.workflow.progress import Progress
+
+__all__ = [
+    "counted",
+    "doubled",
+    "explicit_modes",
+    "history_ladder",
+    "interface_history",
+    "mode_ladder",
+    "mode_setting",
+    "modes_in_band",
+    "richer_pools",
+]
+
+_ORDER = 2.0
+_MEASURED = (4.0, 2.0, 1.0, 0.5)
+_FEWEST = 2
+
+
+def explicit_modes(case: Case) -> Case:
+    """Return the case with the choice of modes written out for every body."""
+    choices = {name: case.reduction.choice(name) for name in case.bodies}
+    return _with_choices(case, choices)
+
+
+def _with_choices(case: Case, choices: Mapping[str, ModeChoice]) -> Case:
+    modes = {**case.reduction.modes, **choices}
+    reduction = case.reduction.model_copy(update={"modes": modes})
+    return case.model_copy(update={"reduction": reduction})
+
+
+def counted(choice: ModeChoice, pool: Modes) -> int:
+    """Elastic modes that a choice keeps of a pool."""
+    if choice.frequency is not None:
+        return int(np.sum(pool.omega <= 2.0 * np.pi * choice.frequency))
+    return min(choice.count or choice.participation or 1, len(pool.omega))
+
+
+def doubled(choice: ModeChoice, pool: Modes) -> ModeChoice:
+    """Choice of twice as many modes."""
+    return _choice(choice, 2 * counted(choice, pool))
+
+
+def _choice(choice: ModeChoice, count: int) -> ModeChoice:
+    if choice.participation is not None:
+        return ModeChoice(participation=count, pool=max(choice.pool or count, count))
+    return ModeChoice(count=count)
+
+
+def richer_pools(
+    problem: ContactProblem, pools: Mapping[str, Modes], progress: Progress
+) -> Mapping[str, Modes]:
+    """Modes of each body, twice as many as the case keeps."""
+    choices = {name: doubled(problem.case.reduction.choice(name), pools[name]) for name in pools}
+    richer = replace(problem, case=_with_choices(problem.case, choices))
+    return mode_pools(richer, at_least=1, progress=progress)
+
+
+def interface_history(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port],
+    counts: Mapping[str, int],
+    *,
+    step: float,
+) -> ImpactHistory:
+    """Impact at the interface level with so many modes of each body, as far as its pool goes."""
+    choices = {
+        name: _choice(problem.case.reduction.choice(name), min(count, len(pools[name].omega)))
+        for name, count in counts.items()
+    }
+    case = _with_choices(problem.case, choices)
+    model = build_interface(replace(problem, case=case), pools, ports=ports)
+    return simulate_case(case, model, step=step).history
+
+
+def mode_setting(body: str, choice: ModeChoice, count: int, pool: Modes) -> Setting:
+    """Modes of a body as the case chooses them.
+
+    Parameters
+    ----------
+    body : str
+    choice : ModeChoice
+    count : int
+        That it keeps.
+    pool : Modes
+        Of which the case keeps some.
+    """
+    key = ("reduction", "modes", body)
+    kind = "participation" if choice.participation is not None else "count"
+    value = SettingValue(key=(*key, kind), value=float(count), kind="count", least=1.0)
+    if choice.frequency is not None:
+        value = SettingValue(
+            key=(*key, "frequency"),
+            value=choice.frequency,
+            unit="Hz",
+            kind="frequency",
+            table=tuple(pool.frequency.tolist()),
+        )
+    return Setting(name=f"modes of {body}", group="modes", values=(value,))
+
+
+def mode_ladder(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port],
+    counts: Mapping[str, int],
+    body: str,
+    *,
+    reference: ImpactHistory,
+    step: float,
+    up_to: float,
+) -> Ladder | None:
+    """A quarter, half, all and twice the modes of one body, the other bodies with twice theirs.
+
+    At the interface level, where leaving out modes is the only thing that changes: the compliance
+    that they carry goes to the contact points.  None where the pool holds no more modes.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of str to Modes
+        Twice as many as kept.
+    ports : pair of Port
+    counts : mapping of str to int
+        Kept.
+    body : str
+    reference : ImpactHistory
+        With twice the modes of every body.
+    step : float [s]
+    up_to : float [Hz]
+    """
+    most = {name: 2 * count for name, count in counts.items()}
+    if len(pools[body].omega) < most[body]:
+        return None
+    factors = [f for f in _MEASURED if f <= 1.0 or counts[body] >= _FEWEST * f]
+    runs = [
+        interface_history(problem, pools, ports, {**most, body: round(counts[body] / f)}, step=step)
+        for f in factors[:-1]
+    ]
+    return history_ladder(factors, [*runs, reference], up_to, _ORDER)
+
+
+def history_ladder(
+    factors: list[float], runs: list[ImpactHistory], up_to: float, order: float
+) -> Ladder:
+    """Compare histories with the finest, and neighbours with each other."""
+    return Ladder(
+        factors=tuple(factors),
+        differences=np.array([impact_errors(runs[-1], run, up_to) for run in runs[:-1]]),
+        steps=np.array(
+            [impact_errors(finer, run, up_to)[HISTORY] for run, finer in pairwise(runs)]
+        ),
+        assumed_order=order,
+    )
+
+
+def modes_in_band(pool: Modes, up_to: float) -> int:
+    """Modes of a pool below the upper edge of the highest band that begins below ``up_to``."""
+    number = np.floor(10.0 * np.log10(up_to / 1000.0) + 0.5).astype(np.int64)
+    edge = float(band_edges(np.array([number]))[1][0])
+    return int(np.sum(pool.omega <= 2.0 * np.pi * edge))

@@ -1,0 +1,282 @@
+"""``klack advise`` for a whole valve: step, modes and meshes by the first impact on every stop.
+
+Later impacts are chaotic and tell nothing about convergence, so none is judged.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.case.bodies import ModeChoice
+from klack.case.valve import ValveCase, Variant
+from klack.errors import InputError, KlackError
+from klack.input.problem import Key
+from klack.workflow.advice import Advice, Measured, settle
+from klack.workflow.advice_cost import time_of
+from klack.workflow.advice_ladder import Ladder, Measure, score
+from klack.workflow.advice_regions import mesh_settings, unmeshed_note
+from klack.workflow.advice_settings import Setting, SettingValue, applied
+from klack.workflow.progress import Progress, silent
+from klack.workflow.stages import collected_warnings
+from klack.workflow.stroke import run_variant, variant_network
+from klack.workflow.valve import Valve, build_valve
+
+__all__ = ["advise_stroke", "first_impacts", "stroke_measures"]
+
+_STEPS = (2.0, 1.0, 0.5)
+_PAIR = (1.0, 0.5)
+_MODE_ORDER, _MESH_ORDER, _STEP_ORDER = 1.0, 1.0, 2.0
+
+
+def stroke_measures(error: float) -> tuple[Measure, ...]:
+    """Measures of a stroke, each the worst of the first impacts on its stops.
+
+    Parameters
+    ----------
+    error : float [-]
+        Accepted for the time of the impact (of its time since the start), peak force, contact
+        time, and absolutely for the restitution.
+    """
+    names = ("impact time", "peak force", "contact time", "restitution")
+    return tuple(Measure(name=name, limit=error) for name in names)
+
+
+def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArray[np.float64]]:
+    """Time, peak force, contact time, restitution of the first impact on every stop, shape (4,).
+
+    Parameters
+    ----------
+    valve : Valve
+    step : float, optional [s]
+        Of the network; that of the case without.
+    """
+    case = valve.case
+    if step is not None:
+        case = case.model_copy(update={"run": case.run.model_copy(update={"step": step})})
+    result = run_variant(case, variant_network(valve, _variant(case)).rows())
+    found: dict[str, NDArray[np.float64]] = {}
+    for event in result.events:
+        if event.stop not in found:
+            numbers = (event.time, event.peak_force, event.contact_time, event.restitution)
+            found[event.stop] = np.array(numbers)
+    return found
+
+
+def _variant(case: ValveCase) -> Variant:
+    names: tuple[Variant, ...] = (*case.run.variants, "wet")
+    return next(name for name in names if not name.endswith("lumped"))
+
+
+def _deviation(
+    reference: Mapping[str, NDArray[np.float64]], run: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Worst deviation over the stops, shape (4,); a stop that is not reached is no agreement."""
+    worst = np.zeros(4)
+    for stop, numbers in reference.items():
+        if stop not in run:
+            return np.ones(4)
+        scale = np.append(np.maximum(numbers[:3], 1e-300), 1.0)
+        worst = np.maximum(worst, np.nan_to_num(np.abs(run[stop] - numbers) / scale))
+    return worst
+
+
+def advise_stroke(
+    case: ValveCase,
+    *,
+    error: float = 0.01,
+    confirm: bool = True,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Advice:
+    """Measure what step, modes and meshes of a valve cost in accuracy at its first impacts.
+
+    Each body keeps its modes and twice as many; the contact regions and each body away from them
+    are meshed once more with half the size; the step is doubled and halved.
+
+    Parameters
+    ----------
+    case : ValveCase
+    error : float [-]
+        Accepted for time, peak force and contact time of first impacts, and for their restitution.
+    confirm : bool
+        Run the advised valve and lay it over the one with everything finest.
+    progress : callable
+    threads : int, optional
+
+    Raises
+    ------
+    InputError
+        For a valve whose first impact does not come within the run.
+    """
+    begin = perf_counter()
+    measures = stroke_measures(error)
+    case = _explicit(case)
+    with collected_warnings() as notes:
+        valve = build_valve(case, progress, threads=threads)
+        spent = perf_counter() - begin
+        now = first_impacts(valve)
+    if not now:
+        raise InputError(
+            f"{case.path or 'case'}: run.duration",
+            got="no impact within it",
+            expected="a run that reaches a stop",
+            hint="look at the lift with klack stroke, and enlarge run.duration.",
+        )
+    with collected_warnings():
+        measured = [_step_ladder(valve, now, measures)]
+        settings = [*_mesh_settings(case), *_mode_settings(valve)]
+        log = list(notes)
+        for i, setting in enumerate(settings):
+            progress("finer bodies", i / len(settings))
+            try:
+                finer = _impacts(applied(case, setting.at(_PAIR[-1])), threads)
+            except KlackError as trouble:
+                log.append(f"No run with a finer '{setting.name}': {str(trouble).splitlines()[0]}")
+                continue
+            order = _MODE_ORDER if setting.group == "modes" else _MESH_ORDER
+            ladder = _ladder(_PAIR, [now, finer], measures, order)
+            measured.insert(
+                -1,
+                Measured(
+                    setting=setting, ladder=ladder, runs=f"{_variant(case)}: {_words(setting)}"
+                ),
+            )
+        log += [
+            unmeshed_note(name, body) for name, body in case.bodies.items() if body.mesh is None
+        ]
+        advice = Advice(
+            case=case.name,
+            title=case.title,
+            level="stroke",
+            measures=measures,
+            up_to=float("nan"),
+            band_from_case=False,
+            counsels=settle(measured, (), measures),
+        )
+        runs = 2 + len(settings)
+        if confirm:
+            progress("advised case", 0.0)
+            dofs = sum(len(body.free) for body in valve.bodies.values())
+            advice = _confirmed(case, advice, now, dofs, threads)
+            runs += 2
+    return replace(
+        advice,
+        notes=tuple(log),
+        times=(spent, spent * _growth(advice)),
+        runs=runs,
+        wall_time=perf_counter() - begin,
+    )
+
+
+def _explicit(case: ValveCase) -> ValveCase:
+    modes = {name: case.reduction.choice(name) for name in case.bodies}
+    reduction = case.reduction.model_copy(update={"modes": modes})
+    return case.model_copy(update={"reduction": reduction})
+
+
+def _step_ladder(
+    valve: Valve, now: Mapping[str, NDArray[np.float64]], measures: Sequence[Measure]
+) -> Measured:
+    step = valve.case.run.step
+    runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in _STEPS]
+    value = SettingValue(key=("run", "step"), value=step, unit="s")
+    return Measured(
+        setting=Setting(name="step of the network", group="step", values=(value,)),
+        ladder=_ladder(_STEPS, runs, measures, _STEP_ORDER),
+        runs=f"{_variant(valve.case)}: 2h, h, h/2",
+    )
+
+
+def _ladder(
+    factors: Sequence[float],
+    runs: Sequence[Mapping[str, NDArray[np.float64]]],
+    measures: Sequence[Measure],
+    order: float,
+) -> Ladder:
+    return Ladder(
+        factors=tuple(factors),
+        differences=np.array([_deviation(runs[-1], run) for run in runs[:-1]]),
+        steps=np.array([score(_deviation(finer, run), measures) for run, finer in pairwise(runs)]),
+        assumed_order=order,
+    )
+
+
+def _mesh_settings(case: ValveCase) -> tuple[Setting, ...]:
+    surfaces = tuple(s for stop in case.stops.values() for s in (stop.upper, stop.lower))
+    return mesh_settings(case.bodies, surfaces)
+
+
+def _mode_settings(valve: Valve) -> list[Setting]:
+    found = []
+    for name, body in valve.reduced.items():
+        choice: ModeChoice = valve.case.reduction.choice(name)
+        elastic = body.frequencies[body.rigid_count : body.mode_count - body.attachment_count]
+        key = ("reduction", "modes", name)
+        if choice.frequency is not None:
+            value = SettingValue(
+                key=(*key, "frequency"),
+                value=choice.frequency,
+                unit="Hz",
+                kind="frequency",
+                table=tuple(elastic.tolist()),
+            )
+        elif choice.count is not None:
+            value = SettingValue(
+                key=(*key, "count"), value=float(choice.count), kind="count", least=1.0
+            )
+        else:  # of a pool: no more than it holds
+            most = 2 * (choice.participation or 1)
+            if (choice.pool or 0) < most:
+                continue
+            value = SettingValue(
+                key=(*key, "participation"),
+                value=float(choice.participation or 1),
+                kind="count",
+                least=1.0,
+            )
+        found.append(Setting(name=f"modes of {name}", group="modes", values=(value,)))
+    return found
+
+
+def _words(setting: Setting) -> str:
+    if setting.group == "modes":
+        return ", ".join(f"{setting.values[0].at(f):g}" for f in _PAIR)
+    return "sizes times 1, 0.5"
+
+
+def _impacts(case: ValveCase, threads: int | None) -> dict[str, NDArray[np.float64]]:
+    return first_impacts(build_valve(case, silent, threads=threads))
+
+
+def _confirmed(
+    case: ValveCase,
+    advice: Advice,
+    now: Mapping[str, NDArray[np.float64]],
+    dofs: int,
+    threads: int | None,
+) -> Advice:
+    """Lay the valve and the advised one over one with everything finest."""
+    finest: dict[Key, float] = {}
+    for item in advice.counsels:
+        finest.update(item.measured.setting.at(min(item.measured.ladder.factors)))
+    reference = _impacts(applied(case, finest), threads)
+    valve = build_valve(applied(case, advice.changes), silent, threads=threads)
+    advised = first_impacts(valve)
+    return replace(
+        advice,
+        dofs=(dofs, sum(len(body.free) for body in valve.bodies.values())),
+        checked=(_deviation(reference, now), _deviation(reference, advised)),
+        check_words="both run again, against the valve with the finest meshes, twice the modes and "
+        "half the step",
+    )
+
+
+def _growth(advice: Advice) -> float:
+    if advice.dofs is None:
+        return float("nan")
+    before, after = advice.dofs
+    return time_of(after, 2) / time_of(before, 2)
