@@ -25,6 +25,7 @@ from cyclopts import App, CycloptsError
 
 from klack import __version__
 from klack.cli import (
+    advise,
     cache,
     calibrate,
     compare,
@@ -63,6 +64,7 @@ app.command(stroke.stroke)
 app.command(shots.shots)
 app.command(noise.noise)
 app.command(reduce.reduce)
+app.command(advise.advise)
 app.command(inspect.inspect)
 app.command(report.report)
 app.command(export.export)
