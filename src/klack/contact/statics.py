@@ -26,6 +26,7 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+from klack.memory import require_memory
 
 __all__ = [
     "ReachError",
@@ -61,11 +62,23 @@ def contact_compliance(
     array, shape (nc, nc) [m/N]
         Symmetric.
     """
+    _require_memory(space)
     return _remembered_compliance(
         flexibility_a,
         flexibility_b,
         (space.G_a, space.G_b),
-        lambda: _condensed(space, flexibility_a, flexibility_b),
+        lambda: flexibility_a.condensed(space.G_a) + flexibility_b.condensed(space.G_b),
+    )
+
+
+def _require_memory(space: ContactSpace) -> None:
+    """Refuse more points than fit: the compliance, its symmetric part and a factor of it."""
+    columns = 8.0 * _CHUNK * max(space.G_a.shape[1], space.G_b.shape[1])
+    require_memory(
+        "contact compliance",
+        4 * 8.0 * space.count**2 + 3 * columns,
+        what=f"a full matrix of {space.count} contact points",
+        hint="larger elements on the two surfaces, or a smaller contact.reach.",
     )
 
 
@@ -84,17 +97,6 @@ def _remembered_compliance(
         lambda C: Entry(arrays={"C": C}),
         lambda entry: entry.arrays["C"],
     )
-
-
-def _condensed(
-    space: ContactSpace, flexibility_a: Flexibility, flexibility_b: Flexibility
-) -> NDArray[np.float64]:
-    C = np.zeros((space.count, space.count))
-    for G, flexibility in ((space.G_a, flexibility_a), (space.G_b, flexibility_b)):
-        for start in range(0, space.count, _CHUNK):
-            columns = slice(start, start + _CHUNK)
-            C[:, columns] += G @ flexibility.solve(G[columns].T.toarray())
-    return (C + C.T) / 2.0
 
 
 class ReachError(InputError):

@@ -19,12 +19,14 @@ from klack.elasticity.factorization import Backend
 from klack.elasticity.lanczos import block_lanczos
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError, require_positive
+from klack.memory import require_memory
 
 __all__ = ["Modes", "eigenmodes", "rigid_frequencies"]
 
 _LARGEST_DENSE = 600
 _BLOCK = 8
 _RIGID_LIMIT = 0.1
+_VECTORS_PER_MODE = 4.0  # basis, its copies while it grows, and the shapes at the end
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,8 @@ def eigenmodes(
         modes of a free body do not lie below 0.1 Hz.
     """
     _check_request(body, count, max_frequency)
+    if count is not None:
+        _require_memory(body, count)
     rigid_frequencies(body)
     if len(body.free) <= _LARGEST_DENSE:
         return _lowest(body, _dense(body), count, max_frequency)
@@ -94,6 +98,16 @@ def eigenmodes(
         )
     with Flexibility(body, backend=backend, threads=threads) as own:
         return _lowest(body, _iterated(own, count, max_frequency), count, max_frequency)
+
+
+def _require_memory(body: ElasticBody, count: int) -> None:
+    """Refuse more modes than fit; their basis grows to twice as many vectors, and is copied."""
+    require_memory(
+        f"eigenmodes of body '{body.name}': count",
+        8.0 * body.dof_count * _VECTORS_PER_MODE * count,
+        what=f"{count} modes of {body.dof_count} degrees of freedom",
+        hint="fewer modes (of the reduction or of its pool), or larger elements.",
+    )
 
 
 def _lowest(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.errors import ConvergenceError
+from klack.memory import require_memory
 
 __all__ = ["block_lanczos"]
 
@@ -39,7 +40,14 @@ class _Subspace:
     def append(self, block: Array) -> None:
         needed = self.size + block.shape[1]
         if needed > self.V.shape[1]:
-            V = np.empty((len(self.V), max(needed, self.V.shape[1] * 3 // 2)), order="F")
+            columns = max(needed, self.V.shape[1] * 3 // 2)
+            require_memory(
+                "block Lanczos",
+                8.0 * len(self.V) * columns,
+                what=f"a basis of {columns} vectors of {len(self.V)} degrees of freedom",
+                hint="fewer modes, a lower max_frequency, or larger elements.",
+            )
+            V = np.empty((len(self.V), columns), order="F")
             V[:, : self.size] = self.basis
             self.V = V
         self.V[:, self.size : needed] = block

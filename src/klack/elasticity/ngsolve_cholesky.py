@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.elasticity.closing import Closing
+from klack.elasticity.factor_memory import fill_memory, require_factor_memory
 
 __all__ = ["NgsolveFactorization"]
 
@@ -24,6 +25,8 @@ class NgsolveFactorization(Closing):
         import ngsolve
 
         self.size = A.shape[0]
+        needed = fill_memory(self.backend, self.size, A.nnz)
+        require_factor_memory(self.backend, self.size, A.nnz, needed)
         entries = A.tocoo()
         rows, columns = entries.coords
         matrix = ngsolve.la.SparseMatrixd.CreateFromCOO(

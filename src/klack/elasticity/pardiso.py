@@ -19,19 +19,16 @@ from numpy.typing import NDArray
 from scipy.sparse import triu
 
 from klack.elasticity.closing import Closing
+from klack.elasticity.factor_memory import out_of_memory, require_factor_memory
 from klack.elasticity.factorization import Precision, not_positive_definite
 from klack.errors import ConvergenceError
 
 __all__ = ["PardisoFactorization"]
 
 _SPD, _INDEFINITE = 2, -2
-_ANALYSE_AND_FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 12, 33, 331, 333, -1
-_ERRORS = {
-    -2: "not enough memory",
-    -3: "reordering failed",
-    -8: "more than 2^31 entries",
-    -9: "not enough memory for the factor",
-}
+_ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
+_ERRORS = {-3: "reordering failed", -8: "more than 2^31 entries"}
+_NO_MEMORY = (-2, -9)
 
 
 class PardisoFactorization(Closing):
@@ -62,14 +59,30 @@ class PardisoFactorization(Closing):
         self._release = weakref.finalize(
             self, _free, self._mkl, self._handle, self._settings, self._kind, self.size
         )
-        empty = np.zeros(self.size, dtype=self._type)
-        error = self._call(_ANALYSE_AND_FACTOR, empty, empty, 1)
-        if error:
+        try:
+            self._factorise(A.nnz)
+        except BaseException:
             self.close()
-            raise _failure(error)
+            raise
         self.nonzeros: int | None = int(self._settings[17])
+        self.memory: int | None = self._told_memory()
+
+    def _factorise(self, entries: int) -> None:
+        """Order the matrix and count the entries of its factor; then, if they fit, compute them."""
+        empty = np.zeros(self.size, dtype=self._type)
+        for phase in (_ANALYSE, _FACTOR):
+            error = self._call(phase, empty, empty, 1)
+            if error in _NO_MEMORY:
+                raise out_of_memory(self.backend, self.size, entries, self._told_memory())
+            if error:
+                raise _failure(error)
+            if phase == _ANALYSE:
+                require_factor_memory(self.backend, self.size, entries, self._told_memory())
+
+    def _told_memory(self) -> int:
+        """Peak memory [byte] as MKL reports it after its analysis: iparm(15) to iparm(17)."""
         analysis, permanent, factor = (int(v) for v in self._settings[14:17])
-        self.memory: int | None = 1024 * max(analysis, permanent + factor)
+        return 1024 * max(analysis, permanent + factor)
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B for one or several columns."""

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from klack.elasticity.closing import Closing
+from klack.elasticity.factor_memory import fill_memory, out_of_memory, require_factor_memory
 from klack.elasticity.factorization import not_positive_definite
 
 __all__ = ["SuperluFactorization"]
@@ -19,6 +20,8 @@ class SuperluFactorization(Closing):
 
     def __init__(self, A: Any, threads: int | None = None) -> None:
         self.size = A.shape[0]
+        needed = fill_memory(self.backend, self.size, A.nnz)
+        require_factor_memory(self.backend, self.size, A.nnz, needed)
         try:
             # symmetric mode pivots on the diagonal, so that the fill of the ordering is kept
             factor = splu(
@@ -29,6 +32,8 @@ class SuperluFactorization(Closing):
             )
         except RuntimeError as error:
             raise not_positive_definite("a pivot is zero") from error
+        except MemoryError as error:
+            raise out_of_memory(self.backend, self.size, A.nnz, needed) from error
         self._factor: Any = factor
         self.nonzeros: int | None = int(factor.nnz)
         self.memory: int | None = 12 * self.nonzeros

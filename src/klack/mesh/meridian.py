@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.curve import Curve, on_axis
+from klack.mesh.element_estimate import require_meshable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, matching_curves, plane_face
@@ -69,6 +70,11 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
         )
     names = tuple(dict.fromkeys(name for p in profiles.values() for name in p.names))
     sizing.require_surfaces(names)
+    lengths: dict[str, float] = {}
+    for curve in (curve for profile in profiles.values() for curve in profile.curves):
+        lengths[curve.name] = lengths.get(curve.name, 0.0) + curve.length
+    area = sum(profile.area for profile in profiles.values())
+    require_meshable("mesh_meridian", sizing, 2, area, lengths)
     tri = _triangulate(profiles, sizing)
     points = _corners_on_curves(tri)
     edges, local_edges = _unique_edges(tri.triangles)

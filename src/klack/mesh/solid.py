@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.boundary import FaceTable
+from klack.mesh.element_estimate import require_meshable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, revolved_solids
@@ -177,6 +178,10 @@ def _mesh_shape(where: str, shape: Any, sizing: MeshSizing) -> Mesh:
     solids, faces = solid_names(shape), face_names(shape)
     _require_upright(where, shape, solids)
     sizing.require_surfaces(faces)
+    areas: dict[str, float] = {}
+    for name, face in zip(faces, shape.faces, strict=True):
+        areas[name] = areas.get(name, 0.0) + face.mass / MM**2
+    require_meshable(where, sizing, 3, shape.mass / MM**3, areas)
     for k, solid in enumerate(shape.solids):
         solid.name = str(k)
     for k, face in enumerate(shape.faces):

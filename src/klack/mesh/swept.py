@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.memory import require_memory
+from klack.mesh.element_estimate import element_memory
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.quality import require_positive_jacobians
@@ -69,6 +71,13 @@ def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
         If the mesh is not made of six-node triangles, or ``layers`` is too small.
     """
     _require_sweepable(meridian, layers)
+    count = 3.0 * meridian.element_count * layers
+    require_memory(
+        "sweep: layers",
+        element_memory(3, count),
+        what=f"{layers} layers, which make {count:.2g} tetrahedra, a mesh",
+        hint="fewer layers (18 are usual), or larger elements in the half section.",
+    )
     ring = _ring(meridian, layers)
     tets = [_tetrahedra(ring, block.connectivity[:, :3]) for block in meridian.blocks]
     faces = {name: _triangles(ring, surface) for name, surface in meridian.surfaces.items()}

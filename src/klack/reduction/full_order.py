@@ -41,6 +41,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.factorization import Backend
 from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, require_positive
+from klack.memory import require_memory
 from klack.reduction.dynamic_stiffness import solve_symmetric
 from klack.reduction.ports import Port
 from klack.reduction.receptance import Receptance, frequency_axis, modal_sum
@@ -259,6 +260,12 @@ class _KrylovSpace:
         self.stiffness = np.block([[self.stiffness, side], [side.T, (corner + corner.T) / 2]])
         size = self.size + vectors.shape[1]
         if size > self._store.shape[1]:
+            require_memory(
+                f"full_order_receptance of body '{self.body.name}'",
+                16.0 * self.body.dof_count * size,
+                what=f"a Krylov basis of {2 * size} vectors",
+                hint="a lower top frequency, or larger elements.",
+            )
             larger = np.empty((self.body.dof_count, 2 * size), order="F")
             larger[:, : self.size] = self.basis
             self._store = larger
