@@ -243,9 +243,15 @@ def build_guide(
 
 
 def simulate_case(
-    case: Case, model: InterfaceModel, guide: Guide | None = None, *, step: float | None = None
+    case: Case,
+    model: InterfaceModel,
+    guide: Guide | None = None,
+    *,
+    step: float | None = None,
+    duration: float | None = None,
 ) -> InterfaceResult:
     """Run the motion of a case once, without jumps."""
+    duration = case.run.duration if duration is None else duration
     spring = case.motion.spring
     gap = case.contact.gap or 0.0
     step = case.run.interface_step if step is None else step
@@ -255,12 +261,12 @@ def simulate_case(
     return simulate_interface(
         model,
         speed=case.motion.speed,
-        duration=case.run.duration,
+        duration=duration,
         step=step,
         force=force,
         spring_stiffness=0.0 if spring is None else spring.stiffness,
         guide=guide,
-        points=model.count * case.run.duration / step <= _MOST_RECORDS,
+        points=model.count * duration / step <= _MOST_RECORDS,
     )
 
 
@@ -273,7 +279,7 @@ def run_interface(
 ) -> LevelResult:
     """One impact at the interface level."""
     case = problem.case
-    simulate_case(case, model, guide, step=case.run.duration / 20)  # compiles
+    simulate_case(case, model, guide, duration=20 * case.run.interface_step)  # compiles
     result = simulate_case(case, model, guide)
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
