@@ -159,7 +159,7 @@ def coarsest_within(
     if score(ladder.error(finest), measures) > allowed:
         return finest
     low, high = np.log(finest), np.log(coarsest)
-    for _ in range(60):  # the score is monotone
+    for _ in range(40):  # the score is monotone
         middle = 0.5 * (low + high)
         if score(ladder.error(float(np.exp(middle))), measures) <= allowed:
             low = middle
