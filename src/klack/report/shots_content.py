@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from klack.report.content import Content, Section, Table, date_text, stage_table
 from klack.report.pressure_figure import pressure_figure
@@ -91,6 +90,8 @@ def _rule(study: ShotsStudy) -> str:
 
 def _rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Spearman's coefficient of what both columns know; 0 where one of them is constant."""
+    from scipy.stats import rankdata  # half a second to load, which every other report saves
+
     known = np.isfinite(one) & np.isfinite(other)
     first, second = rankdata(one[known]), rankdata(other[known])
     if known.sum() < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
