@@ -92,6 +92,8 @@ def whole_files(folder: Path, refuse: Refusal | None = None) -> Iterator[Path]:
         if not _inside_a_stage(folder):
             _synchronise(folder)
     except OSError as error:
+        if _inside_a_stage(folder):  # the outer stage knows the name that the user gave
+            raise
         raise (refuse or _refuse)(folder, error) from error
     finally:
         if stage is not None and not (stage / _READY).is_dir():

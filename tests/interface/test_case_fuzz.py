@@ -235,3 +235,11 @@ def test_hostile_files_in_a_confined_process(tmp_path: Path):
     assert len(done.stdout.splitlines()) == len(HOSTILE) + 1
     assert "SLOW" not in done.stdout, done.stdout
     assert not (tmp_path / "hacked").exists()
+
+
+def test_half_a_letter_is_no_text():
+    """A lone surrogate, which JSON and YAML can write and no file name or terminal can take."""
+    text = CASES[0].read_text(encoding="utf-8")
+    for put in ('"\\ud800"', '"a\\0b"'):
+        with pytest.raises(InputError, match="without such signs"):
+            read_any_case(text.replace("klack: 1", f"klack: {put}", 1), Path("valve.yaml"))

@@ -179,6 +179,21 @@ def test_no_home_and_no_folder_for_temporary_files(result: Path, tmp_path: Path)
     assert sorted(path.name for path in (tmp_path / "b").iterdir()) == ["report.html", "report.pdf"]
 
 
+def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypatch, capsys):
+    """In a private folder: numba runs what it finds there."""
+    from klack.cli import surroundings
+
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    os.environ.pop("NUMBA_CACHE_DIR", None)
+    surroundings.prepare_compiling()
+    assert "NUMBA_CACHE_DIR" not in os.environ  # this machine has a place
+    monkeypatch.setattr(surroundings, "_writable", lambda folder: False)
+    surroundings.prepare_compiling()
+    place = Path(os.environ["NUMBA_CACHE_DIR"])
+    assert place.stat().st_mode & 0o077 == 0
+    assert "compiled functions cannot be kept" in capsys.readouterr().err
+
+
 def shell(text: str, folder: Path, **env: str) -> "subprocess.CompletedProcess[str]":
     klack = f"'{sys.executable}' -m klack"
     return subprocess.run(

@@ -3,6 +3,7 @@
 The case of a whole valve, with a section ``network``, is read by :mod:`klack.case.valve_reader`.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -37,6 +38,7 @@ _Kind = TypeVar("_Kind", bound=CaseFile)
 _LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
 _MOST_VALUES = 200_000
 _DEEPEST = 40
+_NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")  # an escape such as "\\ud800" is half a letter
 
 
 @dataclass(slots=True)
@@ -195,7 +197,9 @@ class _Plain:
             return result
         if node is None or isinstance(node, bool):
             return node
-        for plain in (str, int, float):
+        if isinstance(node, str):
+            return self._text(str(node), key)
+        for plain in (int, float):
             if isinstance(node, plain):
                 return plain(node)
         # a date, a set, or a value with a tag such as !!python/name
@@ -210,7 +214,12 @@ class _Plain:
             self.lines.values[path] = where[2] + 1
         if not isinstance(name, str):
             self._refuse(path, f"the key {name}", "text as a key")
-        return str(name)
+        return self._text(str(name), path)
+
+    def _text(self, text: str, key: Key) -> str:
+        if _NO_TEXT.search(text):
+            self._refuse(key, f"the text {ascii(text)[:80]}", "text without such signs")
+        return text
 
     def _refuse(self, key: Key, got: str, expected: str) -> None:
         line = self.lines.find(key, on_key=False)

@@ -20,6 +20,8 @@ _WORDS: Mapping[int, str] = {
     errno.EFBIG: "a file grew larger than the system allows.\nTry: ulimit -f unlimited.",
     errno.EMFILE: "too many files are open.\nTry: ulimit -n 4096.",
     errno.ENFILE: "too many files are open.\nTry: close other programs.",
+    errno.ENAMETOOLONG: "the name of a file is longer than the system allows.\nTry: a shorter one.",
+    errno.ELOOP: "links lead round in a circle.\nTry: the place itself.",
     errno.EIO: "the disk or the network drive failed.\nTry: another folder (--out).",
 }
 
@@ -47,8 +49,9 @@ def prepare_compiling() -> None:
     if "NUMBA_CACHE_DIR" in os.environ:
         return
     package = Path(__file__).parents[1]
-    home = Path(os.path.expanduser("~"), ".cache")
-    if not all(map(_writable, package.rglob("__pycache__"))) and not _writable(home):
+    places = [folder / "__pycache__" for folder in (package, *package.iterdir()) if folder.is_dir()]
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    if not all(map(_writable, places)) and not _writable(home):
         import atexit
         import shutil
         from tempfile import mkdtemp

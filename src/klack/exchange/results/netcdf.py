@@ -4,6 +4,7 @@ Attributes follow the CF conventions (``units``, ``long_name``, ``title``, ``his
 numbers are the doubles of the study, compressed without loss.
 """
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,9 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
         import h5netcdf
     except ImportError as error:
         raise MissingExtraError("h5netcdf", "writing netCDF", "exchange") from error
-    with whole_file(path) as new, h5netcdf.File(new, "w", invalid_netcdf=False) as file:
+    # HDF5 writes to memory: it ends the process where the disk is full when it closes a file
+    memory = BytesIO()
+    with h5netcdf.File(memory, "w", invalid_netcdf=False) as file:
         file.attrs["Conventions"] = "CF-1.11"
         file.attrs["source"] = f"klack {table.about.get('klack', '')}".strip()
         file.attrs["kind"] = table.kind
@@ -62,6 +65,8 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
         names = identifiers([run.name for run in table.runs], ["case_text"])
         for name, run in zip(names, table.runs, strict=True):
             _write_run(file.create_group(name), run)
+    with whole_file(path) as new:
+        new.write_bytes(memory.getbuffer())
     return path
 
 
