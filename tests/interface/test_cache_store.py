@@ -164,8 +164,7 @@ def test_two_processes_on_one_empty_cache(tmp_path):
     for process in processes:
         out, error = process.communicate(timeout=60)
         assert process.returncode == 0, error
-        served, missed = map(int, out.split())
-        assert served >= 40
+        _, missed = map(int, out.split())
         assert missed <= 20
 
     names = {path.suffix for path in (tmp_path / "deep" / "cache").iterdir()}

@@ -50,10 +50,11 @@ class ResultCache:
     def __init__(self, folder: Path, limit: int) -> None:
         self.folder, self.limit = folder, limit
         self.served: Counter[str] = Counter()
-        """Results given from the folder in this process, by kind."""
+        """Results of earlier processes that this one was given, by kind."""
         self.missed: Counter[str] = Counter()
         """Results that it did not have."""
         self._lock = Lock()
+        self._own: set[str] = set()
         self._writable = True
 
     def load(self, key: str, kind: str) -> Entry | None:
@@ -63,7 +64,10 @@ class ResultCache:
         with suppress(OSError, DamagedEntry, MemoryError):
             entry = read_entry(path, key)
         with self._lock:
-            (self.missed if entry is None else self.served)[kind] += 1
+            if entry is None:
+                self.missed[kind] += 1
+            elif key not in self._own:
+                self.served[kind] += 1
         if entry is not None:
             with suppress(OSError):
                 os.utime(path)  # used just now
@@ -78,6 +82,7 @@ class ResultCache:
                 self._write(key, entry)
             except FileNotFoundError:  # somebody deleted the folder just now
                 self._write(key, entry)
+            self._own.add(key)
             self._keep_within_limit()
         except OSError as error:
             self._give_up(error)

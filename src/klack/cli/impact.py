@@ -93,7 +93,7 @@ def run_case(
 
 
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.stages import from_cache
+    from klack.workflow.stages import stages_with_cached
     from klack.workflow.summary import SUMMARY_COLUMNS, estimate_lines, summary_rows
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
@@ -102,7 +102,7 @@ def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr:
         print(line, file=stream)
     for warning in study.warnings:
         print(f"Note: {warning}", file=stream)
-    if cached := from_cache(study.stage_times):
-        print(f"From the cache: {', '.join(cached)} (see klack cache)", file=stream)
+    if cached := stages_with_cached(study.stage_times):
+        print(f"With cached results (klack cache): {', '.join(cached)}", file=stream)
     made = ["result.zarr", *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -9,22 +9,19 @@ from klack.cache.result_cache import ResultCache
 from klack.errors import AccuracyWarning
 from klack.workflow.progress import Progress
 
-__all__ = ["FROM_CACHE", "LIBRARIES", "StageClock", "collected_warnings", "from_cache"]
+__all__ = ["LIBRARIES", "WITH_CACHED", "StageClock", "collected_warnings", "stages_with_cached"]
 
 LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 """Distributions whose versions belong to a result."""
 
-FROM_CACHE = "from the cache"
-"""Ends the name of a stage whose results were computed by a run before."""
+WITH_CACHED = ", with cached results"
+"""Ends the name of a stage that took results of earlier runs."""
 
 
-def from_cache(stage_times: Mapping[str, float]) -> tuple[str, ...]:
-    """Stages of a run whose results came from the cache, all of them or in part."""
-    whole, part = f", {FROM_CACHE}", f", partly {FROM_CACHE}"
+def stages_with_cached(stage_times: Mapping[str, float]) -> tuple[str, ...]:
+    """Stages of a run that took results of earlier runs from the cache."""
     return tuple(
-        name.removesuffix(whole) if name.endswith(whole) else f"{name.removesuffix(part)} (partly)"
-        for name in stage_times
-        if name.endswith(FROM_CACHE)
+        name.removesuffix(WITH_CACHED) for name in stage_times if name.endswith(WITH_CACHED)
     )
 
 
@@ -39,8 +36,7 @@ class StageClock:
 
     def __init__(self, progress: Progress, cache: ResultCache | None = None) -> None:
         self._progress, self._cache = progress, cache
-        self._served, self._missed = self._counts()
-        self._answers: dict[str, list[int]] = {}
+        self._served, self._helped = self._count(), set[str]()
         self._stage, self._since = "", perf_counter()
         self._times: dict[str, float] = {}
 
@@ -56,17 +52,13 @@ class StageClock:
         if self._stage:
             self._times[self._stage] = self._times.get(self._stage, 0.0) + now - self._since
         self._since = now
-        served, missed = self._counts()
-        if self._stage:
-            answers = self._answers.setdefault(self._stage, [0, 0])
-            answers[0] += served - self._served
-            answers[1] += missed - self._missed
-        self._served, self._missed = served, missed
+        served = self._count()
+        if self._stage and served > self._served:
+            self._helped.add(self._stage)
+        self._served = served
 
-    def _counts(self) -> tuple[int, int]:
-        if self._cache is None:
-            return 0, 0
-        return self._cache.served.total(), self._cache.missed.total()
+    def _count(self) -> int:
+        return 0 if self._cache is None else self._cache.served.total()
 
     def spent(self, stages: Sequence[str]) -> float:
         """Seconds in these stages so far."""
@@ -74,15 +66,12 @@ class StageClock:
         return sum(self._times.get(stage, 0.0) for stage in stages)
 
     def times(self) -> dict[str, float]:
-        """Seconds per stage; its name tells when its results came from the cache."""
+        """Seconds per stage; its name tells when it took results of earlier runs."""
         self._book()
-        return {f"{stage}{self._source(stage)}": time for stage, time in self._times.items()}
-
-    def _source(self, stage: str) -> str:
-        served, missed = self._answers.get(stage, (0, 0))
-        if not served:
-            return ""
-        return f", partly {FROM_CACHE}" if missed else f", {FROM_CACHE}"
+        return {
+            f"{stage}{WITH_CACHED if stage in self._helped else ''}": time
+            for stage, time in self._times.items()
+        }
 
 
 @contextmanager
