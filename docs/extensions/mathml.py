@@ -5,6 +5,7 @@ read is a warning with its place, and a built site has no warnings.
 """
 
 import re
+from html import unescape
 from xml.etree import ElementTree
 
 from docutils import nodes
@@ -19,6 +20,8 @@ __all__ = ["mathml", "setup"]
 _SPACE = "http://www.w3.org/1998/Math/MathML"
 ElementTree.register_namespace("", _SPACE)
 
+_ENTITY = re.compile(r"&(?!amp;|lt;|gt;)\w+;")  # names of HTML, such as &ApplyFunction;
+
 # what LaTeX allows and the converter does not know, in words that it knows
 _SPELLINGS = (
     (re.compile(r"\\([dt]?frac)\s*(\d)\s*(\d)"), r"\\\1{\2}{\3}"),
@@ -32,7 +35,8 @@ def mathml(tex: str, *, block: bool) -> str:
     """Turn one LaTeX equation into a ``<math>`` element."""
     for spelling, known in _SPELLINGS:
         tex = spelling.sub(known, tex)
-    tree = ElementTree.fromstring(str(tex2mathml(tex.strip(), as_block=block)))
+    text = _ENTITY.sub(lambda name: unescape(name[0]), tex2mathml(tex.strip(), as_block=block))
+    tree = ElementTree.fromstring(text)
     for parent in list(tree.iter()):
         for place, child in enumerate(parent):
             parent[place] = _index_beside(child)

@@ -2,8 +2,8 @@
 
 The pages are read in both places, so their links are those of the repository.  What lies inside
 ``docs`` sphinx finds by itself.  Here the others are put right while a page is read: the README
-and its like have a page of their own in the site (``SHOWN``), a module of klack leads to its
-source in the site, and any other file comes along as a download.
+and its like have a page of their own in the site (``SHOWN``), any other file comes along as a
+download.
 """
 
 import os.path

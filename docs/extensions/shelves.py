@@ -47,7 +47,7 @@ def shelves(index: str, pages: list[str]) -> dict[str, dict[str, str]]:
         for link in _PAGE.finditer(row["pages"]):
             page = os.path.normpath(link["page"])
             if page in pages and page not in placed:
-                tree.setdefault(row["shelf"], {})[page] = link["name"]
+                tree.setdefault(row["shelf"], {})[page] = link["name"].replace("`", "")
                 placed.add(page)
     for page in sorted(set(pages) - placed):
         shelf = _SHELF_OF_FOLDER.get(page.split("/")[0], "reference")
