@@ -33,7 +33,7 @@ def numbers(size: Size) -> list[Number]:
     if size == "smallest":
         case = load_case(shipped_cases()["demo-valve-axisymmetric"])
     else:
-        case = solid_valve(1.0, 18) if size == "quick" else solid_valve(0.45, 40)
+        case = solid_valve(2.0, 9) if size == "quick" else solid_valve(0.45, 40)
     run = case.run.model_copy(update={"duration": steps * case.run.full_step})
     study = run_impact(case.model_copy(update={"run": run}), levels=("full",))
     full = study.levels["full"]

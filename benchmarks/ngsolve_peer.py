@@ -51,8 +51,8 @@ class _Modal:
 
 def numbers(size: Size) -> list[Number]:
     """Processor times of both, their ratios, and how far their frequencies are apart."""
-    scale, layers = {"smallest": (3.0, 6), "quick": (1.5, 10), "full": (1.0, 18)}[size]
-    count = 5 if size == "smallest" else 40
+    scale, layers = {"smallest": (3.0, 6), "quick": (2.0, 9), "full": (1.0, 18)}[size]
+    count = {"smallest": 5, "quick": 20, "full": 40}[size]
     mesh = straightened(build_bodies(solid_valve(scale, layers), silent).lower.mesh)
     with threadpool_limits(limits=1):
         klack = _by_klack(mesh, count)

@@ -24,7 +24,7 @@ def numbers(size: Size) -> list[Number]:
     if size == "smallest":
         case = load_case(shipped_cases()["demo-valve-axisymmetric"])
     else:
-        case = solid_valve(1.0, 18) if size == "quick" else solid_valve(0.55, 28)
+        case = solid_valve(2.0, 9) if size == "quick" else solid_valve(0.55, 28)
     begin = perf_counter()
     problem = build_problem(case, silent)
     pools = mode_pools(problem, at_least=_MODES, progress=silent)

@@ -16,7 +16,7 @@ _KLACK = [sys.executable, "-m", "klack"]
 
 def numbers(size: Size) -> list[Number]:
     """Wall-clock of fresh processes; the interpreter's own start is part of all but the import."""
-    repeats = {"smallest": 1, "quick": 3, "full": 7}[size]
+    repeats = {"smallest": 1, "quick": 2, "full": 7}[size]
     bare = _best([sys.executable, "-c", "pass"], repeats)
     found = [
         Number(name="klack --help", value=_best([*_KLACK, "--help"], repeats), unit="s", goal=0.5),

@@ -43,7 +43,7 @@ def numbers(size: Size) -> list[Number]:
         valve = valves()["dry"]
         return [_row("dry: fine step", ns_per_step(valve, coarse=1, steps=500, repeats=1), "ns")]
     books = books_rows()
-    found = _with_accuracy(speed_rows(), books) + books
+    found = _with_accuracy(speed_rows(8 if size == "quick" else 25), books) + books
     if size == "full":
         found += step_rows() + cvode_rows()
     return [replace(number, name=f"stroke, {number.name}") for number in found]
@@ -98,21 +98,21 @@ def ns_per_step(valve: Network, *, coarse: int, steps: int = 20_000, repeats: in
     return best * 1e9
 
 
-def closed_ns_per_step(*, wet: bool, steps: int = 20_000, repeats: int = 25) -> float:
+def closed_ns_per_step(*, wet: bool, steps: int = 20_000, repeats: int) -> float:
     """The same of a needle pressed onto its seat: all contacts closed, nothing moves."""
     valve = whole_valve(driver=VoltageStep(voltage=12.0, start=1.0))
     return ns_per_step(valve if wet else valve.dry(), coarse=1, steps=steps, repeats=repeats)
 
 
-def speed_rows() -> list[Number]:
+def speed_rows(repeats: int = 25) -> list[Number]:
     """Speed of fine steps, and of a stroke of 10 ms."""
     rows = []
     goals = {"dry": 75.0, "wet": 140.0}
     for name, valve in valves().items():
-        rows.append(_row(f"{name}: fine step", ns_per_step(valve, coarse=1), "ns", goals[name]))
-        rows.append(
-            _row(f"{name}: fine step, closed at rest", closed_ns_per_step(wet=name == "wet"), "ns")
-        )
+        moving = ns_per_step(valve, coarse=1, repeats=repeats)
+        closed = closed_ns_per_step(wet=name == "wet", repeats=repeats)
+        rows.append(_row(f"{name}: fine step", moving, "ns", goals[name]))
+        rows.append(_row(f"{name}: fine step, closed at rest", closed, "ns"))
     for name, valve in valves().items():
         runs = [stroke(valve, STROKE, coarse=COARSE) for _ in range(7)]
         best = min(runs, key=lambda result: result.wall_time)
