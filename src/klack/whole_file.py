@@ -23,7 +23,7 @@ from tempfile import mkdtemp
 from klack.errors import InputError
 from klack.folder_lock import FolderLock, locked, try_lock
 
-__all__ = ["outdated", "standing", "whole_file", "whole_files"]
+__all__ = ["in_exchange", "outdated", "standing", "whole_file", "whole_files"]
 
 Refusal = Callable[[Path, OSError], InputError]
 
@@ -123,6 +123,14 @@ def standing(folder: Path, name: str) -> Path:
     except OSError:
         stages = []
     return stages[0] if stages else folder / name
+
+
+def in_exchange(folder: Path) -> bool:
+    """Tell whether somebody writes into a folder at this moment, or was killed while he did."""
+    try:
+        return any(True for _ in folder.glob(f"{_STAGE}*"))
+    except OSError:
+        return True
 
 
 # --------------------------------------------------------------------------- moving

@@ -230,13 +230,16 @@ def main(arguments: list[str]) -> None:
         found = small(folder)
     else:
         words = json.loads(arguments[0])
-        warm(words)
+        warm()
         found = command(words, folder, int(arguments[2]))
     print(json.dumps(found))
 
 
-def warm(words: list[str]) -> None:
-    """Load what takes long, once for all children; nothing that starts threads."""
+def warm() -> None:
+    """Load what takes long, once for all children.
+
+    Nothing is computed: threads, such as those of OpenCASCADE, do not come along into a child.
+    """
     import importlib
 
     modules = ["scipy.sparse.linalg", "zarr", "klack.cli.stored", "klack.case.valve_reader"]
@@ -245,16 +248,6 @@ def warm(words: list[str]) -> None:
     modules += [f"klack.workflow.{name}store" for name in ("", "stroke_", "shots_", "noise_")]
     for name in modules:
         importlib.import_module(name)
-    if words[0] in ("impact", "reduce"):
-        from klack.case import find_case, load_case
-        from klack.workflow.impact import run_impact
-
-        run_impact(load_case(find_case(words[1])), levels=("reduced",), certify=False, threads=1)
-    if words[0] == "stroke":
-        from klack.case.valve_reader import load_valve_case
-        from klack.workflow.stroke import run_stroke
-
-        run_stroke(load_valve_case(Path(words[1])), threads=1)
 
 
 if __name__ == "__main__":

@@ -276,6 +276,21 @@ def test_a_folder_takes_the_place_of_a_file_and_of_a_link(tmp_path: Path):
     assert names(tmp_path / "elsewhere") == []
 
 
+def test_rival_writers_and_a_reader(tmp_path: Path):
+    """What is read is one result, whichever; a reader that is always too late says so."""
+    program = [sys.executable, str(DATA / "rival_writers.py"), str(tmp_path), f"{3 * LONGER}"]
+    done = subprocess.run(program, env=ALONE, capture_output=True, text=True, check=True)
+
+    found = json.loads(done.stdout)
+    assert found["codes"] == [0, 0]
+    assert found["read"] > 3
+    assert found["mixed"] == 0
+    late = "a result that is written again and again while it is read"
+    assert set(found["errors"]) <= {late, "no klack result"}  # the last: before the first one
+    assert len(found["errors"]) < 0.2 * found["read"] + 200
+    assert found["left"] == ["result.zarr"]
+
+
 def test_a_lock_is_waited_for_and_not_for_ever(tmp_path: Path):
     lock = try_lock(tmp_path)
     assert lock is not None

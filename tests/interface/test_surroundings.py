@@ -133,7 +133,7 @@ def test_a_disk_that_fills_at_any_time(result: Path, small_disk: Path):
         ),
     ]
     refused = 0
-    for room in (0, 4096, 65_536, 160_000):
+    for room in (0, 65_536):
         ballast.write_bytes(bytes(max(free - room, 0) // 4096 * 4096))
         for words, (code, said) in zip(commands, run(commands, small_disk.parent), strict=True):
             refused += code == 2
@@ -149,7 +149,7 @@ def test_a_disk_that_fills_at_any_time(result: Path, small_disk: Path):
             shutil.rmtree(small_disk / name, ignore_errors=True)
         (small_disk / "x.json").unlink(missing_ok=True)
         ballast.unlink()
-    assert refused >= 8
+    assert refused >= 6
 
 
 def test_a_report_without_room_keeps_the_result(tmp_path: Path, monkeypatch, capsys):
@@ -277,7 +277,7 @@ def test_two_processes_write_into_one_folder(tmp_path: Path):
     program = [sys.executable, str(DATA / "several_commands.py")]
     running = [
         subprocess.Popen(
-            [*program, json.dumps([words] * 3)],
+            [*program, json.dumps([words] * 2)],
             cwd=tmp_path,
             env=ALONE,
             stdout=subprocess.PIPE,
@@ -296,7 +296,7 @@ def test_two_processes_write_into_one_folder(tmp_path: Path):
     for process in running:
         out, err = process.communicate()
         assert process.returncode == 0, err
-        assert [code for code, _ in json.loads(out)] == [0, 0, 0]
+        assert [code for code, _ in json.loads(out)] == [0, 0]
     assert seen <= {1.0, 2.0, "no klack result"}  # the last one before there is any
     names = sorted(path.name for path in (tmp_path / "r").iterdir())
     assert names == ["report.html", "report.pdf", "result.zarr"]

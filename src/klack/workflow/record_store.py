@@ -6,13 +6,14 @@ a Zarr reader would silently take for zeros, and one of each group finds damaged
 """
 
 import json
+import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from urllib.parse import quote
 from zlib import crc32
 
@@ -20,12 +21,14 @@ import numpy as np
 import zarr
 
 from klack.errors import InputError
-from klack.whole_file import standing, whole_file
+from klack.whole_file import in_exchange, standing, whole_file
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 
+Found = TypeVar("Found")
+
 RESULT_NAME = "result.zarr"
-_TRIES = 5
+_TRIES, _PAUSE = 10, 0.01  # [-], [s]: files move to their place in milliseconds
 _LARGEST = 4_000_000_000  # bytes; the largest results have some 100 MB
 
 
@@ -86,16 +89,21 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
     -----
     A result that another process replaces meanwhile is read again: no numbers of two results mix.
     """
+    return _steadily(folder, lambda path: _load(path, form))
+
+
+def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
+    """What is read from the store of a folder; again, where it was replaced meanwhile."""
     for _ in range(_TRIES):
-        path, mark = _find(folder)
+        place = _find(folder)
         try:
-            record = _load(path, form)
+            found = read(place[0])
         except InputError:
-            if _find(folder) == (path, mark):
+            if _find(folder) == place:
                 raise
         else:
-            if _find(folder) == (path, mark):
-                return record
+            if _find(folder) == place:
+                return found
     raise _damaged(folder, "a result that is written again and again while it is read")
 
 
@@ -132,7 +140,7 @@ def _load(path: Path, form: RecordFormat) -> Any:
 
 def stored_format(folder: Path) -> str:
     """Name of the format of the result in a folder."""
-    return str(_open(_find(folder)[0])[1].get("format"))
+    return _steadily(folder, lambda path: str(_open(path)[1].get("format")))
 
 
 def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
@@ -143,16 +151,24 @@ def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
         raise _damaged(path, f"a store that does not open ({error})") from error
 
 
-def _find(folder: Path) -> tuple[Path, int]:
-    """Place of a store, and the number by which the file system knows this very one."""
+def _find(folder: Path) -> tuple[Path, tuple[int, int]]:
+    """Place of a store, and what tells this very one from others: its number, and when it was made.
+
+    The number alone is given again to the next folder.
+    """
     if folder.name == RESULT_NAME:
         folder = folder.absolute().parent
-    for path in (standing(folder, RESULT_NAME), folder):
-        try:
-            if (path / "zarr.json").is_file():
-                return path, path.stat().st_ino
-        except OSError:  # moved at this moment, or not for this user
-            continue
+    for _ in range(_TRIES):
+        for path in (standing(folder, RESULT_NAME), folder / RESULT_NAME, folder):
+            try:
+                if (path / "zarr.json").is_file():
+                    state = path.stat()
+                    return path, (state.st_ino, state.st_mtime_ns)
+            except OSError:  # moved at this moment, or not for this user
+                continue
+        if not in_exchange(folder):
+            break
+        time.sleep(_PAUSE)
     raise InputError(
         f"result {folder}",
         got="no klack result" if folder.exists() else "a folder that does not exist",
