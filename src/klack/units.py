@@ -60,6 +60,12 @@ _ATOM = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)-?\d(?:\.\d)?)?"
 _UNIT = rf"(?:1 ?/ ?)?{_ATOM}(?: ?[*/·] ?{_ATOM}| {_ATOM})*"
 _QUANTITY = re.compile(rf"(?P<number>{_NUMBER}) ?(?P<unit>{_UNIT})?")
 _LONGEST = 60
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def _with_prefixes(unit: str) -> dict[str, float]:
+    """Size of a unit under every prefix that :func:`format_si` writes."""
+    return {prefix + unit: float(f"1e{power}") for power, prefix in _PREFIXES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +107,14 @@ ANGLE = Kind(
     "rad",
     "40 deg",
     ("deg", "rad"),
-    {"deg": pi / 180, "degree": pi / 180, "°": pi / 180, "rad": 1.0, "mrad": 1e-3},
+    {"deg": pi / 180, "degree": pi / 180, "°": pi / 180, **_with_prefixes("rad")},
 )
 FREQUENCY = Kind(
     "a frequency",
     "Hz",
     "900 kHz",
     ("Hz", "kHz", "MHz"),
-    {"mHz": 1e-3, "Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "GHz": 1e9},
+    _with_prefixes("Hz"),
 )
 RATE = Kind(
     "a rate",
@@ -307,14 +313,15 @@ def _refuse(where: str, value: object, kind: Kind, hint: str, came: str = "") ->
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:
-    """Write a number with a decimal prefix, as people read it.
+    """Write a number with a decimal prefix, as people read it; :func:`parse_quantity` reads it.
 
     Parameters
     ----------
     value : float
         In ``unit``.
     unit : str
-        SI unit without prefix; ``"-"`` or ``""`` writes the plain number.
+        SI unit without prefix; ``"-"`` or ``""`` writes the plain number.  Temperatures, rates
+        (1/s), powers (m^2) and what is counted in kg get no prefix.
     digits : int
         Significant digits.
 
@@ -330,12 +337,12 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     if value == 0 or not isfinite(value):
         return f"{value:g} {unit}"
     rounded = abs(float(f"{value:.{digits}g}"))
-    prefixes = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-    if unit.startswith("kg") or "^" in unit.split("/")[0]:
+    plain = unit in ("K", "deg", "%") or unit.startswith(("kg", "1/"))
+    if plain or "^" in unit.split("/")[0]:
         return f"{value:.{digits}g} {unit}"
-    power = next((p for p in sorted(prefixes, reverse=True) if rounded >= 10.0**p), -15)
+    power = next((p for p in sorted(_PREFIXES, reverse=True) if rounded >= 10.0**p), -15)
     scaled = float(f"{value / 10.0**power:.{digits}g}")
-    return f"{scaled:.{max(digits, 3)}g} {prefixes[power]}{unit}"  # 450 nm, not 4.5e+02 nm
+    return f"{scaled:.{max(digits, 3)}g} {_PREFIXES[power]}{unit}"  # 450 nm, not 4.5e+02 nm
 
 
 def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:

@@ -10,7 +10,7 @@ from klack import units
 from klack.errors import InputError
 from klack.units import format_si, parse_quantity
 
-KINDS = [units.LENGTH, units.TIME, units.FORCE, units.STIFFNESS, units.PRESSURE]
+KINDS = list(units.KINDS)
 VALUES = st.builds(
     lambda sign, power: sign * float(np.exp(power * np.log(10.0))),
     st.sampled_from([1.0, -1.0]),
@@ -21,14 +21,14 @@ VALUES = st.builds(
 @examples(100)
 @given(VALUES, st.sampled_from(KINDS))
 def test_plain_numbers_are_read_as_written(value, kind):
-    text = f"{value!r} {kind.unit}"
+    text = repr(value) if kind.bare else f"{value!r} {kind.unit}"
     assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-14)
 
 
 @examples(100)
 @given(VALUES, st.sampled_from(KINDS), st.integers(2, 9))
 def test_what_people_read_can_be_read_back(value, kind, digits):
-    """Half a unit of the last digit, whatever the prefix (a frequency is read from mHz on)."""
+    """Half a unit of the last digit, whatever the prefix, for every kind that klack knows."""
     text = format_si(value, kind.unit, digits)
     assert parse_quantity(text, kind) == pytest.approx(value, rel=0.501 * 10.0 ** (1 - digits))
 
@@ -39,6 +39,25 @@ def test_a_length_is_the_same_in_every_unit(value, unit):
     name, metres = unit
     read = parse_quantity(f"{value / metres!r} {name}", units.LENGTH)
     assert read == pytest.approx(value, rel=1e-14)
+
+
+@examples(60)
+@given(VALUES, st.sampled_from(["uHz", "nHz", "urad", "mrad"]))
+def test_a_prefix_is_a_power_of_ten_in_tables_of_units_as_well(value, unit):
+    kind = units.FREQUENCY if unit.endswith("Hz") else units.ANGLE
+    factor = {"u": 1e-6, "n": 1e-9, "m": 1e-3}[unit[0]]
+    assert parse_quantity(f"{value!r} {unit}", kind) == pytest.approx(value * factor, rel=1e-14)
+
+
+@examples(60)
+@given(st.floats(allow_nan=False), st.sampled_from(KINDS), st.integers(1, 17))
+def test_any_number_can_be_written_for_people(value, kind, digits):
+    text = format_si(value, kind.unit, digits)
+    assert len(text) < 40
+    # rounded to a few digits the largest numbers there are would be infinite
+    if np.isfinite(value) and (value == 0.0 or 1e-280 < abs(value) < 1e300):
+        read = parse_quantity(text, kind)
+        assert read == pytest.approx(value, rel=0.501 * 10.0 ** (1 - min(digits, 14)))
 
 
 @examples(60)
