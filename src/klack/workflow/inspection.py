@@ -146,7 +146,7 @@ def _mesh_rows(model: MeshModel) -> Iterator[Row]:
         yield "elements", family, str(count)
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     for axis, a, b in zip("rz" if mesh.dimension == 2 else "xyz", low, high, strict=True):
-        yield "extent", axis, f"{a * 1e3:.6g} to {b * 1e3:.6g} mm"
+        yield "extent", axis, _range(np.array([a, b]))
     yield "edges", "", f"{summary.smallest_edge * 1e3:.3g} to {summary.largest_edge * 1e3:.3g} mm"
     yield "worst element", f"quality {summary.worst_quality:.2f}", summary.worst_element
     yield "volume", "", f"{corner_volume(mesh) * 1e9:.6g} mm^3"
