@@ -211,7 +211,7 @@ def plain(folder: Path) -> object:
 
     def without(value: object) -> object:
         if isinstance(value, dict):
-            clocks = ("wall_time_s", "stage_times_s", "setup_time_s", "created", "resumed")
+            clocks = ("stage_times_s", "setup_time_s", "created", "resumed", "real_time_factor")
             return {
                 key: without(item)
                 for key, item in value.items()
