@@ -21,7 +21,7 @@ def numbers(size: Size) -> list[Number]:
     Beside each stands the energy residual of an impact with that many modes.
     """
     counts = _COUNTS[size]
-    repeats = 2 if size == "smallest" else 20
+    repeats = 10 if size == "smallest" else 20
     found = []
     for closed in (False, True):
         words = "contact" if closed else "flight"

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from number import Number, Size
 from small_valve import Motion, by_cvode, by_klack, network
+from threadpoolctl import threadpool_limits
 
 from klack.magnetics.voltage_step import VoltageStep
 from klack.network.network import Network
@@ -182,6 +183,14 @@ def step_rows() -> list[Number]:
 
 def cvode_rows() -> list[Number]:
     """Time of klack and of CVODE at equal error of the state, on one small valve."""
+    import sksundae.cvode  # noqa: F401  (loaded before the limit, which reaches what is loaded)
+
+    # small matrices gain nothing from several threads
+    with threadpool_limits(limits=1):
+        return _cvode_rows()
+
+
+def _cvode_rows() -> list[Number]:
     rows = []
     for name, modes in product(("dry", "wet"), (5, 20, 80)):
         exact, ours, theirs = _both(wet=name == "wet", modes=modes)
