@@ -15,9 +15,9 @@ from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.simulation.impact import simulate_impact
 from klack.units import format_si
-from klack.workflow.advice import Advice, Counsel, Fixed, Measured, settle
+from klack.workflow.advice import Advice, Fixed, Measured
+from klack.workflow.advice_affordable import affordable
 from klack.workflow.advice_cost import fits, larger, memory_of, time_of
-from klack.workflow.advice_ladder import Measure
 from klack.workflow.advice_modes import (
     counted,
     explicit_modes,
@@ -65,7 +65,6 @@ _REST_OF_LARGE = (2.0, 1.0, 0.5)
 _LARGE = 50_000  # degrees of freedom of finest meshes that take seconds
 _GROWTH = 6  # of the degrees of freedom with a quarter of the size: 4 to 7 on shipped cases
 _COARSE = (1.5, 1.0)
-_LOOSER = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
 # lowest orders measured on shipped cases: contact of curved faces, corners of a body, the circle
 _CONTACT_ORDER, _REST_ORDER, _LAYER_ORDER = 1.4, 1.0, 2.0
 
@@ -176,7 +175,15 @@ def advise_impact(
         meshes, finest = _mesh_ladders(base, family, judged, log, progress, threads)
         measured = [*meshes, *measured]
         _unmeshed(case, log)
-        counsels, dofs = _affordable(base, family, measured, fixed, measures, log)
+        counsels, dofs, dear = affordable(
+            measured,
+            fixed,
+            measures,
+            size_with=lambda values: _size_with(base, family, values),
+            present=base.dofs,
+            dimension=case.dimension,
+        )
+        log.notes += [dear] if dear else []
         advice = Advice(
             case=case.name,
             title=case.title,
@@ -493,34 +500,6 @@ def _unmeshed(case: Case, log: _Log) -> None:
     for name in (case.contact.moving.body, case.contact.stop.body):
         if case.bodies[name].mesh is None:
             log.notes.append(unmeshed_note(name, case.bodies[name]))
-
-
-def _affordable(
-    base: _Base,
-    family: _Family,
-    measured: Sequence[Measured],
-    fixed: Sequence[Fixed],
-    measures: Sequence[Measure],
-    log: _Log,
-) -> tuple[tuple[Counsel, ...], int]:
-    """Advice whose meshes fit into the memory, for a looser target if need be; and their size."""
-    needed = 0
-    for looser in _LOOSER:
-        limits = [replace(measure, limit=looser * measure.limit) for measure in measures]
-        counsels = settle(measured, fixed, limits)
-        dofs = _size_with(base, family, {k: v for c in counsels for k, v in c.changes.items()})
-        needed = needed or dofs
-        if fits(dofs, base.case.dimension):
-            break
-    if looser > 1.0:
-        memory = memory_of(needed, base.case.dimension)
-        log.notes.append(
-            f"The meshes for this target would have about {needed:.2g} degrees of freedom and need "
-            f"{memory / 1e9:.2g} GB, more than half of what is free: the advice is for {looser:g} "
-            "times the target. Try: bodies as axisymmetric half sections where the support allows "
-            "it, or another machine."
-        )
-    return counsels, dofs
 
 
 def _size_with(base: _Base, family: _Family, changes: Mapping[Key, float]) -> int:

@@ -1,4 +1,4 @@
-"""``klack advise`` for a whole valve: step, modes and meshes by the first impact on every stop.
+"""``klack advise`` for a whole valve: step, modes and meshes by the first impact on each stop.
 
 Later impacts are chaotic and tell nothing about convergence, so none is judged.
 """
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from klack.case.bodies import ModeChoice
 from klack.case.valve import ValveCase, Variant
+from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
-from klack.workflow.advice import Advice, Measured, settle
+from klack.workflow.advice import Advice, Measured
+from klack.workflow.advice_affordable import affordable
 from klack.workflow.advice_cost import time_of
 from klack.workflow.advice_ladder import Ladder, Measure, score
 from klack.workflow.advice_regions import mesh_settings, unmeshed_note
@@ -23,7 +25,7 @@ from klack.workflow.advice_settings import Setting, SettingValue, applied
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import collected_warnings
 from klack.workflow.stroke import run_variant, variant_network
-from klack.workflow.valve import Valve, build_valve
+from klack.workflow.valve import Valve, build_valve, build_valve_bodies
 
 __all__ = ["advise_stroke", "first_impacts", "stroke_measures"]
 
@@ -38,15 +40,16 @@ def stroke_measures(error: float) -> tuple[Measure, ...]:
     Parameters
     ----------
     error : float [-]
-        Accepted for the time of the impact (of its time since the start), peak force, contact
-        time, and absolutely for the restitution.
+        Accepted for the time of the impact (of its time since the start), peak force, and
+        absolutely for the restitution.  The contact time comes in whole steps and is only reported.
     """
-    names = ("impact time", "peak force", "contact time", "restitution")
-    return tuple(Measure(name=name, limit=error) for name in names)
+    names = ("impact time", "peak force", "restitution")
+    judged = [Measure(name=name, limit=error) for name in names]
+    return (*judged, Measure(name="contact time"))
 
 
 def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArray[np.float64]]:
-    """Time, peak force, contact time, restitution of the first impact on every stop, shape (4,).
+    """Time, peak force, restitution, contact time of the first impact on every stop, shape (4,).
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArr
     found: dict[str, NDArray[np.float64]] = {}
     for event in result.events:
         if event.stop not in found:
-            numbers = (event.time, event.peak_force, event.contact_time, event.restitution)
+            numbers = (event.time, event.peak_force, event.restitution, event.contact_time)
             found[event.stop] = np.array(numbers)
     return found
 
@@ -79,7 +82,7 @@ def _deviation(
     for stop, numbers in reference.items():
         if stop not in run:
             return np.ones(4)
-        scale = np.append(np.maximum(numbers[:3], 1e-300), 1.0)
+        scale = np.array([numbers[0], numbers[1], 1.0, numbers[3]])
         worst = np.maximum(worst, np.nan_to_num(np.abs(run[stop] - numbers) / scale))
     return worst
 
@@ -101,7 +104,7 @@ def advise_stroke(
     ----------
     case : ValveCase
     error : float [-]
-        Accepted for time, peak force and contact time of first impacts, and for their restitution.
+        Accepted for time and peak force of first impacts, and for their restitution.
     confirm : bool
         Run the advised valve and lay it over the one with everything finest.
     progress : callable
@@ -148,6 +151,16 @@ def advise_stroke(
         log += [
             unmeshed_note(name, body) for name, body in case.bodies.items() if body.mesh is None
         ]
+        dofs = _dofs(valve.bodies)
+        counsels, size, dear = affordable(
+            measured,
+            (),
+            measures,
+            size_with=lambda values: _dofs(build_valve_bodies(applied(case, values), silent)),
+            present=dofs,
+            dimension=next(iter(valve.bodies.values())).dimension,
+        )
+        log += [dear] if dear else []
         advice = Advice(
             case=case.name,
             title=case.title,
@@ -155,13 +168,13 @@ def advise_stroke(
             measures=measures,
             up_to=float("nan"),
             band_from_case=False,
-            counsels=settle(measured, (), measures),
+            counsels=counsels,
+            dofs=(dofs, size),
         )
         runs = 2 + len(settings)
         if confirm:
             progress("advised case", 0.0)
-            dofs = sum(len(body.free) for body in valve.bodies.values())
-            advice = _confirmed(case, advice, now, dofs, threads)
+            advice = _confirmed(case, advice, now, threads)
             runs += 2
     return replace(
         advice,
@@ -256,7 +269,6 @@ def _confirmed(
     case: ValveCase,
     advice: Advice,
     now: Mapping[str, NDArray[np.float64]],
-    dofs: int,
     threads: int | None,
 ) -> Advice:
     """Lay the valve and the advised one over one with everything finest."""
@@ -264,15 +276,17 @@ def _confirmed(
     for item in advice.counsels:
         finest.update(item.measured.setting.at(min(item.measured.ladder.factors)))
     reference = _impacts(applied(case, finest), threads)
-    valve = build_valve(applied(case, advice.changes), silent, threads=threads)
-    advised = first_impacts(valve)
+    advised = _impacts(applied(case, advice.changes), threads)
     return replace(
         advice,
-        dofs=(dofs, sum(len(body.free) for body in valve.bodies.values())),
         checked=(_deviation(reference, now), _deviation(reference, advised)),
         check_words="both run again, against the valve with the finest meshes, twice the modes and "
         "half the step",
     )
+
+
+def _dofs(bodies: Mapping[str, ElasticBody]) -> int:
+    return sum(len(body.free) for body in bodies.values())
 
 
 def _growth(advice: Advice) -> float:

@@ -113,8 +113,8 @@ def _verdict(advice: Advice) -> str:
     if advice.meets:
         return "The case is expected to miss the target, and the advised one to meet it."
     return (
-        "The target is not reached: the advice is as far as the runs can be extrapolated, and the "
-        "last column says what remains."
+        "The target is not reached: the advice goes as far as the runs can be extrapolated and the "
+        "meshes be afforded; what remains is in the sum."
     )
 
 

@@ -30,7 +30,7 @@ from klack.workflow.progress import Progress, silent
 from klack.workflow.stops import StopContact, build_stop, split_law, stop_law
 from klack.workflow.structures import valve_structures
 
-__all__ = ["Valve", "build_valve", "filled_network"]
+__all__ = ["Valve", "build_valve", "build_valve_bodies", "filled_network"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +72,7 @@ def build_valve(
     InputError
         For geometry, surfaces, supports or connections that cannot be used.
     """
-    bodies = _build_bodies(case, progress)
+    bodies = build_valve_bodies(case, progress)
     flexibilities: dict[str, Flexibility] = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("factorise", i / len(bodies))
@@ -115,7 +115,7 @@ def build_valve(
     )
 
 
-def _build_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
+def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
     """Mesh every body, fine at the first touch of each of its stops."""
     places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
     for stop in case.stops.values():
