@@ -5,8 +5,10 @@ any other number.
 """
 
 import os
+from math import exp, log
 
 from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
 
 _COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
 _asked = os.environ.get("KLACK_PROPERTIES", "")
@@ -19,3 +21,8 @@ def examples(usual: int) -> settings:
     # a slow property has few examples as usual, and fewer than others in a long run
     most = 1000 if _asked == "long" else int(_asked)
     return settings(max_examples=max(usual, min(most, 40 * usual)), **_COMMON)
+
+
+def log_range(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers between two bounds, every decade alike."""
+    return st.floats(log(low), log(high)).map(exp)

@@ -1,7 +1,7 @@
 """Land face: the ring of a narrow gap, over which the pressure falls."""
 
 from collections.abc import Mapping
-from math import log, pi
+from math import expm1, log1p, pi
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -22,7 +22,9 @@ def land_areas(inner: float, outer: float) -> tuple[float, float]:
     .. math:: A_1 = \pi\,(s - r_1^2), \qquad A_2 = \pi\,(r_2^2 - s), \qquad
               s = \frac{r_2^2 - r_1^2}{2 \ln(r_2/r_1)}
 
-    from the laminar radial flow ``p(r) = p_1 + (p_2 - p_1) ln(r/r_1)/ln(r_2/r_1)``.
+    from the laminar radial flow ``p(r) = p_1 + (p_2 - p_1) ln(r/r_1)/ln(r_2/r_1)``.  With
+    ``x = 2 ln(r_2/r_1)`` and ``f(x) = (e^x - 1 - x)/x`` they are ``pi r_1^2 f(x)`` and
+    ``-pi r_2^2 f(-x)``, which keeps its digits for narrow lands.
 
     Parameters
     ----------
@@ -39,8 +41,18 @@ def land_areas(inner: float, outer: float) -> tuple[float, float]:
     >>> round((inside + outside) / (pi * (1.0e-6 - 0.81e-6)), 12)
     1.0
     """
-    s = (outer - inner) * (outer + inner) / (2.0 * log(outer / inner))
-    return pi * (s - inner**2), pi * (outer**2 - s)
+    x = 2.0 * log1p((outer - inner) / inner)
+    return pi * inner**2 * _beyond_straight(x), -pi * outer**2 * _beyond_straight(-x)
+
+
+def _beyond_straight(x: float) -> float:
+    """``(e^x - 1 - x)/x``, also for small ``x``."""
+    if abs(x) > 0.5:
+        return (expm1(x) - x) / x
+    total = 0.0
+    for n in range(16, 1, -1):  # x/2! + x^2/3! + ..., the last ones first
+        total = x / n * (1.0 + total)
+    return total
 
 
 class LandFace(Component):
