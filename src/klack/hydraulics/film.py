@@ -75,7 +75,8 @@ class Film(Section):
     can take, ``B/(2 h_r^2)``; without it a viscous film would never let the faces touch.
 
     With ``roughness`` the film of the same height is harder: asperities stand in the way of the
-    fluid (:func:`mean_flow_factor`).  While the faces part the film pulls, at most with ``(p - p_cav) A``: then it cavitates.
+    fluid (:func:`mean_flow_factor`).  While the faces part the film pulls, at most with
+    ``(p - p_cav) A``: then it cavitates.
 
     Limits: both edges at one constant pressure; no inertia of the fluid (``rho h V / mu`` up to
     about 1); rigid faces in parallel (the bodies' own compliance is in series, see
