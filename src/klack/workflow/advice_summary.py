@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from klack.input.problem import Key
 from klack.units import format_si
 from klack.workflow.advice import Advice, Counsel
-from klack.workflow.advice_ladder import REACH, Measure
+from klack.workflow.advice_ladder import REACH, Measure, score
 from klack.workflow.advice_settings import SettingValue
 
 __all__ = ["ADVICE_COLUMNS", "advice_lines", "advice_rows", "advice_to_json"]
@@ -113,9 +113,14 @@ def _verdict(advice: Advice) -> str:
     if advice.meets:
         return "The case is expected to miss the target, and the advised one to meet it."
     return (
-        "The target is not reached: the advice goes as far as the runs can be extrapolated and the "
-        "meshes be afforded; what remains is in the sum."
+        "By the sum of expected errors the target is not reached: the advice goes as far as the "
+        "runs can be extrapolated and the meshes be afforded."
+        + (" Run again, the advised case is within it." if _within(advice) else "")
     )
+
+
+def _within(advice: Advice) -> bool:
+    return advice.checked is not None and score(advice.checked[1], advice.measures) <= 1.0
 
 
 def _band(advice: Advice) -> str:
