@@ -47,9 +47,9 @@ NO_LAW = -1
 """``kind`` of an interface without a contact: only a film."""
 
 _LINEAR, _TABLE = LAW_LINEAR, LAW_TABLE
-_FORCE_LEFT = 1e-9  # [N] accepted error of a force
-_ROUND_OFF = 1e-17  # [m]
-_UNKNOWN = 1e18  # [N/m^2] curvature of a law, where it is not looked up: Newton step < 3e-14 m
+_FORCE_LEFT = 1e-11  # accepted error of a force over the force
+_STEP_LEFT = 3e-7  # last Newton step over the indentation, where the curvature is not looked up
+_ROUND_OFF = 1e-15  # of the equation, over its gaps
 _LEFT_BY_FILM = 0.01  # share of the compression that a film must have made to end at first touch
 _NEWTON_LIMIT = 100
 _SERIES = 0.05  # below it the logarithm is a short series
@@ -337,8 +337,10 @@ def _film_alone(
             slope = (damper + linear) * inverse * rate
             curvature = (3.0 * damper + linear) * inverse * inverse * rate
         step = excess / (1.0 + S * slope)
-        if abs(excess) < _ROUND_OFF or (
-            curvature * step * step < _FORCE_LEFT and step < z and not (pulled and step > 0.0)
+        if abs(excess) <= _ROUND_OFF * (z + abs(base)) or (
+            curvature * step * step <= _FORCE_LEFT * abs(film)
+            and step < z
+            and not (pulled and step > 0.0)
         ):
             film += slope * step
             if pulled or film >= -suction:
@@ -383,9 +385,9 @@ def _both(
     low, high = -np.inf, np.inf
     contact, film = 0.0, 0.0
     for _ in range(_NEWTON_LIMIT):
-        contact, stiffness, curvature = 0.0, 0.0, 0.0
+        contact, stiffness, curvature, longest = 0.0, 0.0, 0.0, np.inf
         if (z0 < 0.0 or z < 0.0) and kind != NO_LAW:
-            contact, stiffness, curvature, hint = _contact(kind, p, start, chi_over_h, z0, z, hint)
+            contact, stiffness, longest, hint = _contact(kind, p, start, chi_over_h, z0, z, hint)
         open1 = max(z, 0.0)
         x = open1 + cut_off
         inverse = 1.0 / x
@@ -398,12 +400,16 @@ def _both(
         if not pulled and (z > 0.0 or (z == 0.0 and excess < 0.0)):
             damper = cubic * inverse * inverse
             film_slope = (damper + linear) * inverse * rate
-            curvature += (3.0 * damper + linear) * inverse * inverse * rate
+            curvature = (3.0 * damper + linear) * inverse * inverse * rate
         step = excess / (1.0 + S * (stiffness + film_slope))
         after = z - step
         kinked = z == 0.0 or (z > 0.0) != (after > 0.0) or (pulled and step > 0.0)
         # taken without a look back, and before the bracket test: both its ends are round-off then
-        if abs(excess) < _ROUND_OFF or (not kinked and curvature * step * step < _FORCE_LEFT):
+        if abs(excess) <= _ROUND_OFF * (abs(z) + abs(base)) or (
+            not kinked
+            and abs(step) <= longest
+            and curvature * step * step <= _FORCE_LEFT * (contact + abs(film))
+        ):
             contact = max(contact + stiffness * step, 0.0)
             if pulled or film + film_slope * step >= -suction:
                 film += film_slope * step
@@ -429,19 +435,23 @@ def _both(
 def _contact(
     kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z: float, hint: int
 ) -> tuple[float, float, float, int]:
-    """Contact force, its slope over the indentation, its curvature, table interval."""
-    curvature = _UNKNOWN
+    """Contact force, its slope over the indentation, longest last Newton step, table interval."""
+    deep = -min(z0, z)
+    if chi_over_h * deep > 1.0:
+        deep = 1.0 / chi_over_h
+    longest = _STEP_LEFT * deep
     if kind == _LINEAR and z0 <= 0.0 and z <= 0.0:
         mean, slope = -0.5 * p[start] * (z0 + z), 0.5 * p[start]
-        curvature = 0.0 if chi_over_h == 0.0 else _UNKNOWN
+        if chi_over_h == 0.0:
+            longest = np.inf
     else:
         mean, slope, hint = mean_force(kind, p, start, -z0, -z, hint)
     if chi_over_h == 0.0:
-        return mean, slope, curvature, hint
+        return mean, slope, longest, hint
     factor = 1.0 + chi_over_h * (z0 - z)
     if factor <= 0.0:
-        return 0.0, 0.0, curvature, hint  # the law would pull
-    return mean * factor, slope * factor + mean * chi_over_h, curvature, hint
+        return 0.0, 0.0, longest, hint  # the law would pull
+    return mean * factor, slope * factor + mean * chi_over_h, longest, hint
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,7 +7,7 @@
 
 #include "klack_law.h"
 
-#define KLACK_ROUND_OFF 1e-17   /* [m] */
+#define KLACK_ROUND_OFF 1e-15   /* of the equation, over its gaps */
 #define KLACK_LEFT_BY_FILM 0.01 /* share of e that a film must have made to end at first touch */
 
 typedef struct {
@@ -81,8 +81,9 @@ static int klack_film_alone(const klack_interface *i, double S, double z0, doubl
             curvature = (3.0 * damper + i->linear) * inverse * inverse * rate;
         }
         step = excess / (1.0 + S * slope);
-        if (fabs(excess) < KLACK_ROUND_OFF ||
-            (curvature * step * step < KLACK_FORCE_LEFT && step < z && !(pulled && step > 0.0))) {
+        if (fabs(excess) <= KLACK_ROUND_OFF * (z + fabs(base)) ||
+            (curvature * step * step <= KLACK_FORCE_LEFT * fabs(film) && step < z &&
+             !(pulled && step > 0.0))) {
             film += slope * step;
             *force = film;
             if (pulled || film >= -i->suction) return 1;
@@ -93,15 +94,16 @@ static int klack_film_alone(const klack_interface *i, double S, double z0, doubl
     return 0;
 }
 
-/* contact force between two gaps; its slope over the indentation, its curvature */
-static klack_force klack_contact(const klack_interface *i, double z0, double z, double *curvature,
+/* contact force between two gaps; its slope over the indentation; longest last Newton step */
+static klack_force klack_contact(const klack_interface *i, double z0, double z, double *longest,
                                  int *hint) {
+    double deep = -klack_least(z0, z);
     if (i->kind == KLACK_LINEAR && z0 <= 0.0 && z <= 0.0 && i->chi == 0.0) {
         klack_force f = {-0.5 * i->law[0] * (z0 + z), 0.5 * i->law[0]};
-        *curvature = 0.0;
         return f;
     }
-    *curvature = 1e18; /* where it is not known: Newton step < 3e-14 m */
+    if (i->chi * deep > 1.0) deep = 1.0 / i->chi;
+    *longest = KLACK_STEP_LEFT * deep;
     return klack_damped_force(i->kind, i->law, i->chi, -z0, -z, hint);
 }
 
@@ -119,10 +121,11 @@ static klack_forces klack_both(const klack_interface *i, double theta, double z0
     for (turn = 0; turn < 100; turn++) {
         klack_force contact = {0.0, 0.0};
         double curvature = 0.0, film_slope = 0.0, open1 = klack_largest(z, 0.0);
+        double longest = INFINITY;
         double x = open1 + i->cut_off, inverse = 1.0 / x, film, excess, step, after;
         int pulled, kinked;
         if ((z0 < 0.0 || z < 0.0) && i->kind != KLACK_NO_LAW) {
-            contact = klack_contact(i, z0, z, &curvature, hint);
+            contact = klack_contact(i, z0, z, &longest, hint);
         }
         film = rate * klack_film_mean(i, x0, x, inverse0, inverse, open0 - open1);
         pulled = film <= -i->suction;
@@ -131,15 +134,16 @@ static klack_forces klack_both(const klack_interface *i, double theta, double z0
         if (!pulled && (z > 0.0 || (z == 0.0 && excess < 0.0))) {
             double damper = i->cubic * inverse * inverse;
             film_slope = (damper + i->linear) * inverse * rate;
-            curvature += (3.0 * damper + i->linear) * inverse * inverse * rate;
+            curvature = (3.0 * damper + i->linear) * inverse * inverse * rate;
         }
         step = excess / (1.0 + S * (contact.slope + film_slope));
         after = z - step;
         kinked = z == 0.0 || (z > 0.0) != (after > 0.0) || (pulled && step > 0.0);
         f.contact = contact.force;
         f.film = film;
-        if (fabs(excess) < KLACK_ROUND_OFF ||
-            (!kinked && curvature * step * step < KLACK_FORCE_LEFT)) {
+        if (fabs(excess) <= KLACK_ROUND_OFF * (fabs(z) + fabs(base)) ||
+            (!kinked && fabs(step) <= longest &&
+             curvature * step * step <= KLACK_FORCE_LEFT * (contact.force + fabs(film)))) {
             f.contact = klack_largest(contact.force + contact.slope * step, 0.0);
             if (pulled || film + film_slope * step >= -i->suction) {
                 f.film = film + film_slope * step;

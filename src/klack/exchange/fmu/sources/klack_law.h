@@ -11,7 +11,8 @@
 
 enum { KLACK_NO_LAW = -1, KLACK_LINEAR = 0, KLACK_HERTZ = 1, KLACK_TABLE = 2 };
 
-#define KLACK_FORCE_LEFT 1e-9 /* [N] accepted error of a force */
+#define KLACK_FORCE_LEFT 1e-11 /* accepted error of a force over the force */
+#define KLACK_STEP_LEFT 3e-7   /* last Newton step over the indentation */
 
 typedef struct {
     double force, slope;
@@ -120,7 +121,7 @@ static klack_force klack_mean_force(int kind, const double *p, double d0, double
     if (kind == KLACK_HERTZ) {
         double low = klack_least(d0, d1), high = klack_largest(d0, d1);
         f.force = klack_hertz_mean(p[0], p[1], klack_largest(low, 0.0), high);
-        if (high - low < 1e-16) {
+        if (high - low < 1e-8 * high) {
             f.slope = 0.5 * p[1] * f.force / high;
             return f;
         }
@@ -171,19 +172,24 @@ static double klack_solve_step(int kind, const double *p, double chi, double G, 
     if (d0 <= 0.0 && df <= 0.0) return 0.0;
     if (kind == KLACK_LINEAR && chi == 0.0) return klack_solve_linear(p[0], G, d0, df);
     for (turn = 0; turn < 60; turn++) {
-        double excess, step, curvature = 1e16; /* where it is not known: Newton step < 3e-13 m */
+        double excess, step;
+        int last;
         if (kind == KLACK_TABLE && chi == 0.0 && klack_within(p, *hint, d0, d1)) {
             const double *c = p + 1 + 6 * *hint;
             f = klack_cubic_mean(c, d0 - c[0], d1 - c[0]);
-            curvature = fabs(c[3]) + fabs(c[4]) * (d0 + 3.0 * d1 - 4.0 * c[0]);
+            excess = d1 - df + G * f.force;
+            step = excess / (1.0 + G * f.slope);
+            last = (fabs(c[3]) + fabs(c[4]) * (d0 + 3.0 * d1 - 4.0 * c[0])) * step * step <=
+                   KLACK_FORCE_LEFT * f.force;
         } else {
+            double deep = klack_largest(d0, d1);
             f = klack_damped_force(kind, p, chi, d0, d1, hint);
+            excess = d1 - df + G * f.force;
+            step = excess / (1.0 + G * f.slope);
+            if (chi * deep > 1.0) deep = 1.0 / chi;
+            last = fabs(step) <= KLACK_STEP_LEFT * deep;
         }
-        excess = d1 - df + G * f.force;
-        step = excess / (1.0 + G * f.slope);
-        if (curvature * step * step < KLACK_FORCE_LEFT) {
-            return klack_largest(f.force - f.slope * step, 0.0);
-        }
+        if (last) return klack_largest(f.force - f.slope * step, 0.0);
         if (excess > 0.0) {
             low = klack_largest(low, d1 - excess);
             high = d1;

@@ -12,7 +12,8 @@
 
 #define SOFT 100.0 /* [rad/s] slower modes are not counted from their rest position */
 #define SWEEPS 500
-#define SETTLED 1e-17 /* [m] */
+#define SETTLED 1e-11    /* change of a gap over the largest change that a force makes */
+#define ROUND_OFF 1e-16  /* of a gap: no film force is known better */
 #define MOST_STEPS 1e12
 #define LANES 8 /* of these sums, on every processor, so that all give the same numbers */
 
@@ -197,19 +198,21 @@ static int settle(klack_model *m, const double *free, klack_forces *f, double *F
         }
     }
     for (sweep = 0; sweep < SWEEPS; sweep++) {
-        double change = 0.0;
+        double change = 0.0, largest = 0.0, unseen = 0.0;
         for (c = 0; c < C; c++) {
             double own = free[c], before = F[c], guess = before;
+            double way = m->G[c][c] + 2.0 * klack_series[c] * !KLACK_FILMS;
             for (o = 0; o < C; o++) {
                 if (o != c) own += m->G[c][o] * F[o];
             }
             if (sweep == 0 && !KLACK_FILMS) guess = 2.0 * before - m->contacts[c].force_before;
             f[c] = one_force(m, c, own, guess);
             F[c] = f[c].contact + f[c].film;
-            change = klack_largest(change, fabs(F[c] - before) *
-                                               (m->G[c][c] + 2.0 * klack_series[c] * !KLACK_FILMS));
+            change = klack_largest(change, fabs(F[c] - before) * way);
+            largest = klack_largest(largest, fabs(F[c]) * way);
+            if (KLACK_FILMS) unseen = klack_largest(unseen, ROUND_OFF * fabs(m->contacts[c].gap));
         }
-        if (C == 1 || change < SETTLED) return 0;
+        if (C == 1 || change <= klack_largest(SETTLED * largest, unseen)) return 0;
     }
     return 1;
 }
