@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from energy_ledger import allowed
 
 from klack.verification import COVERS, GROUPS, Check, run_checks
 
@@ -65,7 +66,9 @@ def written(check: Check, plain) -> tuple[str, str]:
     ],
 )
 def test_page_lists_the_checks_of_a_group(group, plain):
-    checks = run_checks([group])
+    # the order of an error is seen in steps of 400 ns: forces that settle to 1 pm leave 4e-8
+    with allowed("simulate_network", 1e-7):
+        checks = run_checks([group])
     rows = listed(group)
 
     assert [check.name for check in checks if not check.passed] == []

@@ -535,6 +535,22 @@ def run_network(
                                 mdot[k] += slope_a[k] * r[a]
                             if b < volumes:
                                 mdot[k] += slope_b[k] * r[b]
+                            if branch_books[k] > 0:
+                                # what it stores has to follow from the pressures that do the work
+                                i0, o0 = branch_input0[k], branch_output0[k]
+                                branch_inputs[i0 + 2] = p[a]
+                                branch_inputs[i0 + 3] = p[b]
+                                status = call(
+                                    branch_function[k],
+                                    shift(branch_parameters, branch_parameter0[k]),
+                                    shift(branch_state, branch_state0[k]),
+                                    shift(branch_inputs, i0),
+                                    shift(branch_outputs, o0),
+                                )
+                                if status != 0:
+                                    report[0], report[1], report[2] = k, status, t
+                                    return STATUS_BRANCH
+                                mdot[k] = branch_outputs[o0]
                         for i in range(volumes):
                             V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
                     for w in range(nodes.wall_node.size):

@@ -8,7 +8,7 @@ from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
 from klack.simulation.network_arrays import PORTS, STORE, SUPPLY, WORK
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
-from klack.simulation.network_result import EnergyBooks
+from klack.simulation.network_result import BODY_STORE, EnergyBooks
 
 __all__ = ["energy_books", "energy_stores", "reset_books"]
 
@@ -28,7 +28,7 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     stores = {}
     for b, row in enumerate(rows.bodies):
         kinetic, strain = body_energy(row.body, *modal_state(network, b))
-        stores[f"{row.component} kinetic and strain"] = kinetic + strain
+        stores[f"{row.component} {BODY_STORE}"] = kinetic + strain
     for i, kind in enumerate(network.book_kind):
         if kind == STORE:
             stores[network.book_names[i]] = float(network.books[i])
@@ -83,7 +83,7 @@ def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Energ
         work = float(network.bodies.at[WORK + place : WORK + place + len(row.ports)].sum())
         place += len(row.ports)
         if np.any(row.body.damping > 0.0):
-            name = f"{row.component} kinetic and strain"
+            name = f"{row.component} {BODY_STORE}"
             losses[f"{row.component} damping"] = work - (after[name] - before[name])
     return EnergyBooks(
         supplies=supplies, losses=losses, stores_before=dict(before), stores_after=after

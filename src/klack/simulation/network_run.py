@@ -48,7 +48,7 @@ Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
-_BALANCE = 1e-6  # energy residual over throughput; 1e-9 is usual, forces settle to 1e-12 m
+_BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual, forces settle to 1e-12 m
 _SETTLE_STEP = 1e-6  # [s]
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
@@ -98,7 +98,7 @@ def simulate_network(
     Warns
     -----
     AccuracyWarning
-        When the energy balance does not close to 1e-6 of the throughput
+        When the energy balance does not close to 1e-6 of :attr:`EnergyBooks.scale`
         (:mod:`klack.energy_balance`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):
