@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from klack.cache.entry import Entry
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
+from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 from klack.memory import require_memory
@@ -72,11 +73,14 @@ def contact_compliance(
 
 
 def _require_memory(space: ContactSpace) -> None:
-    """Refuse more points than fit: the compliance, its symmetric part and a factor of it."""
-    columns = 8.0 * _CHUNK * max(space.G_a.shape[1], space.G_b.shape[1])
+    """Refuse more points than fit: the compliance, its symmetric part and a factor of it.
+
+    And what condensing the larger body to them takes.
+    """
+    condensing = max(condensation_memory(*G.shape) for G in (space.G_a, space.G_b))
     require_memory(
         "contact compliance",
-        4 * 8.0 * space.count**2 + 3 * columns,
+        4 * 8.0 * space.count**2 + condensing,
         what=f"a full matrix of {space.count} contact points",
         hint="larger elements on the two surfaces, or a smaller contact.reach.",
     )
