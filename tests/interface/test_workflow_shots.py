@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from energy_ledger import allowed
 
 from klack.case import load_case
 from klack.errors import InputError
@@ -109,9 +110,10 @@ def test_shots_off_centre_lose_rebound_to_rocking_and_keep_the_books(alone):
 
 
 def test_a_frictionless_guide_takes_no_energy(model, draws):
-    """Steps of 50 ns in the contact with the bore: 0.1 % of the energy."""
+    """Steps of 50 ns in the contact with the bore: 0.1 % of the energy, of either sign."""
     for draw in draws:
-        energy = simulate_shot(model.setup, replace(draw, friction=0.0)).energy
+        with allowed("simulate_interface", 1e-3):
+            energy = simulate_shot(model.setup, replace(draw, friction=0.0)).energy
         assert abs(energy.guide) < 1e-3 * energy.initial
 
 

@@ -50,7 +50,7 @@ from klack.workflow.levels import (
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 from klack.workflow.section import section_picture
-from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings, warnings_of
 from klack.workflow.structures import impact_structures
 from klack.workflow.study import (
     BodySummary,
@@ -132,10 +132,13 @@ def run_impact(
                 results[level] = run_lumped(problem)
             elif level.startswith("reduced"):
                 pair = own if level == "reduced" else _variant(level, problem, pools)
-                results[level] = _run_variant(case, level, pair, setup_time=clock.spent(_SET_UP))
+                setup = clock.spent(_SET_UP)
+                with warnings_of(f"level '{level}'"):
+                    results[level] = _run_variant(case, level, pair, setup_time=setup)
         clock("reduced", 1.0)
         if "interface" in wanted:
-            results["interface"] = _run_interface(problem, pools, own, clock)
+            with warnings_of("level 'interface'"):
+                results["interface"] = _run_interface(problem, pools, own, clock)
         certificate = _certificate(problem, pools, results if certify else {}, clock)
         transfer: tuple[TransferComparison, ...] = ()
         if case.run.transfer is not None:
@@ -147,7 +150,8 @@ def run_impact(
         problem.close()
         sections: tuple[SectionPicture, ...] = ()
         if "full" in wanted:
-            results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
+            with warnings_of("level 'full'"):
+                results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
             sections = _sections(problem, run)
     # the best of what was run; the lumped model is nobody's reference
     best = (name for name in ("full", "interface", "reduced") if name in results)
@@ -228,9 +232,12 @@ def _certificate(
     clock("estimate of the error", 0.0)
     count = certificate_modes(problem.case)
     model = build_interface(problem, pools, count=count)
-    history = simulate_case(problem.case, model).history
+    with warnings_of(f"estimate of the error, {count} modes"):
+        history = simulate_case(problem.case, model).history
     clock("estimate of the error", 0.5)
-    fewer = simulate_case(problem.case, build_interface(problem, pools, count=count // 2)).history
+    half = build_interface(problem, pools, count=count // 2)
+    with warnings_of(f"estimate of the error, {count // 2} modes"):
+        fewer = simulate_case(problem.case, half).history
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("estimate of the error", 1.0)

@@ -9,7 +9,14 @@ from klack.cache.result_cache import ResultCache
 from klack.errors import AccuracyWarning
 from klack.workflow.progress import Progress
 
-__all__ = ["LIBRARIES", "WITH_CACHED", "StageClock", "collected_warnings", "stages_with_cached"]
+__all__ = [
+    "LIBRARIES",
+    "WITH_CACHED",
+    "StageClock",
+    "collected_warnings",
+    "stages_with_cached",
+    "warnings_of",
+]
 
 LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 """Distributions whose versions belong to a result."""
@@ -88,3 +95,16 @@ def collected_warnings() -> Iterator[list[str]]:
                 notes.append(text)
         else:
             warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+@contextmanager
+def warnings_of(run: str) -> Iterator[None]:
+    """Begin every accuracy warning with the run that it belongs to."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for item in caught:
+        text: Warning | str = item.message
+        if issubclass(item.category, AccuracyWarning):
+            text = f"{run}: {item.message}"
+        warnings.warn_explicit(text, item.category, item.filename, item.lineno)
