@@ -87,6 +87,7 @@ FAILURES = {
 _TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
 _MOST_EVENTS = 30
 _LOCATED = 1e-12
+_TELLS = 1e-6  # of a step: shorter pieces say nothing of the rates of the fluxes
 _FRONT, _DIODE = FRONT, DIODE
 _NONE, _BLOCKS = -1, -2
 _MAP = MAP
@@ -333,12 +334,14 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             curve = per_time
         elif last > 0.0:
             curve = 1.0 / ahead
+        told = piece > _TELLS * h  # of a shorter piece the rate is round-off, and so is a guess
         for j in range(loops):
             phi[j] += change[j]
-            now_rate = change[j] * per_time
-            bend[j] = (now_rate - rate[j]) * curve
-            rate[j] = now_rate
-        last = piece
+            if told:
+                now_rate = change[j] * per_time
+                bend[j] = (now_rate - rate[j]) * curve
+                rate[j] = now_rate
+        last = piece if told else 0.0
         current = end
         blocked = False
         done = h if whole else done + piece
