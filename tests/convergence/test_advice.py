@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.advice.advice import Advice, Counsel, settle
+from klack.advice.impact import advise_impact
+from klack.advice.ladder import score
+from klack.advice.modes import counted, interface_history
+from klack.advice.settings import applied
+from klack.advice.target import HISTORY, impact_errors, impact_measures
 from klack.case.reader import read_case
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.simulation.impact import simulate_impact
-from klack.workflow.advice import Advice, Counsel, settle
-from klack.workflow.advice_impact import advise_impact
-from klack.workflow.advice_ladder import score
-from klack.workflow.advice_modes import counted, interface_history
-from klack.workflow.advice_settings import applied
-from klack.workflow.advice_target import HISTORY, impact_errors, impact_measures
 from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import silent

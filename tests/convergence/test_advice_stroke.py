@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from klack.advice.stroke import advise_stroke, first_impacts
 from klack.case.shipped import find_case
 from klack.case.valve_reader import load_valve_case
-from klack.workflow.advice_stroke import advise_stroke, first_impacts
 from klack.workflow.valve import build_valve
 
 pytestmark = pytest.mark.slow

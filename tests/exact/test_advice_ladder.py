@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from klack.workflow.advice import Measured, settle
-from klack.workflow.advice_ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
-from klack.workflow.advice_settings import Setting, SettingValue, rounded_down, rounded_up
+from klack.advice.advice import Measured, settle
+from klack.advice.ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
+from klack.advice.settings import Setting, SettingValue, rounded_down, rounded_up
 
 MEASURES = (Measure(name="history", limit=0.01), Measure(name="bands", limit=1.0, decibel=True))
 

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from klack.advice.advice import Counsel, Fixed, Measured, settle
+from klack.advice.cost import fits, memory_of
+from klack.advice.ladder import Measure
 from klack.input.problem import Key
-from klack.workflow.advice import Counsel, Fixed, Measured, settle
-from klack.workflow.advice_cost import fits, memory_of
-from klack.workflow.advice_ladder import Measure
 
 __all__ = ["affordable"]
 
@@ -31,7 +31,7 @@ def affordable(
     Parameters
     ----------
     measured, fixed, measures
-        As for :func:`klack.workflow.advice.settle`.
+        As for :func:`klack.advice.advice.settle`.
     size_with : callable
         Degrees of freedom of all bodies with these values.
     present : int

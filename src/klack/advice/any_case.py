@@ -2,13 +2,13 @@
 
 from typing import cast
 
+from klack.advice.advice import Advice
+from klack.advice.impact import AdviceLevel, advise_impact
+from klack.advice.stroke import advise_stroke
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.units import format_si
-from klack.workflow.advice import Advice
-from klack.workflow.advice_impact import AdviceLevel, advise_impact
-from klack.workflow.advice_stroke import advise_stroke
 from klack.workflow.progress import Progress, silent
 
 __all__ = ["advise_case"]
@@ -27,7 +27,7 @@ def advise_case(
 ) -> Advice:
     """Advise an impact of two bodies, or the stroke of a whole valve.
 
-    Parameters are those of :func:`klack.workflow.advice_impact.advise_impact`; a stroke is judged
+    Parameters are those of :func:`klack.advice.impact.advise_impact`; a stroke is judged
     by its first impacts, without a band and without levels.
     """
     if isinstance(case, Case):

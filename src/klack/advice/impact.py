@@ -7,18 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from klack.case.schema import Case
-from klack.contact.history import ImpactHistory
-from klack.contact.restitution import measure_impact
-from klack.elasticity.eigen import Modes
-from klack.errors import InputError, KlackError
-from klack.input.problem import Key
-from klack.simulation.impact import simulate_impact
-from klack.units import format_si
-from klack.workflow.advice import Advice, Fixed, Measured
-from klack.workflow.advice_affordable import affordable
-from klack.workflow.advice_cost import fits, larger, memory_of, time_of
-from klack.workflow.advice_modes import (
+from klack.advice.advice import Advice, Fixed, Measured
+from klack.advice.affordable import affordable
+from klack.advice.cost import fits, larger, memory_of, time_of
+from klack.advice.modes import (
     counted,
     explicit_modes,
     history_ladder,
@@ -28,19 +20,27 @@ from klack.workflow.advice_modes import (
     modes_in_band,
     richer_pools,
 )
-from klack.workflow.advice_regions import (
+from klack.advice.regions import (
     axisymmetric_twin,
     layer_setting,
     mesh_settings,
     unmeshed_note,
 )
-from klack.workflow.advice_settings import Setting, SettingValue, applied
-from klack.workflow.advice_target import (
+from klack.advice.settings import Setting, SettingValue, applied
+from klack.advice.target import (
     highest_band,
     impact_errors,
     impact_measures,
     judged_up_to,
 )
+from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
+from klack.contact.restitution import measure_impact
+from klack.elasticity.eigen import Modes
+from klack.errors import InputError, KlackError
+from klack.input.problem import Key
+from klack.simulation.impact import simulate_impact
+from klack.units import format_si
 from klack.workflow.bodies import BodyPair, build_bodies
 from klack.workflow.interface_level import build_interface, simulate_case
 from klack.workflow.levels import (

@@ -7,14 +7,14 @@ from itertools import pairwise
 import numpy as np
 
 from klack.acoustics.third_octave import band_edges
+from klack.advice.ladder import Ladder
+from klack.advice.settings import Setting, SettingValue
+from klack.advice.target import HISTORY, impact_errors
 from klack.case.bodies import ModeChoice
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.elasticity.eigen import Modes
 from klack.reduction.ports import Port
-from klack.workflow.advice_ladder import Ladder
-from klack.workflow.advice_settings import Setting, SettingValue
-from klack.workflow.advice_target import HISTORY, impact_errors
 from klack.workflow.interface_level import build_interface, simulate_case
 from klack.workflow.levels import mode_pools
 from klack.workflow.problem import ContactProblem

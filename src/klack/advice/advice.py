@@ -6,21 +6,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.input.problem import Key
-from klack.workflow.advice_ladder import (
+from klack.advice.ladder import (
     Ladder,
     Measure,
     allotment,
     coarsest_within,
     score,
 )
-from klack.workflow.advice_settings import Setting
+from klack.advice.settings import Setting
+from klack.input.problem import Key
 
 __all__ = ["Advice", "Counsel", "Fixed", "Measured", "counsel", "settle"]
 
 _COARSER = {"mesh": 2.0, "layers": 1.5, "modes": 1.0, "step": 4.0}
 """How much coarser than the coarsest run an advised setting may be; finer is
-:data:`klack.workflow.advice_ladder.REACH`.
+:data:`klack.advice.ladder.REACH`.
 
 Modes that are left out change more than a power law knows: no fewer than were run."""
 
@@ -200,7 +200,7 @@ def settle(
     """Share the target out over the settings and find the coarsest of each.
 
     Every setting gets the same share of the target; what it cannot use goes to the others (see
-    :func:`klack.workflow.advice_ladder.allotment`).  The scores are added although the worst
+    :func:`klack.advice.ladder.allotment`).  The scores are added although the worst
     measures of two settings may differ: the sum of every single measure is then within its limit.
 
     Parameters

@@ -11,17 +11,17 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.advice.advice import Advice, Measured
+from klack.advice.affordable import affordable
+from klack.advice.cost import time_of
+from klack.advice.ladder import Ladder, Measure, score
+from klack.advice.regions import mesh_settings, unmeshed_note
+from klack.advice.settings import Setting, SettingValue, applied
 from klack.case.bodies import ModeChoice
 from klack.case.valve import ValveCase, Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
-from klack.workflow.advice import Advice, Measured
-from klack.workflow.advice_affordable import affordable
-from klack.workflow.advice_cost import time_of
-from klack.workflow.advice_ladder import Ladder, Measure, score
-from klack.workflow.advice_regions import mesh_settings, unmeshed_note
-from klack.workflow.advice_settings import Setting, SettingValue, applied
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import collected_warnings
 from klack.workflow.stroke import run_variant, variant_network

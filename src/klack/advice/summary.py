@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.advice.advice import Advice, Counsel
+from klack.advice.ladder import REACH, Measure, score
+from klack.advice.settings import SettingValue
 from klack.input.problem import Key
 from klack.units import format_si
-from klack.workflow.advice import Advice, Counsel
-from klack.workflow.advice_ladder import REACH, Measure, score
-from klack.workflow.advice_settings import SettingValue
 
 __all__ = ["ADVICE_COLUMNS", "advice_lines", "advice_rows", "advice_to_json"]
 

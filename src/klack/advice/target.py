@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from klack.acoustics.comparison import compare_histories, impact_third_octaves
 from klack.acoustics.third_octave import ThirdOctaves
+from klack.advice.ladder import Measure
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError
 from klack.units import format_si
-from klack.workflow.advice_ladder import Measure
 
 __all__ = ["HISTORY", "highest_band", "impact_errors", "impact_measures", "judged_up_to"]
 

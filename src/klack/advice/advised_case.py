@@ -7,6 +7,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
+from klack.advice.advice import Advice
 from klack.case.case_tree import CaseTree
 from klack.case.inserting import merged, with_values
 from klack.case.key_path import written_at
@@ -15,7 +16,6 @@ from klack.case.valve_reader import read_any_case
 from klack.errors import InputError
 from klack.input.problem import Key
 from klack.units import FREQUENCY, LENGTH, TIME, format_si, parse_quantity
-from klack.workflow.advice import Advice
 
 __all__ = ["advice_yaml", "advised_text", "changed_values"]
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
+from klack.advice.settings import Setting, SettingValue
 from klack.case.bodies import CaseBody, ModeChoice, Reduction, SurfaceName
 from klack.case.placement import Placement
 from klack.case.schema import Case
-from klack.workflow.advice_settings import Setting, SettingValue
 
 __all__ = ["axisymmetric_twin", "layer_setting", "mesh_settings", "unmeshed_note"]
 

@@ -1,0 +1,1 @@
+"""Mesh, modes and step for a target, each from a measured convergence."""
