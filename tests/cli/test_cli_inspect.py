@@ -82,6 +82,72 @@ def test_a_step_file_shows_its_faces_alone_and_in_a_case(tmp_path: Path, capsys)
     assert shown.count("surface side 31.416 mm^2") == 2
 
 
+def pin_case(folder: Path, text: str) -> Path:
+    pin = Profile(
+        (0.0, 0.0),
+        (
+            Line((1e-3, 0.0), "foot"),
+            Line((1e-3, 5e-3), "side"),
+            Line((0.0, 5e-3), "head"),
+            Line((0.0, 0.0)),
+        ),
+    )
+    write_step_revolved({"pin": pin}, folder / "pin.step")
+    (folder / "case.yaml").write_text(text)
+    return folder / "case.yaml"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "where", "got", "hint"),
+    [
+        ("block.head]", "block.haed]", "14: contact.between[1]", "'haed' of block", "'head'"),
+        ("surface: foot", "surface: foof", "13: bodies.block.fixed[0].surface", "'foof'", "'foot'"),
+        (
+            "    fixed:",
+            "    mesh: {size: 1 mm, surfaces: {sides: 1 mm}}\n    fixed:",
+            "12: bodies.block.mesh.surfaces.sides",
+            "'sides'",
+            "'side'",
+        ),
+    ],
+    ids=["contact", "support", "size"],
+)
+def test_a_wrong_name_of_a_face_is_told_with_its_key(
+    right, wrong, where, got, hint, tmp_path: Path, capsys, monkeypatch
+):
+    """By klack inspect, and by klack impact before it meshes anything."""
+    monkeypatch.setenv("KLACK_CACHE", "off")
+    text = CASE
+    if "mesh" in wrong:  # the second body has its sizes there
+        text = text[: text.rindex("    mesh: {size: 1 mm}\n")] + text[text.rindex("    fixed:") :]
+        where = where.replace("14", "13")
+    path = pin_case(tmp_path, text.replace(right, wrong))
+
+    def never(*args: object) -> None:
+        raise AssertionError("meshed")
+
+    monkeypatch.setattr("klack.workflow.generated_mesh.mesh_step", never)
+    for command in (["inspect", str(path)], ["impact", str(path), "--out", str(tmp_path / "o")]):
+        assert main(command) == 2
+        told = capsys.readouterr().err
+        assert f"case.yaml:{where}: got the unknown surface {got}" in told
+        assert "expected one of: " in told
+        assert f"did you mean {hint}?" in told
+
+
+def test_a_wrong_name_in_a_mesh_is_told_by_inspect(tmp_path: Path, capsys):
+    text = find_case("needle-from-inp").read_text()
+    assert "needle.tip" in text
+    for file in find_case("needle-from-inp").parent.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "case.yaml").write_text(text.replace("needle.tip", "needle.top_"))
+
+    assert main(["inspect", str(tmp_path / "case.yaml")]) == 2
+    told = capsys.readouterr().err
+    assert "contact.between[0]: got the unknown surface 'top_' of needle" in told
+    assert "did you mean 'top'?" in told
+
+
 def test_a_mesh_without_unit_is_refused(capsys):
     assert main(["inspect", str(NEEDLE)]) == 2
     assert "unit" in capsys.readouterr().err

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from klack.case.bodies import CaseFile
+from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
 from klack.mechanics.fmu_file import FmuDescription, describe_fmu
 from klack.mesh.mesh import Mesh
 from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
 from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
-from klack.mesh.step_content import StepPart, step_content
+from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.model_files.system_matrix import SystemMatrix
 from klack.reduction.reduced_body import ReducedBody
@@ -55,7 +56,7 @@ def inspect_file(
         hint = "check the spelling and the folder."
         raise InputError(str(path), got="no such file", expected="a file", hint=hint)
     if ending in STEP_ENDINGS:
-        return tuple(_step_rows(path))
+        return tuple(_step_rows(step_content(path)))
     if ending in MESH_FORMATS:
         return tuple(_mesh_rows(read_mesh_file(path, unit_length)))
     if ending in MATRIX_FORMATS:
@@ -78,8 +79,10 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     Raises
     ------
     InputError
-        For files that cannot be read, and for matrices and models that no body has.
+        For files that cannot be read, for matrices and models that no body has, and, after the
+        rows of all bodies, for a surface that the case names and its file does not have.
     """
+    known: dict[str, tuple[str, ...]] = {}
     for name, body in case.bodies.items():
         if body.reduced is not None:
             yield name, tuple(_reduced_rows(reduced_from_file(case, name)))
@@ -88,11 +91,16 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
         elif body.geometry.mesh is not None:
             mesh = body.geometry.mesh
             solids = tuple(body.material) if isinstance(body.material, dict) else None
-            yield name, tuple(_mesh_rows(read_mesh_file(mesh.file, mesh.unit, solids=solids)))
+            model = read_mesh_file(mesh.file, mesh.unit, solids=solids)
+            known[name] = (*model.mesh.surfaces, *model.mesh.node_sets)
+            yield name, tuple(_mesh_rows(model))
         elif body.geometry.step is not None:
-            yield name, tuple(_step_rows(body.geometry.step.file))
+            content = step_content(body.geometry.step.file)
+            known[name] = tuple(face.name for face in content.faces)
+            yield name, tuple(_step_rows(content))
         else:
             yield name, (("geometry", "", "meshed by klack when the case runs"),)
+    require_surface_names(case, known)
 
 
 def _reduced_rows(body: ReducedBody) -> Iterator[Row]:
@@ -118,8 +126,7 @@ def _reduced_rows(body: ReducedBody) -> Iterator[Row]:
         )
 
 
-def _step_rows(path: Path) -> Iterator[Row]:
-    content = step_content(path)
+def _step_rows(content: StepContent) -> Iterator[Row]:
     for solid in content.solids:
         yield "solid", solid.name, f"{solid.size * 1e9:.6g} mm^3, {_box(solid)}"
     for face in content.faces:
