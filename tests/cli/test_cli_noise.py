@@ -16,6 +16,7 @@ import pytest
 from klack.cli.main import main
 from klack.report.noise_content import noise_content
 from klack.workflow.noise_store import load_noise
+from klack.workflow.noise_summary import NOISE_COLUMNS, noise_rows
 from klack.workflow.store import load_study, save_study
 
 ROOT = Path(__file__).parents[2]
@@ -120,6 +121,18 @@ def test_sounds_have_the_stated_level(heard, numbers):
         if name == "click.wav":
             exposure = 10.0 * np.log10((values**2).sum() / 48_000 / 4e-10)
             assert exposure == pytest.approx(numbers["sound_exposure_level_dB"], abs=1e-3)
+
+
+def test_the_table_says_how_levels_are_weighted(heard):
+    """A-weighting takes from what is radiated below 1 kHz and adds a decibel at 2 to 4 kHz."""
+    study = load_noise(heard)
+    (row,) = noise_rows(study)
+    shown = dict(zip(NOISE_COLUMNS, row, strict=True))
+    levels = study.designs[0].sound.statistics
+
+    assert float(shown["SEL [dBA]"]) == pytest.approx(levels.exposure_level_A, abs=0.05)
+    assert float(shown["SEL [dBZ]"]) == pytest.approx(levels.exposure_level, abs=0.05)
+    assert float(shown["peak [dBZ]"]) == pytest.approx(levels.peak_level, abs=0.05)
 
 
 def test_the_click_carries_the_radiated_energy(heard):

@@ -3,6 +3,9 @@
 Truth: half sine and decaying step in closed form; the sum of a series that is only averaged.
 """
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -18,6 +21,7 @@ from klack.simulation.network_result import (
     InterfaceRecord,
     NetworkResult,
 )
+from klack.workflow import noise_source
 from klack.workflow.noise_force import before_impact, interrupted_impact, stop_force
 
 PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
@@ -196,3 +200,33 @@ def test_a_run_that_ends_in_an_impact_is_cut_before_it():
 
     assert before_impact(net_force(1.0), open_end).time[-1] == pytest.approx(39.5e-6)
     assert before_impact(net_force(1.0), None).values.size == 80
+
+
+def test_a_needle_that_rings_on_its_stop_has_landed():
+    """Undamped it rings for ever: after 10 ms of contact, 250 times that of its bounces."""
+    bounce = replace(last_impact(95e-6), contact_time=40e-6)
+    landed = replace(last_impact(np.nan), time=10e-3)
+
+    def ringing(end: float) -> TimeSeries:
+        steps = round(end / 1e-6)
+        return TimeSeries(step=1e-6, values=np.full(steps, -120.0), unit="N", start=0.5e-6)
+
+    assert interrupted_impact([bounce, landed], ringing(20e-3)) is None
+    assert interrupted_impact([bounce, landed], ringing(10.1e-3)) is landed
+    # the bounces on the other stop tell nothing
+    other = replace(bounce, stop="opening")
+    assert interrupted_impact([other, landed], ringing(20e-3)) is landed
+
+
+@pytest.mark.parametrize(("speed", "told"), [(0.29, False), (0.31, True)])
+def test_an_impact_that_is_left_out_is_told_when_it_would_be_heard(speed, told):
+    """Below a tenth of the speed it has less than a hundredth of the energy."""
+    loud = replace(last_impact(75e-6), approach_speed=3.0)
+    last = replace(last_impact(np.nan), approach_speed=speed)
+    variant = SimpleNamespace(result=SimpleNamespace(events=[loud, last], interfaces={}))
+
+    notes = noise_source._notes(variant, last)
+
+    assert bool(notes) == told
+    if told:
+        assert "impact on 'seat' at 0.31 m/s, which is left out (the fastest has 3 m/s)" in notes[0]

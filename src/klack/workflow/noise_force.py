@@ -24,6 +24,7 @@ __all__ = ["before_impact", "impact_force", "interrupted_impact", "stop_force", 
 Floats = NDArray[np.float64]
 
 _AT_REST = 0.05  # net force over the peak of the last impact
+_LONG = 5.0  # contact times of earlier impacts after which a contact is rest, though it rings
 
 
 def impact_force(history: ImpactHistory) -> TimeSeries:
@@ -41,7 +42,8 @@ def impact_force(history: ImpactHistory) -> TimeSeries:
 def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) -> ImpactEvent | None:
     """Impact in which a run ends, if it does: its force would seem to stay for ever.
 
-    A needle that rests on its stop does not accelerate.
+    A needle that rests on its stop does not accelerate; without damping it may ring there for ever,
+    but has then stayed closed for longer than any impact before.
 
     Parameters
     ----------
@@ -53,6 +55,13 @@ def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) ->
     if net is None or not events or np.isfinite(events[-1].separation_time):
         return None
     last = events[-1]
+    ended = [
+        event.contact_time
+        for event in events
+        if event.stop == last.stop and np.isfinite(event.separation_time)
+    ]
+    if ended and float(net.time[-1]) - last.time > _LONG * max(ended):
+        return None
     return last if abs(float(net.values[-1])) > _AT_REST * last.peak_force else None
 
 

@@ -42,6 +42,7 @@ __all__ = [
     "stroke_sources",
 ]
 
+_HEARD = 0.1  # of the fastest impact: slower ones have less than 1 % of its energy
 _AROUND = 5.0  # contact times shown on each side of the strongest impact
 
 
@@ -303,10 +304,12 @@ def _net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
 def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
     result: NetworkResult = variant.result
     found = []
-    if last is not None:
+    fastest = max((event.approach_speed for event in result.events), default=0.0)
+    if last is not None and last.approach_speed > _HEARD * fastest:
         found.append(
-            f"The run ends in an impact on '{last.stop}', which is left out; run it longer to have "
-            "the whole of it."
+            f"The run ends in an impact on '{last.stop}' at {last.approach_speed:.2g} m/s, which "
+            f"is left out (the fastest has {fastest:.2g} m/s); run it longer to have the whole of "
+            "it."
         )
     incomplete = [stop for stop, record in result.interfaces.items() if not record.complete]
     if incomplete:

@@ -10,17 +10,19 @@ from klack.workflow.noise_study import BodyNoise, ClickSound, NoiseDesign, Noise
 
 __all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json"]
 
+# dBA: A-weighted, dBZ: unweighted (IEC 61672-1)
 NOISE_COLUMNS = (
     "design",
     "peak force [N]",
     "force [dB]",
     "injected [uJ]",
     "radiated [nJ]",
-    "SEL [dB]",
-    "peak [dB]",
-    "loudness max [sone]",
+    "SEL [dBA]",
+    "SEL [dBZ]",
+    "peak [dBZ]",
+    "loudness [sone]",
     "sharpness [acum]",
-    "valid up to [kHz]",
+    "up to [kHz]",
 )
 
 
@@ -33,9 +35,10 @@ def _row(design: NoiseDesign) -> tuple[str, ...]:
     sound = design.sound
     level = 10.0 * np.log10(max(design.unbalanced_energy.sum(), 1e-300) / ENERGY_REFERENCE)
     heard = (
-        ("–",) * 4
+        ("–",) * 5
         if sound is None
         else (
+            f"{sound.statistics.exposure_level_A:.1f}",
             f"{sound.statistics.exposure_level:.1f}",
             f"{sound.statistics.peak_level:.1f}",
             f"{sound.loudness.maximum:.3g}",
