@@ -213,3 +213,31 @@ def test_schema_of_a_stroke_names_the_components(capsys):
     assert {"network", "run", "stops"} <= set(json.loads(printed)["properties"])
     for word in ("rigid-mass", "end-stop", "solenoid", "orifice"):
         assert f'"{word}"' in printed
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_valve_that_does_not_open_says_so(tmp_path, capsys, recwarn, quiet):
+    """5 N of the magnet against 12 N of the spring: 7 N are missing."""
+    text = CASE.read_text()
+    assert "35 N, 35 N" in text
+    (tmp_path / "case.yaml").write_text(text.replace("35 N, 35 N", "5 N, 5 N"))
+
+    words = ["--variant", "dry", "--out", str(tmp_path / "out")]
+    assert main(["stroke", str(tmp_path / "case.yaml"), *words, *(["-q"] if quiet else [])]) == 0
+
+    shown = capsys.readouterr()
+    told = shown.err if quiet else shown.out
+    assert "Note: 'dry': the needle never left its seat. It was pressed on 'seat' with 12 N" in told
+    missing = re.search(r"and ([\d.]+) N were still missing", told)
+    assert missing is not None
+    # the seat has no damping at rest: it rings by 2 % when the magnet pulls
+    assert float(missing[1]) == pytest.approx(7.0, rel=0.03)
+    assert "preload" in told
+    assert (tmp_path / "out" / "report.html").is_file()
+    if quiet:
+        assert shown.out == ""
+    assert [str(w.message) for w in recwarn if w.category is UserWarning] == []
+
+
+def test_a_valve_that_opens_has_no_such_note(run):
+    assert not any("never left" in note for note in load_stroke(run / "out").warnings)

@@ -236,3 +236,17 @@ def test_section_figure_leaves_the_closing_motion_out_of_the_shape(
     assert len(figure.image) < 3e6
     assert figure.magnification in (100.0, 200.0, 500.0)
     assert "−3.00\N{NO-BREAK SPACE}µm" in figure.note
+
+
+def test_without_a_full_run_the_report_says_why_it_has_no_picture(
+    impact_study: ImpactStudy,
+) -> None:
+    (section,) = (
+        section
+        for section in report_content(replace(impact_study, sections=())).sections
+        if section.title == "The bodies at peak force"
+    )
+
+    assert section.picture is None
+    assert "the level 'full' only" in section.paragraphs[0]
+    assert "--level reduced,full" in section.paragraphs[0]

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
+from klack.cli.notes import print_notes
+from klack.cli.options import (
+    CaseArgument,
+    Json,
+    Out,
+    Quiet,
+    Threads,
+    require_files,
+    require_threads,
+)
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
@@ -58,6 +67,7 @@ def calibrate(
 
     require_json_target(json)
     require_threads(threads)
+    require_files("--measurement", measurement)
     for option, number, unit in (("--strokes", strokes, "strokes"), ("--workers", workers, "")):
         if number is not None:
             require_positive(option, number, unit)
@@ -110,6 +120,8 @@ def calibrate(
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")
+    else:
+        print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, calibration_to_json(study))
     if failure:
@@ -129,7 +141,6 @@ def _print_study(study: "CalibrationStudy", folder: Path, report: bool, *, to_st
         f"({1e6 * study.residual_rms_before:.3g} um before).",
         file=stream,
     )
-    for warning in study.warnings:
-        print(f"Note: {warning}", file=stream)
+    print_notes(study.warnings, to_stderr=to_stderr)
     made = ["result.zarr", CALIBRATED_NAME, *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.notes import print_notes
 from klack.cli.options import Json, Quiet
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 from klack.cli.progress import show_progress
@@ -151,6 +152,9 @@ def _strokes(
     if not quiet:
         _print_strokes(compared, to_stderr=str(json) == "-")
         _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
+    else:
+        notes = [note for variant in compared.variants.values() for note in variant.notes]
+        print_notes((*notes, *compared.warnings), to_stderr=True)
     if json is not None:
         write_json(json, measured_to_json(compared))
     if failure:
@@ -182,6 +186,8 @@ def _drops(
     if not quiet:
         _print_drops(compared, to_stderr=str(json) == "-")
         _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
+    else:
+        print_notes((*compared.notes, *compared.warnings), to_stderr=True)
     if json is not None:
         write_json(json, measured_shots_to_json(compared))
     if failure:
@@ -246,13 +252,11 @@ def _print_strokes(study: "MeasuredStrokeStudy", *, to_stderr: bool) -> None:
             print_table("Measured", HIGHEST_COLUMNS, highest, left=2, to_stderr=to_stderr)
         for item in variant.rejected:
             print(f"Put aside: {item.name}: {item.reason}", file=stream)
-        for note in variant.notes:
-            print(f"Note: {note}", file=stream)
+        print_notes(variant.notes, to_stderr=to_stderr)
     for variant in study.variants.values():
         print(verdict(study, variant), file=stream)
     print(rule(study), file=stream)
-    for warning in study.warnings:
-        print(f"Note: {warning}", file=stream)
+    print_notes(study.warnings, to_stderr=to_stderr)
 
 
 def _print_drops(study: "MeasuredShotsStudy", *, to_stderr: bool) -> None:
@@ -271,8 +275,7 @@ def _print_drops(study: "MeasuredShotsStudy", *, to_stderr: bool) -> None:
         print(f"Put aside: {item.name}: {item.reason}", file=stream)
     for line in (drop_verdict(study), bias_sentence(study), drop_rule(study)):
         print(line, file=stream)
-    for note in (*study.notes, *study.warnings):
-        print(f"Note: {note}", file=stream)
+    print_notes((*study.notes, *study.warnings), to_stderr=to_stderr)
 
 
 def _print_folder(folder: Path, report: bool, *, to_stderr: bool) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.notes import print_notes
 from klack.cli.options import Json, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import Progress, show_progress
@@ -80,6 +81,8 @@ def noise(
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")
+    else:
+        print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, noise_to_json(study))
     if failure:
@@ -145,7 +148,6 @@ def _print_study(study: "NoiseStudy", folder: Path, report: bool, *, to_stderr: 
 
     print_table(study.title, NOISE_COLUMNS, noise_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for warning in study.warnings:
-        print(f"Note: {warning}", file=stream)
+    print_notes(study.warnings, to_stderr=to_stderr)
     made = ["result.zarr", *sound_names(study), *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -1,13 +1,23 @@
 """Options that several commands share."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.errors import require_positive
+from klack.errors import InputError, require_positive
 
-__all__ = ["CaseArgument", "Json", "Levels", "Out", "Quiet", "Threads", "require_threads"]
+__all__ = [
+    "CaseArgument",
+    "Json",
+    "Levels",
+    "Out",
+    "Quiet",
+    "Threads",
+    "require_files",
+    "require_threads",
+]
 
 CaseArgument = Annotated[
     Path, Parameter(name="CASE", help="Case file (YAML), or the name of a shipped case.")
@@ -46,3 +56,15 @@ def require_threads(threads: int | None) -> None:
     """Refuse a number of processor cores that cannot be."""
     if threads is not None:
         require_positive("--threads", threads, "cores")
+
+
+def require_files(option: str, files: Sequence[Path]) -> None:
+    """Refuse files that are not there, before the long work begins."""
+    for file in files:
+        if not file.is_file():
+            raise InputError(
+                f"{option} {file}",
+                got="a folder" if file.is_dir() else "no such file",
+                expected="a file",
+                hint="check the spelling; the path is relative to the present folder.",
+            )

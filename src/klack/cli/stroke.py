@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.notes import print_notes
 from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
@@ -85,6 +86,8 @@ def stroke(
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")
+    else:
+        print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, stroke_to_json(study))
     if failure:
@@ -139,8 +142,7 @@ def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr:
     for variant in study.variants.values():
         _print_impacts(variant, to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for warning in study.warnings:
-        print(f"Note: {warning}", file=stream)
+    print_notes(study.warnings, to_stderr=to_stderr)
     made = ["result.zarr", *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)
 

@@ -119,8 +119,7 @@ def report_content(study: ImpactStudy) -> Content:
         return tuple(by_name[name] for name in names if name in by_name)
 
     sections = [_estimates(study), _computed(study)]
-    if study.sections:
-        sections.append(Section(title="The bodies at peak force", picture=section_figure(study)))
+    sections.append(_bodies_at_peak(study))
     sections.append(Section(title="Force over time", charts=named("force")))
     sections.append(_pressure(study))
     sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
@@ -150,6 +149,19 @@ def report_content(study: ImpactStudy) -> Content:
         case_text=study.case_text,
         versions=", ".join([f"klack {study.version}", *libraries]),
     )
+
+
+def _bodies_at_peak(study: ImpactStudy) -> Section:
+    """Picture of the full order; without it, why there is none."""
+    title = "The bodies at peak force"
+    if study.sections:
+        return Section(title=title, picture=section_figure(study))
+    text = (
+        "No picture: the displacement of the whole bodies is known at the level 'full' only, which "
+        "was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies with a "
+        "mesh."
+    )
+    return Section(title=title, paragraphs=(text,))
 
 
 def date_text(created: str) -> str:

@@ -104,7 +104,7 @@ def svg_bars(chart: BarChart) -> bytes:
             left = [a + b for a, b in zip(left, part.values, strict=True)]
         axes.set_yticks(range(len(left)), [plain(row) for row in chart.rows])
         axes.invert_yaxis()
-        axes.set_xlim(0.0, 1.03 * whole)
+        axes.set_xlim(0.0, 1.03 * whole or 1.0)  # nothing moved: an empty axis
         _scale(axes, chart.x, "x")
         _legend(figure, [axes])
         return svg(figure)

@@ -25,6 +25,7 @@ from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.stroke_rest import rest_note
 from klack.workflow.stroke_study import (
     FluidSummary,
     LineSummary,
@@ -76,6 +77,8 @@ def run_stroke(
         stops = _stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
     rows = [run.rows for run in runs.values()]
+    told = (rest_note(name, run.variant.result, roles.seat) for name, run in runs.items())
+    resting = tuple(note for note in told if note)
     return StrokeStudy(
         case=case.name,
         title=case.title,
@@ -98,7 +101,7 @@ def run_stroke(
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
-        warnings=tuple(notes),
+        warnings=(*notes, *resting),
     )
 
 
