@@ -359,6 +359,7 @@ def test_klack_impact_refuses_and_leaves_nothing(tmp_path):
     done = limited("", 8_000_000_000, "sys.exit(main(['impact', 'case.yaml']))", tmp_path)
 
     assert done.returncode == 2, done.stderr
-    assert "contact.size: got 4 nm, which makes some" in done.stderr
-    assert "Try: a 'mesh: contact.size' of" in done.stderr
+    key = "bodies.needle.mesh.contact.size"
+    assert f"{key}: got 4 nm, which makes some" in done.stderr
+    assert f"Try: a {key} of" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]

@@ -21,6 +21,7 @@ from klack.mesh.mesh import ElementBlock, Mesh
 
 __all__ = [
     "MeshSummary",
+    "PoorElementError",
     "corner_volume",
     "edge_lengths",
     "mesh_summary",
@@ -28,6 +29,12 @@ __all__ = [
     "require_positive_jacobians",
     "scaled_jacobians",
 ]
+
+
+class PoorElementError(InputError):
+    """An element is inverted or too flat; ``elements`` is the number of all of them."""
+
+    elements: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,7 +224,7 @@ def require_positive_jacobians(
     smallest: float = 0.0,
     numbers: Sequence[NDArray[np.int64]] | None = None,
 ) -> None:
-    """Raise :class:`InputError` if an element is inverted or worse than ``smallest``.
+    """Raise :class:`PoorElementError` if an element is inverted or worse than ``smallest``.
 
     Parameters
     ----------
@@ -233,12 +240,14 @@ def require_positive_jacobians(
     if numbers is not None:
         number = int(np.concatenate(list(numbers))[number])
     if not quality > smallest:
-        raise InputError(
+        error = PoorElementError(
             f"{where}: element {number} ({block.family}, solid '{block.solid}') at {_place(place)}",
             got=f"a smallest scaled Jacobian of {quality:.3g}",
             expected=f"above {smallest:g} (1 is ideal, below 0 is inverted)",
             hint="mesh finer where the boundary is curved, or check the order of the nodes.",
         )
+        error.elements = mesh.element_count
+        raise error
 
 
 def require_connected(where: str, mesh: Mesh) -> None:

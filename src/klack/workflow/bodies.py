@@ -22,6 +22,7 @@ from klack.units import format_si
 from klack.workflow.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.workflow.generated_mesh import meshed_profiles, meshed_step
 from klack.workflow.held_nodes import held_nodes
+from klack.workflow.mesh_messages import meshed_for_case
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
 from klack.workflow.step_names import require_step_names
@@ -162,14 +163,16 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
             f"bodies.{name}", got="no element sizes", expected="mesh", hint="add mesh: {size: ...}."
         )
     if geometry.step is not None:
-        return meshed_step(geometry.step, _sizing(body.mesh, places))
+        step = geometry.step
+        return meshed_for_case(name, _sizing(body.mesh, places), lambda s: meshed_step(step, s))
     if geometry.profile is None:
         raise InputError(
             f"bodies.{name}.geometry", got="no shape", expected="a profile", hint="draw one."
         )
     sizing = _sizing(body.mesh, tuple(_ring(at) for at in places))
     profiles = geometry.profile.profiles()
-    return meshed_profiles(profiles, sizing, geometry.model or "axisymmetric", geometry.layers)
+    model, layers = geometry.model or "axisymmetric", geometry.layers
+    return meshed_for_case(name, sizing, lambda s: meshed_profiles(profiles, s, model, layers))
 
 
 def _ring(place: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,0 +1,98 @@
+"""Sizes that a case asks for and no mesher can do: the message names the key, and a size that does.
+
+Truth: the mesher itself, asked with the size of the hint.
+"""
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from klack import memory
+from klack.case import find_case, load_case
+from klack.errors import InputError
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh
+from klack.mesh.profile import Line, Profile
+from klack.mesh.quality import PoorElementError
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_step, write_step_revolved
+from klack.units import LENGTH, parse_quantity
+from klack.workflow.bodies import mesh_body
+from klack.workflow.mesh_messages import meshed_for_case
+
+PIN = Profile((0, 0), (Line((1e-3, 0)), Line((1e-3, 4e-3)), Line((0, 4e-3)), Line((0, 0))))
+
+
+def needs(limit: float):
+    """Mesher that fails, as netgen does at a round face, above a size."""
+
+    def mesher(sizing: MeshSizing) -> Mesh:
+        if sizing.size > limit:
+            error = PoorElementError(
+                "mesh_step: pin.step: element 7 (tet10)", got="-0.1", expected="above 0", hint="-"
+            )
+            error.elements = 200
+            raise error
+        return mesh_meridian({"pin": PIN}, sizing)
+
+    return mesher
+
+
+def test_a_size_that_is_too_coarse_is_named_with_one_that_does():
+    """Of 2 mm the shares 0.7 and 0.5 are tried; 1.2 mm is the limit."""
+    mesher = needs(1.2e-3)
+    with pytest.raises(InputError) as caught:
+        meshed_for_case("pin", MeshSizing(size=2e-3), mesher)
+
+    text = str(caught.value)
+    assert text.startswith("bodies.pin.mesh.size: mesh_step: pin.step: element 7 (tet10): got 2 mm")
+    found = re.search(r"bodies\.pin\.mesh\.size: (\S+ \S+) \(tried", caught.value.hint)
+    assert found is not None
+    size = parse_quantity(found[1], LENGTH, "size")
+    assert size == pytest.approx(1e-3, rel=1e-12)
+    mesher(MeshSizing(size=size))
+
+
+def test_a_thin_walled_tube_of_a_step_file(tmp_path: Path):
+    """Wall of 0.2 mm, radius 3 mm: curved elements of 1 mm turn inside out."""
+    tube = Profile(
+        (2.8e-3, 0), (Line((3e-3, 0)), Line((3e-3, 5e-3)), Line((2.8e-3, 5e-3)), Line((2.8e-3, 0)))
+    )
+    write_step_revolved({"tube": tube}, tmp_path / "tube.step")
+
+    def mesher(sizing: MeshSizing) -> Mesh:
+        return mesh_step(tmp_path / "tube.step", sizing)
+
+    with pytest.raises(InputError) as caught:
+        meshed_for_case("tube", MeshSizing(size=2e-3), mesher)
+
+    assert caught.value.where.startswith("bodies.tube.mesh.size: mesh_step: ")
+    found = re.search(r"bodies\.tube\.mesh\.size: (\S+ \S+) \(tried", caught.value.hint)
+    assert found is not None, caught.value.hint
+    assert parse_quantity(found[1], LENGTH, "size") < 1.5e-3
+
+
+def test_without_a_size_that_does_the_hint_says_what_to_look_at():
+    with pytest.raises(InputError) as caught:
+        meshed_for_case("pin", MeshSizing(size=2e-3), needs(0.05e-3))
+    assert "below the radius of the smallest round face" in caught.value.hint
+    assert "bodies.pin.mesh.grading below 0.3" in caught.value.hint
+
+
+@pytest.mark.parametrize("setting", ["size", "contact.size"])
+def test_too_many_elements_are_refused_by_the_key_of_the_case(setting, monkeypatch):
+    monkeypatch.setattr(memory, "_WORTH_A_LOOK", 0.0)
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=50e3))
+    monkeypatch.setenv("KLACK_CACHE", "off")
+    body = load_case(find_case("demo-valve-axisymmetric")).bodies["needle"]
+    places = ((0.4e-3, -0.4e-3),) if setting == "contact.size" else ()
+
+    with pytest.raises(InputError) as caught:
+        mesh_body(body, "needle", places)
+
+    # the finest of the two makes the most elements
+    assert caught.value.where == f"bodies.needle.mesh.{setting}"
+    assert f"a bodies.needle.mesh.{setting} of" in caught.value.hint
