@@ -5,6 +5,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
+from energy_ledger import allowed
 
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
@@ -154,8 +155,11 @@ def test_friction_stops_the_shaft_and_does_not_turn_it_round(needle):
     """In steps of 5 us, each of which would take 33 mm/s from it."""
     guide = squeezed(needle, 0.2)
 
-    run = move(needle, guide, [0] * 6, 150e-6, speed=0.1, step=5e-6)
+    # the squeezed springs hold 15 times m v^2/2 from the start; the guide's books give it out
+    with allowed("simulate_interface", 16.0):
+        run = move(needle, guide, [0] * 6, 150e-6, speed=0.1, step=5e-6)
 
+    assert abs(run.energy.residual) < 1e-12
     speed = run.history.velocity_a
     assert np.all(np.diff(speed) >= 0.0)
     assert speed[-1] == pytest.approx(0.0, abs=1e-9)
