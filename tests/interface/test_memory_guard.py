@@ -337,9 +337,9 @@ def test_a_real_limit_is_seen_before_the_factor_is_computed(tmp_path):
         "from klack.elasticity.factorization import factorize\n"
         "from klack.errors import InputError\n"
         "A = lattice(36)\n"
-        "factorize(lattice(6)).close()"
+        "factorize(lattice(6), threads=1).close()"
     )
-    after = "try:\n    factorize(A)\nexcept InputError as error:\n    print(error)"
+    after = "try:\n    factorize(A, threads=1)\nexcept InputError as error:\n    print(error)"
     done = limited(before, 100_000_000, after, tmp_path)
 
     assert done.returncode == 0, done.stderr
