@@ -49,6 +49,11 @@ def start_judged(given: object) -> None:
     _start(given)
 
 
+def name_of_the_judge() -> str:
+    """Which function judges the runs of this process."""
+    return energy_balance.check_energy_balance.__name__
+
+
 energy_balance.check_energy_balance = judge
 workers._start = start_judged
 

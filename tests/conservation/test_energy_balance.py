@@ -122,9 +122,5 @@ def test_every_solver_is_judged():
 def test_worker_processes_judge_as_well():
     """A run in a process of a pool fails in the same words."""
     with energy_ledger.workers.worker_pool(1, None) as pool:
-        job = pool.submit(energy_balance_is_judged)
+        job = pool.submit(energy_ledger.name_of_the_judge)
         assert job.result(timeout=120) == "judge"
-
-
-def energy_balance_is_judged() -> str:
-    return energy_balance.check_energy_balance.__name__
