@@ -8,6 +8,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
+from energy_ledger import allowed
 
 from klack.case import load_case, read_case, shipped_cases
 from klack.case.schema import Case
@@ -196,7 +197,8 @@ def test_shots_of_the_guided_valve():
     ):
         assert fine in text
         text = text.replace(fine, coarse)
-    study = run_shots(read_case(text, path), count=3, workers=1)
+    with allowed("simulate_interface", 1e-3):  # coarse elements at the contact: asserted below
+        study = run_shots(read_case(text, path), count=3, workers=1)
 
     centric, shots = study.centric.row(0), study.shots
     back = centric["restitution"] * centric["approach_speed"]
