@@ -98,8 +98,9 @@ def _free_blocks() -> list[Check]:
             "two blocks, 20 modes: gaps under an uneven pressure, largest deviation [relative]",
             expected=0.0,
             computed=float(np.max(np.abs(ours - exact)) / np.max(np.abs(exact))),
-            tolerance=5e-14,
+            tolerance=1e-12,
             source="static solutions of the whole bodies (inertia relief)",
+            reason="round-off of two solutions: 1e-15 with MKL, 6e-14 with SuperLU",
         ),
         compare(
             _GROUP,
