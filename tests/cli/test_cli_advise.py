@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from energy_ledger import allowed
 from ruamel.yaml import YAML
 
 from klack.case.case_tree import read_case_tree
@@ -116,6 +117,23 @@ def test_advice_can_be_pasted_and_written(path, tmp_path, capsys):
     assert laid_over.bodies == advised.bodies
     assert laid_over.reduction == advised.reduction
     assert laid_over.run == advised.run
+
+
+@pytest.mark.slow
+def test_the_interface_level_is_advised_and_run_again(path, tmp_path):
+    """Convergence: the advised case is nearer to the finest run than the case as it is."""
+    numbers = tmp_path / "advice.json"
+
+    with allowed("simulate_interface", 1e-3):  # a coarse contact, owing 1.2e-4 at the end
+        code = main(
+            ["advise", str(path), "--level", "interface", "--json", str(numbers), "--quiet"]
+        )
+
+    assert code == 0
+    told = json.loads(numbers.read_text())
+    assert (told["level"], told["fixed"]) == ("interface", [])
+    again = told["run_again"]
+    assert again["advised"]["force_history"] < again["now"]["force_history"]
 
 
 def test_values_are_added_where_none_stand(path):

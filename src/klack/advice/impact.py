@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any, Literal
 
@@ -93,7 +94,12 @@ class _Base:
     def step(self) -> float:
         return _step_of(self.case, self.level)
 
-    def history(self, factor: float = 1.0) -> ImpactHistory:
+    @cached_property
+    def now(self) -> ImpactHistory:
+        """Impact of the case as it is; wanted again when the factorisations are gone."""
+        return self.history(1.0)
+
+    def history(self, factor: float) -> ImpactHistory:
         """Impact at the level of the advice with another step."""
         step = factor * self.step
         if self.level == "reduced":
@@ -159,10 +165,9 @@ def advise_impact(
     log.notes += warned
     log.runs += 1
     with collected_warnings():
-        now = base.history()
-        _require_one_pulse(base, now)
-        wanted = highest_band(now) if up_to is None else up_to
-        judged = judged_up_to(now, wanted)
+        _require_one_pulse(base, base.now)
+        wanted = highest_band(base.now) if up_to is None else up_to
+        judged = judged_up_to(base.now, wanted)
         if up_to is not None and judged < up_to / 1.3:
             log.notes.append(
                 f"Third octaves above {format_si(judged, 'Hz', 3)} are more than 40 dB below the "
@@ -332,7 +337,7 @@ def _modes_and_step(
             )
         )
         progress("modes and steps", (i + 1) / 4)
-    histories = [base.history(factor) for factor in _STEPS]
+    histories = [base.now, *(base.history(factor) for factor in _STEPS[1:])]
     value = SettingValue(key=base.step_key, value=base.step, unit="s")
     measured.append(
         Measured(
@@ -367,6 +372,10 @@ class _Family:
     words: str
     fine: bool
     large: bool = False
+
+    @cached_property
+    def dofs(self) -> int:
+        return _dofs(build_bodies(self.case, silent))
 
 
 def _family(base: _Base, log: _Log) -> _Family:
@@ -419,9 +428,9 @@ def _mesh_ladders(
     finest = {k: v for s in settings for k, v in s.at(factors[s.name][-1]).items()}
     total = 1 + sum(len(f) - 1 for f in factors.values())
     result: list[Measured] = []
-    base_run = base.history() if not family.fine else None
-    reference = base_run
-    if reference is None:
+    if not family.fine:
+        reference = base.now
+    else:
         progress("meshes", 0.0)
         reference = _run(applied(case, finest), base.level, threads)
         log.runs += 1
@@ -462,7 +471,7 @@ def _mesh_ladders(
         progress("layers", 0.0)
         coarse = _run(applied(base.case, layers.at(_COARSE[0])), base.level, threads)
         log.runs += 1
-        ladder = history_ladder(list(_COARSE), [coarse, base.history()], judged, _LAYER_ORDER)
+        ladder = history_ladder(list(_COARSE), [coarse, base.now], judged, _LAYER_ORDER)
         words = " and ".join(f"{v.at(_COARSE[0]):g}" for v in layers.values[:1])
         result.append(
             Measured(
@@ -517,9 +526,8 @@ def _size_with(base: _Base, family: _Family, changes: Mapping[Key, float]) -> in
     ]
     ratio = max(layers, default=1.0)
     if family.case is not base.case:
-        before = _dofs(build_bodies(family.case, silent))
         after = _dofs(build_bodies(applied(family.case, sections), silent))
-        return round(base.dofs * ratio * after / before)
+        return round(base.dofs * ratio * after / family.dofs)
     factors = [v / _value_at(base.case, k) for k, v in sections.items()]
     return round(larger(base.dofs, min(1.0, *factors), 3) * ratio)
 
@@ -551,7 +559,7 @@ def _confirmed(
     progress("advised case", 0.0)
     case = family.case
     reference = _richest(applied(case, finest), base.step / 2.0, threads)
-    present = base.history() if case is base.case else _run(case, base.level, threads)
+    present = base.now if case is base.case else _run(case, base.level, threads)
     progress("advised case", 0.5)
     advised = _run(_advised(base, case, advice.changes), base.level, threads)
     log.runs += 2 + (case is not base.case)
