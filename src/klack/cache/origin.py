@@ -10,6 +10,7 @@ from pathlib import Path
 
 import klack
 from klack.cache.content import content_key
+from klack.cores import available_cores
 
 __all__ = ["origin"]
 
@@ -38,7 +39,7 @@ def origin() -> str:
         {name: _version(name) for name in _DISTRIBUTIONS},
         (platform.system(), platform.machine(), platform.python_version(), _instructions()),
         {name: os.environ.get(name) for name in _THREADS},
-        _cores(),
+        available_cores(),
     )
 
 
@@ -64,9 +65,3 @@ def _instructions() -> tuple[str, ...]:
     module = import_module("numpy._core._multiarray_umath")
     found = getattr(module, "__cpu_features__", {})
     return tuple(sorted(name for name, there in found.items() if there))
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 
 from klack import __version__
+from klack.cores import available_cores
 from klack.elasticity.factorization import available_backends
 
 __all__ = ["RunConditions", "run_conditions"]
@@ -65,7 +66,6 @@ def run_conditions() -> RunConditions:
 
 
 def _threads() -> str:
-    affinity = getattr(os, "sched_getaffinity", None)  # not on macOS and Windows
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    cores = available_cores()
     limits = [f"{name}={os.environ[name]}" for name in _THREAD_LIMITS if os.environ.get(name)]
     return ", ".join([f"{cores} core{'s' * (cores != 1)}", *limits])

@@ -17,6 +17,7 @@ from klack.case.key_path import written_at
 from klack.case.measurement import CaseMeasurement
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
+from klack.cores import available_cores
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.measurement.computed_stroke import trigger_instant
@@ -50,7 +51,6 @@ from klack.workflow.calibration_study import (
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.valve import build_valve
-from klack.workflow.workers import available_cores
 
 __all__ = ["calibration_of", "run_calibration"]
 

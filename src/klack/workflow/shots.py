@@ -12,6 +12,7 @@ from klack import __version__
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
+from klack.cores import available_cores
 from klack.errors import ConvergenceError
 from klack.units import format_si
 from klack.workflow.pressure import pressure_record
@@ -30,7 +31,6 @@ from klack.workflow.shots_pool import run_shots_on
 from klack.workflow.shots_study import RuleVerdict, ShotColumns, ShotsStudy
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.study import PressureRecord
-from klack.workflow.workers import available_cores
 
 __all__ = ["judge_rule", "run_shots"]
 

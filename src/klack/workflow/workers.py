@@ -17,7 +17,6 @@ from klack.errors import ConvergenceError, InputError, KlackError
 __all__ = [
     "Failure",
     "answer",
-    "available_cores",
     "deaf_to_interrupts",
     "shared",
     "unwrapped",
@@ -35,13 +34,6 @@ class Failure:
 
     kind: str
     parts: tuple[str, ...]
-
-
-def available_cores() -> int:
-    """Processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def worker_pool(workers: int, given: object) -> ProcessPoolExecutor:
