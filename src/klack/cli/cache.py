@@ -24,6 +24,7 @@ def cache(
     """
     from klack.cache.setting import result_cache
     from klack.errors import InputError
+    from klack.memory import in_words
 
     require_json_target(json)
     results = result_cache()
@@ -43,11 +44,11 @@ def cache(
                 expected="files that may be deleted",
                 hint="check who owns the folder, or set KLACK_CACHE to another one.",
             ) from error
-        print(f"Deleted {gone.count} results, {_size(gone.size)}.", file=stream)
+        print(f"Deleted {gone.count} results, {in_words(gone.size)}.", file=stream)
     there = results.content()
     print(f"Folder: {results.folder}", file=stream)
     print(
-        f"Results: {there.count}, {_size(there.size)} of at most {_size(results.limit)}",
+        f"Results: {there.count}, {in_words(there.size)} of at most {in_words(results.limit)}",
         file=stream,
     )
     if json is not None:
@@ -55,10 +56,3 @@ def cache(
         numbers = {"count": there.count, "size_B": there.size, "limit_B": results.limit}
         write_json(json, {"folder": folder, **numbers})
     return 0
-
-
-def _size(count: int) -> str:
-    """Bytes in words."""
-    if count < 1_000_000:
-        return f"{count / 1e3:.3g} kB"
-    return f"{count / 1e6:.3g} MB" if count < 1_000_000_000 else f"{count / 1e9:.3g} GB"
