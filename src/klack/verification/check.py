@@ -117,16 +117,19 @@ class Check:
 def compare(
     group: str,
     name: str,
-    *,
     expected: float,
     computed: float,
     tolerance: float,
     source: str,
+    curve: ComparedCurve | None = None,
+    *,
     absolute: bool = False,
     reason: str = "",
-    curve: ComparedCurve | None = None,
 ) -> Check:
-    """Build a :class:`Check`; relative unless ``absolute`` or the expected value is zero."""
+    """Build a :class:`Check`; relative unless ``absolute`` or the expected value is zero.
+
+    A group with many checks names itself once: ``_check = partial(compare, GROUP)``.
+    """
     difference = computed - expected
     is_absolute = absolute or expected == 0
     deviation = difference if is_absolute else difference / abs(expected)

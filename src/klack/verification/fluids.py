@@ -1,5 +1,6 @@
 """Fluids: reference equations, mixtures with gas and vapour, and their table."""
 
+from functools import partial
 from itertools import pairwise
 from math import exp, log
 
@@ -21,6 +22,8 @@ ATMOSPHERE = 101_325.0
 IAPWS = "IAPWS-95 and IAPWS 2008 at 25 degC and 1 atm, between the columns of the library"
 NSRDS = "NSRDS functions (Daubert and Danner; coefficients as in OpenFOAM), 30 degC"
 
+_check = partial(compare, GROUP)
+
 
 def checks() -> list[Check]:
     """Reference data, laws of mixtures, conservation of mass and energy, and the table."""
@@ -33,27 +36,6 @@ def checks() -> list[Check]:
         *_conservation(),
         *_table(),
     ]
-
-
-def _check(
-    name: str,
-    expected: float,
-    computed: float,
-    tolerance: float,
-    source: str,
-    curve: ComparedCurve | None = None,
-    reason: str = "",
-) -> Check:
-    return compare(
-        GROUP,
-        name,
-        expected=expected,
-        computed=computed,
-        tolerance=tolerance,
-        source=source,
-        curve=curve,
-        reason=reason,
-    )
 
 
 def _water() -> list[Check]:

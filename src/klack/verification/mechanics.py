@@ -1,6 +1,7 @@
 """Mechanical components in the time loop: closed solutions of one and two masses."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import exp, log, pi, sqrt
 from warnings import catch_warnings, simplefilter
 
@@ -26,6 +27,8 @@ GROUP = "mechanics"
 MASS = 3e-3  # [kg]
 NEWTON = "Newton's second law, closed form"
 
+_check = partial(compare, GROUP)
+
 
 def checks() -> list[Check]:
     """Motion under each component against its closed solution, and the energy books."""
@@ -37,25 +40,6 @@ def checks() -> list[Check]:
         *_two_bodies(),
         *_balances(),
     ]
-
-
-def _check(
-    name: str,
-    expected: float,
-    computed: float,
-    tolerance: float,
-    source: str,
-    curve: ComparedCurve | None = None,
-) -> Check:
-    return compare(
-        GROUP,
-        name,
-        expected=expected,
-        computed=computed,
-        tolerance=tolerance,
-        source=source,
-        curve=curve,
-    )
 
 
 def _run(

@@ -1,6 +1,7 @@
 """The time loop of a network: books, momentum, repetition, step sizes, and laws seen through it."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import exp, pi, sqrt
 from typing import ClassVar
 from warnings import catch_warnings, simplefilter
@@ -50,6 +51,8 @@ STEP = 20e-9
 RECORD = 1.28e-6
 NEVER = 1e9  # [N] suction that is never reached
 
+_check = partial(compare, GROUP)
+
 
 def checks() -> list[Check]:
     """A whole valve, then one law after the other in the smallest network that shows it."""
@@ -70,30 +73,6 @@ def checks() -> list[Check]:
         *_surge(),
         *_coil(),
     ]
-
-
-def _check(
-    name: str,
-    expected: float,
-    computed: float,
-    tolerance: float,
-    source: str,
-    *,
-    absolute: bool = False,
-    curve: ComparedCurve | None = None,
-    reason: str = "",
-) -> Check:
-    return compare(
-        GROUP,
-        name,
-        expected=expected,
-        computed=computed,
-        tolerance=tolerance,
-        source=source,
-        absolute=absolute,
-        curve=curve,
-        reason=reason,
-    )
 
 
 def _run(
