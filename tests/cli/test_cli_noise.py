@@ -256,17 +256,19 @@ def test_what_cannot_be_used_is_said(impact, heard, tmp_path, capsys, words, tol
 
 def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):
     text = (HOW_TO / "noise.md").read_text(encoding="utf-8")
-    energy, exposure, loudness = (
+    energy, exposure, weighted, loudness = (
         float(re.search(rf"\| {name}[^|]*\| ([\d.]+) {unit} \|", text)[1])
         for name, unit in (
             ("structure-borne energy injected", "uJ"),
             ("sound exposure level", "dB"),
+            ("the same, A-weighted", "dB"),
             ("loudness, loudest moment", "sone"),
         )
     )
 
     assert 1e6 * numbers["injected_energy_J"] == pytest.approx(energy, abs=6e-4)
     assert numbers["sound_exposure_level_dB"] == pytest.approx(exposure, abs=0.06)
+    assert numbers["sound_exposure_level_dBA"] == pytest.approx(weighted, abs=0.06)
     assert numbers["loudness_max_sone"] == pytest.approx(loudness, abs=0.06)
     # the excerpt is that of the case, less its comments
     case = (ROOT / "cases" / "demo-valve-axisymmetric" / "case.yaml").read_text(encoding="utf-8")
