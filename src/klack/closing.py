@@ -1,4 +1,4 @@
-"""Holders of much memory that give it back at the end of a ``with`` block."""
+"""Holders of memory, files, locks or processes that let go of them after a ``with`` block."""
 
 from abc import ABC, abstractmethod
 from types import TracebackType
@@ -12,7 +12,7 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Give the memory back."""
+        """Let go of what is held."""
 
     def __enter__(self) -> Self:
         return self

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.elasticity.closing import Closing
+from klack.closing import Closing
 from klack.elasticity.factor_memory import fill_memory, require_factor_memory
 
 __all__ = ["NgsolveFactorization"]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import triu
 
-from klack.elasticity.closing import Closing
+from klack.closing import Closing
 from klack.elasticity.factor_memory import out_of_memory, require_factor_memory
 from klack.elasticity.factorization import Precision, not_positive_definite
 from klack.errors import ConvergenceError

@@ -28,8 +28,8 @@ from klack.cache.content import content_key
 from klack.cache.entry import Entry
 from klack.cache.remember import remembered
 from klack.cache.result_cache import ResultCache
+from klack.closing import Closing
 from klack.elasticity.body import ElasticBody
-from klack.elasticity.closing import Closing
 from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
 from klack.errors import InputError

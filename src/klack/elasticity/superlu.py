@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from klack.elasticity.closing import Closing
+from klack.closing import Closing
 from klack.elasticity.factor_memory import fill_memory, out_of_memory, require_factor_memory
 from klack.elasticity.factorization import not_positive_definite
 

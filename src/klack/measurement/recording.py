@@ -7,15 +7,14 @@ its sizes are checked before memory is asked for.
 """
 
 import re
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.closing import Closing
 from klack.errors import InputError
 from klack.measurement.time_base import TimeBase, survey_time
 
@@ -58,7 +57,7 @@ class ChannelInfo:
     label: str = ""
 
 
-class Recording(ABC):
+class Recording(Closing):
     """Channels of one open file; use it in a ``with`` statement.
 
     Parameters
@@ -155,19 +154,8 @@ class Recording(ABC):
         """Time of samples that exist [s]; formats that store it override this."""
         return channel.start + channel.step * np.arange(first, last, dtype=np.float64)
 
-    def close(self) -> None:  # noqa: B027  # many formats hold nothing open
+    def close(self) -> None:  # many formats hold nothing open
         """Let go of the file."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def some_names(channels: tuple[ChannelInfo, ...], most: int = 12) -> str:

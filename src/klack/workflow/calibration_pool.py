@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from types import TracebackType
-from typing import Self
 
+from klack.closing import Closing
 from klack.errors import ConvergenceError
 from klack.workflow.calibration_log import TrialKey, TrialLog
 from klack.workflow.calibration_motion import Motion, MotionModel
@@ -21,7 +20,7 @@ from klack.workflow.workers import (
 __all__ = ["TrialPool"]
 
 
-class TrialPool:
+class TrialPool(Closing):
     """Computes trials that the log does not hold yet, and keeps them there.
 
     The numbers do not depend on the number of workers.
@@ -39,15 +38,8 @@ class TrialPool:
         self.used: set[TrialKey] = set()
         self._pool: ProcessPoolExecutor | None = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """End the processes."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
 

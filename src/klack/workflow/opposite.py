@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from klack.case.schema import Case
+from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.statics import StaticContact
 from klack.elasticity.body import ElasticBody
-from klack.elasticity.closing import Closing
 from klack.elasticity.statics import Flexibility
 from klack.mesh.mesh import Surface
 from klack.mesh.rigid import Pose

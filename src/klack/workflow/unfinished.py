@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Generic, TypeVar
 
 import klack
 from klack.case.bodies import CaseBody
+from klack.closing import Closing
 from klack.errors import InputError
 from klack.folder_lock import FolderLock, try_lock
 
@@ -67,7 +67,7 @@ class LogForm(Generic[Key, Part]):
             return
 
 
-class UnfinishedLog(Generic[Key, Part]):
+class UnfinishedLog(Closing, Generic[Key, Part]):
     """Finished parts in a file; those of an earlier, interrupted run are there.
 
     One process at a time: the file is locked until :meth:`close`.
@@ -104,17 +104,6 @@ class UnfinishedLog(Generic[Key, Part]):
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Let other processes have the file."""
