@@ -6,6 +6,7 @@ Longer: ``KLACK_LONG=50``, another ``KLACK_SEED=2``.
 import os
 import random
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -74,8 +75,42 @@ def test_a_break_of_the_reader_is_an_error(whole: bytes, tmp_path: Path, monkeyp
 
 def test_a_file_that_is_read_for_ever_is_an_error(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(step_trial, "_PROGRAM", "import time\ntime.sleep(60)")
+    path = tmp_path / "part.step"
+    path.touch()
     with pytest.raises(InputError, match=r"longer than 0\.2 s"):
-        require_readable_step(tmp_path / "part.step", patience=0.2)
+        require_readable_step(path, patience=0.2)
+
+
+def test_a_file_is_tried_once_until_it_changes(whole: bytes, tmp_path: Path, monkeypatch):
+    """Truth = number of processes started, counted."""
+    starts, run = [], subprocess.run
+
+    def counted(words, **options):
+        starts.append(words[-1])
+        return run(words, **options)
+
+    monkeypatch.setattr(step_trial.subprocess, "run", counted)
+    path = tmp_path / "part.step"
+    path.write_bytes(whole)
+    for _ in range(3):
+        assert read_step(path).solids
+    assert starts == [str(path)]
+
+    later = path.stat().st_mtime_ns + 1_000_000_000
+    os.utime(path, ns=(later, later))  # written again with as many bytes
+    read_step(path)
+    (tmp_path / "other.step").write_bytes(whole)
+    os.utime(tmp_path / "other.step", ns=(later, later))
+    (tmp_path / "other.step").replace(path)  # another file of the same size and time
+    read_step(path)
+    assert len(starts) == 3
+
+    monkeypatch.setattr(step_trial, "_PROGRAM", "import os\nos.abort()")
+    path.write_bytes(whole + b"\n")
+    for _ in range(2):  # refused files are not remembered
+        with pytest.raises(InputError, match="breaks on it"):
+            read_step(path)
+    assert len(starts) == 5
 
 
 def test_the_trial_is_silent_and_starts_nothing_else(whole: bytes, tmp_path: Path, capfd):

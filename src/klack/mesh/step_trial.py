@@ -3,11 +3,13 @@
 OpenCASCADE reads whatever a file says.  Of files with a few wrong digits or a lost line one in six
 brought it to an end without a word (a segmentation fault), some keep it busy without end: that may
 not happen in the process that holds the work of a user.  The second reading, of a file that passed,
-takes as long as the first; meshing takes far longer.
+takes as long as the first; meshing takes far longer.  A file that passed is not tried again by this
+process until it changes.
 """
 
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 from klack.errors import InputError
@@ -38,6 +40,13 @@ def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
     """
     if not sys.executable:  # inside of another program
         return
+    state = path.stat()
+    _try(path, patience, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
+
+
+@cache  # a file that was refused is tried again: memory may have been short
+def _try(path: Path, patience: float, state: tuple[int, ...]) -> None:
+    """Start the child; ``state`` tells a file from what stood at its path before."""
     try:
         done = subprocess.run(
             [sys.executable, "-c", _PROGRAM, str(path.absolute())],
