@@ -1,6 +1,5 @@
 """The advice as YAML: lines to paste, and the whole case with them."""
 
-from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from ruamel.yaml import YAML
 
 from klack.advice.advice import Advice
 from klack.case.case_tree import CaseTree
-from klack.case.inserting import merged, with_values
+from klack.case.inserting import merged, plain_data, with_values
 from klack.case.key_path import written_at
 from klack.case.rewriting import moved_files
 from klack.case.valve_reader import read_any_case
@@ -53,7 +52,7 @@ def advice_yaml(tree: CaseTree, advice: Advice) -> str:
     for key, text in changed_values(tree, advice).items():
         whole = key[:3] if key[0] == "bodies" and key[2] == "mesh" else None
         if whole and written_at(data, whole) is None:
-            data = merged(data, whole, _plain(written_at(tree.data, whole)))
+            data = merged(data, whole, plain_data(written_at(tree.data, whole)))
         data = merged(data, key, safe.load(text))
     if not data:
         return ""
@@ -63,12 +62,6 @@ def advice_yaml(tree: CaseTree, advice: Advice) -> str:
     stream = StringIO()
     out.dump(data, stream)
     return stream.getvalue()
-
-
-def _plain(data: Any) -> Any:
-    if isinstance(data, Mapping):
-        return {str(key): _plain(value) for key, value in data.items()}
-    return [_plain(item) for item in data] if isinstance(data, list) else data
 
 
 def advised_text(tree: CaseTree, advice: Advice, path: Path, version: str) -> str:

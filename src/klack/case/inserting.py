@@ -14,7 +14,7 @@ from klack.case.rewriting import rewritten
 from klack.errors import InputError
 from klack.input.problem import Key
 
-__all__ = ["merged", "with_values"]
+__all__ = ["merged", "plain_data", "with_values"]
 
 
 def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> str:
@@ -51,6 +51,13 @@ def merged(data: Any, key: Key, value: object) -> Any:
     return copy
 
 
+def plain_data(data: Any) -> Any:
+    """Copy without comments and positions: mappings, lists and plain values."""
+    if isinstance(data, Mapping):
+        return {str(key): plain_data(value) for key, value in data.items()}
+    return [plain_data(item) for item in data] if isinstance(data, list) else data
+
+
 def _inserted(text: str, key: Key, value: str) -> str:
     root: Node = YAML().compose(StringIO(text))
     node, rest = root, key
@@ -82,7 +89,7 @@ def _require_only(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
     for key, value in values.items():
         expected = merged(expected, key, YAML(typ="safe").load(value))
     try:
-        same = _plain(parse(text, tree.path)[0]) == _plain(expected)
+        same = plain_data(parse(text, tree.path)[0]) == plain_data(expected)
     except InputError:
         same = False
     if not same:
@@ -92,9 +99,3 @@ def _require_only(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
             expected="the sections bodies, reduction and run written out, without anchors",
             hint="replace anchors and aliases (& and *) by plain values, or change it by hand.",
         )
-
-
-def _plain(data: Any) -> Any:
-    if isinstance(data, Mapping):
-        return {str(key): _plain(value) for key, value in data.items()}
-    return [_plain(item) for item in data] if isinstance(data, list) else data
