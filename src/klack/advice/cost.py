@@ -3,9 +3,9 @@
 Rough, and meant to be: they decide whether a finer mesh is tried, and what a user may expect.
 """
 
-import os
+from klack.memory import available_memory
 
-__all__ = ["available_memory", "fits", "larger", "memory_of", "time_of"]
+__all__ = ["fits", "larger", "memory_of", "time_of"]
 
 _SHARE = 0.5  # of the free memory
 
@@ -32,14 +32,9 @@ def time_of(dofs: int, dimension: int) -> float:
     return float(dofs ** _TIME[dimension])
 
 
-def available_memory() -> float:
-    """Free memory of the machine [bytes]; inf where it is not known."""
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, OSError, ValueError):
-        return float("inf")
-
-
 def fits(dofs: int, dimension: int) -> bool:
-    """Whether a run of this size is expected to use no more than half of the free memory."""
-    return memory_of(dofs, dimension) <= _SHARE * available_memory()
+    """Whether a run of this size is expected to use no more than half of the free memory.
+
+    Free is what is left to this process, inside a container or a batch job too.
+    """
+    return memory_of(dofs, dimension) <= _SHARE * available_memory().size
