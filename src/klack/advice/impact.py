@@ -330,7 +330,7 @@ def _modes_and_step(
                 )
         measured.append(
             Measured(
-                setting=mode_setting(name, choice, base.counts[name], base.pools[name]),
+                setting=mode_setting(name, choice, base.counts[name], base.pools[name].frequency),
                 ladder=ladder,
                 runs=_runs_words("interface", ladder.factors, base.counts[name]),
                 at_least=limit,

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.acoustics.third_octave import band_edges
 from klack.advice.ladder import Ladder
@@ -12,6 +14,7 @@ from klack.advice.settings import Setting, SettingValue
 from klack.advice.target import HISTORY, impact_errors
 from klack.case.bodies import ModeChoice
 from klack.case.schema import Case
+from klack.case.valve import ValveCase
 from klack.contact.history import ImpactHistory
 from klack.elasticity.eigen import Modes
 from klack.reduction.ports import Port
@@ -32,18 +35,20 @@ __all__ = [
     "richer_pools",
 ]
 
+AnyCase = TypeVar("AnyCase", Case, ValveCase)
+
 _ORDER = 2.0
 _MEASURED = (4.0, 2.0, 1.0, 0.5)
 _FEWEST = 2
 
 
-def explicit_modes(case: Case) -> Case:
+def explicit_modes(case: AnyCase) -> AnyCase:
     """Return the case with the choice of modes written out for every body."""
     choices = {name: case.reduction.choice(name) for name in case.bodies}
     return _with_choices(case, choices)
 
 
-def _with_choices(case: Case, choices: Mapping[str, ModeChoice]) -> Case:
+def _with_choices(case: AnyCase, choices: Mapping[str, ModeChoice]) -> AnyCase:
     modes = {**case.reduction.modes, **choices}
     reduction = case.reduction.model_copy(update={"modes": modes})
     return case.model_copy(update={"reduction": reduction})
@@ -94,7 +99,9 @@ def interface_history(
     return simulate_case(case, model, step=step).history
 
 
-def mode_setting(body: str, choice: ModeChoice, count: int, pool: Modes) -> Setting:
+def mode_setting(
+    body: str, choice: ModeChoice, count: int, frequencies: NDArray[np.float64]
+) -> Setting:
     """Modes of a body as the case chooses them.
 
     Parameters
@@ -103,8 +110,8 @@ def mode_setting(body: str, choice: ModeChoice, count: int, pool: Modes) -> Sett
     choice : ModeChoice
     count : int
         That it keeps.
-    pool : Modes
-        Of which the case keeps some.
+    frequencies : array, shape (k,) [Hz]
+        Of the elastic modes known, ascending; the case keeps some of them.
     """
     key = ("reduction", "modes", body)
     kind = "participation" if choice.participation is not None else "count"
@@ -115,7 +122,7 @@ def mode_setting(body: str, choice: ModeChoice, count: int, pool: Modes) -> Sett
             value=choice.frequency,
             unit="Hz",
             kind="frequency",
-            table=tuple(pool.frequency.tolist()),
+            table=tuple(frequencies.tolist()),
         )
     return Setting(name=f"modes of {body}", group="modes", values=(value,))
 

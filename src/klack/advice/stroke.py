@@ -15,9 +15,9 @@ from klack.advice.advice import Advice, Measured
 from klack.advice.affordable import affordable
 from klack.advice.cost import time_of
 from klack.advice.ladder import Ladder, Measure, score
+from klack.advice.modes import explicit_modes, mode_setting
 from klack.advice.regions import mesh_settings, unmeshed_note
 from klack.advice.settings import Setting, SettingValue, applied
-from klack.case.bodies import ModeChoice
 from klack.case.valve import ValveCase, Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
@@ -117,7 +117,7 @@ def advise_stroke(
     """
     begin = perf_counter()
     measures = stroke_measures(error)
-    case = _explicit(case)
+    case = explicit_modes(case)
     with collected_warnings() as notes:
         valve = build_valve(case, progress, threads=threads)
         spent = perf_counter() - begin
@@ -185,12 +185,6 @@ def advise_stroke(
     )
 
 
-def _explicit(case: ValveCase) -> ValveCase:
-    modes = {name: case.reduction.choice(name) for name in case.bodies}
-    reduction = case.reduction.model_copy(update={"modes": modes})
-    return case.model_copy(update={"reduction": reduction})
-
-
 def _step_ladder(
     valve: Valve, now: Mapping[str, NDArray[np.float64]], measures: Sequence[Measure]
 ) -> Measured:
@@ -226,32 +220,12 @@ def _mesh_settings(case: ValveCase) -> tuple[Setting, ...]:
 def _mode_settings(valve: Valve) -> list[Setting]:
     found = []
     for name, body in valve.reduced.items():
-        choice: ModeChoice = valve.case.reduction.choice(name)
+        choice = valve.case.reduction.choice(name)
         elastic = body.frequencies[body.rigid_count : body.mode_count - body.attachment_count]
-        key = ("reduction", "modes", name)
-        if choice.frequency is not None:
-            value = SettingValue(
-                key=(*key, "frequency"),
-                value=choice.frequency,
-                unit="Hz",
-                kind="frequency",
-                table=tuple(elastic.tolist()),
-            )
-        elif choice.count is not None:
-            value = SettingValue(
-                key=(*key, "count"), value=float(choice.count), kind="count", least=1.0
-            )
-        else:  # of a pool: no more than it holds
-            most = 2 * (choice.participation or 1)
-            if (choice.pool or 0) < most:
-                continue
-            value = SettingValue(
-                key=(*key, "participation"),
-                value=float(choice.participation or 1),
-                kind="count",
-                least=1.0,
-            )
-        found.append(Setting(name=f"modes of {name}", group="modes", values=(value,)))
+        count = choice.count or choice.participation or len(elastic)
+        if choice.participation is not None and (choice.pool or 0) < 2 * count:
+            continue  # of a pool: no more than it holds
+        found.append(mode_setting(name, choice, count, elastic))
     return found
 
 
