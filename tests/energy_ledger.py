@@ -49,7 +49,7 @@ def start_judged(given: object) -> None:
     _start(given)
 
 
-def name_of_the_judge() -> str:
+def name_of_the_judge(_: object = None) -> str:
     """Which function judges the runs of this process."""
     return energy_balance.check_energy_balance.__name__
 

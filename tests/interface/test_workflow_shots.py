@@ -8,7 +8,7 @@ import pytest
 from energy_ledger import allowed
 
 from klack.case import load_case
-from klack.errors import InputError
+from klack.errors import ConvergenceError, InputError
 from klack.workflow.progress import silent
 from klack.workflow.record_store import stored_format
 from klack.workflow.shot_draw import centric_draw, draw_shot
@@ -181,6 +181,21 @@ def test_a_failing_shot_is_named(model, draws):
     )
     with pytest.raises(InputError, match=r"(?s)shot 2.*contact\.reach"):
         run_shots_on(1, replace(model.setup, model=rim), draws[2:3], shot_log(None, ""), silent)
+
+
+def test_shots_whose_workers_die_end_with_a_way_out(model, draws, alone, tmp_path, monkeypatch):
+    """What they share is larger than the pipe to a new process; truth = exit code of the worker."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, sys\nif any('spawn_main' in word for word in sys.orig_argv):\n    os._exit(3)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    log = shot_log(None, "")
+    log.add(0, alone[0])
+    words = (
+        r"shots: a worker process died with exit code 3; 1 of 4 shots are finished\.\nTry: fewer"
+    )
+    with pytest.raises(ConvergenceError, match=words):
+        run_shots_on(2, model.setup, draws, log, silent)
 
 
 def test_a_study_comes_back_from_disk(study, tmp_path: Path):

@@ -1,21 +1,12 @@
 """Trials of a calibration on all cores, each computed once."""
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 
 from klack.closing import Closing
 from klack.errors import ConvergenceError
 from klack.workflow.calibration_log import TrialKey, TrialLog
 from klack.workflow.calibration_motion import Motion, MotionModel
-from klack.workflow.workers import (
-    Failure,
-    answer,
-    deaf_to_interrupts,
-    shared,
-    unwrapped,
-    worker_pool,
-)
+from klack.workflow.workers import Failure, WorkerDied, WorkerPool, answer, shared, unwrapped
 
 __all__ = ["TrialPool"]
 
@@ -36,12 +27,11 @@ class TrialPool(Closing):
     def __init__(self, model: MotionModel, workers: int, log: TrialLog) -> None:
         self.model, self.workers, self.log = model, workers, log
         self.used: set[TrialKey] = set()
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool = WorkerPool(workers, model)
 
     def close(self) -> None:
         """End the processes."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+        self._pool.close()
 
     def motions(self, values: Sequence[Sequence[float]], duration: float) -> list[Motion]:
         """Motions for several parameter vectors [SI], in their order.
@@ -62,16 +52,12 @@ class TrialPool(Closing):
         return [self.log.done[key] for key in keys]
 
     def _compute(self, keys: Sequence[TrialKey]) -> None:
-        if self._pool is None:
-            self._pool = worker_pool(self.workers, self.model)
         try:
-            with deaf_to_interrupts():
-                jobs = {self._pool.submit(_run, key): key for key in keys}
-            for job in as_completed(jobs):
-                self._keep(jobs[job], job.result())
-        except BrokenProcessPool:
+            for key, found in self._pool.completed(_run, keys):
+                self._keep(key, found)
+        except WorkerDied as error:
             raise ConvergenceError(
-                "calibration: a worker process died; the trials so far are kept.\n"
+                f"calibration: {error}; the trials so far are kept.\n"
                 "Try: fewer --workers if the memory was full; the same command goes on from here."
             ) from None
 

@@ -1,22 +1,13 @@
 """Many shots on all cores: one process per core, one thread each."""
 
 from collections.abc import Sequence
-from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 
 from klack.errors import ConvergenceError
 from klack.workflow.progress import Progress
 from klack.workflow.shot_draw import ShotDraw
 from klack.workflow.shot_run import ShotOutcome, ShotSetup, run_shot
 from klack.workflow.shots_log import ShotLog
-from klack.workflow.workers import (
-    Failure,
-    answer,
-    deaf_to_interrupts,
-    shared,
-    unwrapped,
-    worker_pool,
-)
+from klack.workflow.workers import Failure, WorkerDied, WorkerPool, answer, shared, unwrapped
 
 __all__ = ["run_shots_on"]
 
@@ -45,20 +36,16 @@ def run_shots_on(
             log.add(draw.index, unwrapped(_name(draw.index), _answer(setup, draw)))
             progress("shots", len(log.done) / total)
         return
-    pool = worker_pool(workers, setup)
     try:
-        with deaf_to_interrupts():
-            jobs = {pool.submit(_run, draw): draw.index for draw in left}
-        for job in as_completed(jobs):
-            log.add(jobs[job], unwrapped(_name(jobs[job]), job.result()))
-            progress("shots", len(log.done) / total)
-    except BrokenProcessPool:
+        with WorkerPool(workers, setup) as pool:
+            for draw, found in pool.completed(_run, left):
+                log.add(draw.index, unwrapped(_name(draw.index), found))
+                progress("shots", len(log.done) / total)
+    except WorkerDied as error:
         raise ConvergenceError(
-            f"shots: a worker process died; {len(log.done)} of {total} shots are finished.\n"
+            f"shots: {error}; {len(log.done)} of {total} shots are finished.\n"
             "Try: fewer --workers if the memory was full; the same command goes on from here."
         ) from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _run(draw: ShotDraw) -> ShotOutcome | Failure:

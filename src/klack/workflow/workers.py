@@ -4,26 +4,34 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from klack.closing import Closing
 from klack.errors import ConvergenceError, InputError, KlackError
 
 __all__ = [
     "Failure",
+    "WorkerDied",
+    "WorkerPool",
     "answer",
     "deaf_to_interrupts",
     "shared",
     "unwrapped",
-    "worker_pool",
 ]
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+_LAST_MOMENTS = 10.0  # [s] from the end of a connection to that of its process
 
 _shared: list[Any] = []
 
@@ -36,19 +44,120 @@ class Failure:
     parts: tuple[str, ...]
 
 
-def worker_pool(workers: int, given: object) -> ProcessPoolExecutor:
-    """Processes of one thread each, to which ``given`` is sent once; see :func:`shared`."""
-    return ProcessPoolExecutor(
-        max_workers=workers,
+class WorkerDied(Exception):
+    """A worker process ended without an answer; says how."""
+
+
+class WorkerPool(Closing):
+    """Processes of one thread each that share one thing; see :func:`shared`.
+
+    Each has a connection of its own, of which this process holds one end only: a worker that dies
+    is seen at once, also while it starts.  (The pool of the standard library hands what is shared
+    to a new process through a pipe of which it holds both ends; where that is more than the pipe
+    takes, 64 kB, and the process is gone, it waits for ever.)
+
+    Parameters
+    ----------
+    workers : int
+        Processes at most; they start when there is work for them.
+    given : object
+        Sent to each of them once.
+    """
+
+    def __init__(self, workers: int, given: object) -> None:
+        self.workers, self._given = workers, given
+        self._processes: dict[Connection, BaseProcess] = {}
+        self._is_busy = False
+
+    def close(self) -> None:
+        """End the processes; what they compute at this moment is lost."""
+        for connection, process in self._processes.items():
+            connection.close()
+            process.terminate()
+        for process in self._processes.values():
+            process.join()
+        self._processes.clear()
+        self._is_busy = False
+
+    def completed(
+        self, compute: Callable[[Item], Result], items: Iterable[Item]
+    ) -> Iterator[tuple[Item, Result]]:
+        """Compute something for each item; yield item and result, in the order of their end.
+
+        Parameters
+        ----------
+        compute : callable
+            Of a module, with one argument.
+        items : iterable
+
+        Raises
+        ------
+        WorkerDied
+            When a process ends without an answer.
+        Exception
+            Of ``compute``.
+        """
+        if self._is_busy:  # with what was asked for before, and given up
+            self.close()
+        self._is_busy = True
+        left = deque(items)
+        running: dict[Connection, Item] = {}
+        self._staff(min(self.workers, len(left)))
+        for connection in list(self._processes)[: len(left)]:
+            running[connection] = left.popleft()
+            self._send(connection, (compute, running[connection]))
+        while running:
+            for connection in _ready(running):
+                result, error = self._receive(connection)
+                if error is not None:
+                    raise error
+                item = running.pop(connection)
+                if left:
+                    running[connection] = left.popleft()
+                    self._send(connection, (compute, running[connection]))
+                yield item, result
+        self._is_busy = False
+
+    def _staff(self, count: int) -> None:
+        """Have so many processes, all of them with what is shared."""
         # a fork would inherit the threads and locks of the libraries
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_start,
-        initargs=(given,),
-    )
+        context = multiprocessing.get_context("spawn")
+        new = []
+        with deaf_to_interrupts():
+            for _ in range(count - len(self._processes)):
+                here, there = context.Pipe()
+                process = context.Process(target=_work, args=(there, _start), daemon=True)
+                process.start()
+                there.close()
+                self._processes[here] = process
+                new.append(here)
+        for connection in new:
+            self._send(connection, self._given)
+
+    def _send(self, connection: Connection, what: object) -> None:
+        try:
+            connection.send(what)
+        except OSError:
+            raise self._died(connection) from None
+
+    def _receive(self, connection: Connection) -> Any:
+        try:
+            return connection.recv()
+        except (EOFError, OSError):
+            raise self._died(connection) from None
+
+    def _died(self, connection: Connection) -> WorkerDied:
+        process = self._processes[connection]
+        process.join(_LAST_MOMENTS)
+        code = process.exitcode
+        if code is None:
+            return WorkerDied("a worker process does not answer")
+        how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
+        return WorkerDied(f"a worker process died {how}")
 
 
 def shared() -> Any:
-    """What :func:`worker_pool` was given, inside of a worker."""
+    """What the :class:`WorkerPool` was given, inside of a worker."""
     return _shared[0]
 
 
@@ -86,6 +195,29 @@ def deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _ready(running: Iterable[Connection]) -> list[Connection]:
+    """Connections with an answer, or of a process that is gone; wait for the first."""
+    ready = wait(list(running))
+    return [connection for connection in running if connection in ready]
+
+
+def _work(connection: Connection, start: Callable[[object], None]) -> None:
+    """What a worker does, until it is not wanted any more."""
+    with suppress(EOFError, OSError):  # the process that asked has closed its end
+        start(connection.recv())
+        while True:
+            compute, item = connection.recv()
+            connection.send(_attempt(compute, item))
+
+
+def _attempt(compute: Callable[[Item], Result], item: Item) -> tuple[Result | None, Any]:
+    try:
+        return compute(item), None
+    except Exception as error:  # a mistake of ours, to be seen where it was asked for
+        error.add_note(f"In a worker process:\n{traceback.format_exc()}")
+        return None, error
 
 
 def _end_with_parent() -> None:
