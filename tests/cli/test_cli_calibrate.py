@@ -2,11 +2,10 @@
 
 import json
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 
 import numpy as np
 import pytest
+from rigid_valve import write_bench
 
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
@@ -14,25 +13,12 @@ from klack.workflow.calibration_log import TRIAL_LOG
 from klack.workflow.calibration_motion import MotionModel
 from klack.workflow.calibration_store import load_calibration
 
-_SPEC = spec_from_file_location(
-    "strokes", Path(__file__).parents[1] / "reference" / "test_calibration_recovers.py"
-)
-STROKES = module_from_spec(_SPEC)
-_SPEC.loader.exec_module(STROKES)
-TEXT = STROKES.TEXT.replace("  profile: [friction]\n", "") + "  # the end\n"
-
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """A case and a file of three strokes, one column each."""
     folder = tmp_path_factory.mktemp("bench")
-    (folder / "valve.yaml").write_text(
-        TEXT.replace("measurement:\n", "measurement:\n  channels: {lift: 'lift_*'}\n")
-    )
-    strokes = STROKES.measured(5, count=3)
-    table = np.column_stack([strokes.time, *strokes.matrix("lift")])
-    head = "time [s]," + ",".join(f"lift_{i} [m]" for i in range(3))
-    np.savetxt(folder / "strokes.csv", table, delimiter=",", header=head, comments="", fmt="%.9e")
+    write_bench(folder, 5, 3)
     return folder
 
 

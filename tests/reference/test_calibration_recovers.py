@@ -1,98 +1,23 @@
 """Hidden values must come out, within their interval, as often as the interval says.
 
-A rigid valve of three components; truth is its own model at a finer step with parameters that
-differ from stroke to stroke, and noise.
+A rigid valve of three components; truth is its own model, see ``rigid_valve``.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from rigid_valve import NO_PROFILE, SCATTER, TEXT, TRUTH, measured, tree_of
 
-from klack.case.case_tree import CaseTree
-from klack.case.reader import parse
 from klack.measurement.fit_window import FitWindow
-from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
-from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
-from klack.simulation.network_run import simulate_network
+from klack.measurement.stroke_set import MeasuredStroke
 from klack.workflow.calibration import _repeatable, run_calibration
-
-TEXT = """
-klack: 1
-title: Rigid valve
-network:
-  components:
-    needle: {type: rigid-mass, mass: 3 g, points: [tip, top]}
-    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
-    stop: {type: end-stop, gap: 80 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
-    spring: {type: spring, stiffness: 10 N/mm, preload: 11 N}
-    guide: {type: guide-friction, coulomb: 0.8 N, smoothing_speed: 10 mm/s}
-    magnet:
-      type: force-over-time
-      time: [0 us, 50 us, 900 us, 950 us]
-      force: [0 N, 30 N, 30 N, 0 N]
-  connections:
-    - [needle.tip, seat.upper]
-    - [seat.lower, ground]
-    - [needle.top, stop.lower, spring.end, magnet.end, guide.body]
-    - [stop.upper, ground]
-run: {duration: 1.5 ms, step: 0.2 us, coarse: 8, record: 2 us, variants: [dry]}
-measurement:
-  zero: none
-  sensor: {bandwidth: 100 kHz, offset: 0 um}
-calibration:
-  variant: dry
-  parameters:
-    preload: {key: network.components.spring.preload, lower: 8 N, upper: 16 N}
-    friction: {key: network.components.guide.coulomb, lower: 0 N, upper: 3 N}
-    offset: {key: measurement.sensor.offset, lower: -10 um, upper: 10 um}
-  profile: [friction]
-"""
-TRUTH = np.array([12.4, 0.5, 2.5e-6])
-SCATTER = np.array([0.06, 0.05, 0.2e-6])
-STROKES, NOISE = 6, 0.5e-6
-
-
-def tree_of(text=TEXT):
-    path = Path("rigid.yaml")
-    data, lines = parse(text, path)
-    return CaseTree(path=path, text=text, data=data, lines=lines)
-
-
-def lift_of(tree, preload, friction, offset, grid):
-    case = tree.case(
-        {
-            ("network", "components", "spring", "preload"): f"{preload!r} N",
-            ("network", "components", "guide", "coulomb"): f"{friction!r} N",
-        }
-    )
-    result = simulate_network(
-        case.network.network().rows(), duration=1.5e-3, step=50e-9, coarse=32, record=2e-6
-    )
-    true = result.channels["needle.tip displacement"].values
-    sensor = LiftSensor(bandwidth=100e3, offset=offset)
-    return np.interp(grid, result.time, sense(result.time, true, sensor))
-
-
-def measured(seed, count=STROKES, begin=0.0, text=TEXT):
-    rng = np.random.default_rng(seed)
-    grid = 2e-6 * np.arange(round(begin / 2e-6), 700)
-    strokes = []
-    for k in range(count):
-        values = TRUTH + SCATTER * rng.standard_normal(3)
-        lift = lift_of(tree_of(text), *map(float, values), grid)
-        lift += NOISE * rng.standard_normal(grid.size)
-        strokes.append(MeasuredStroke(name=f"#{k + 1}", values={"lift": lift}))
-    return StrokeSet(source="computed", time=grid, strokes=tuple(strokes))
 
 
 def calibrate(strokes, text=TEXT, **options):
     return run_calibration(tree_of(text), strokes, workers=1, **options)
 
 
-NO_PROFILE = TEXT.replace("  profile: [friction]\n", "")
 SEEDS = range(7)
 
 
