@@ -12,18 +12,23 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rigid_valve import write_bench
 
-from klack.cli.stored import load_stored
+from klack.cli.stored import is_result, load_stored
 from klack.errors import InputError
 from klack.folder_lock import locked, try_lock
 from klack.whole_file import standing, whole_file, whole_files
+from klack.workflow.calibration_log import TRIAL_LOG, TrialKey, trial_log
+from klack.workflow.calibration_motion import Motion
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and forks")
 
 DATA = Path(__file__).parents[1] / "data"
 NEEDLE = Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml"
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
+CALIBRATE = ("calibrate", "valve.yaml", "--measurement", "strokes.csv", "--no-report")
 ALONE = {**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -62,14 +67,17 @@ def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path:
     [
         (["impact", str(DATA / "tiny_rods.yaml"), "--no-report", "--no-certify"], 4),
         (["export", str(DATA / "tiny_rods.yaml"), "--to", "csv"], 4),
+        ([*CALIBRATE, "--workers", "1"], 4),
     ],
-    ids=["impact", "export"],
+    ids=["impact", "export", "calibrate"],
 )
 def test_a_crash_of_a_command_costs_nothing(words: list[str], points: int, tmp_path: Path):
     """The former result can be read or the new one is there; the next run makes the same numbers.
 
     One thread: to the last digit.
     """
+    if words[0] == "calibrate":
+        write_bench(tmp_path, 5, 3)
     found = crashes(json.dumps(words), str(tmp_path), str(points * LONGER))
 
     assert found["operations"] > 20
@@ -198,6 +206,73 @@ def test_a_run_stopped_at_any_time_leaves_a_whole_result(number, code, tmp_path:
             assert err.endswith("klack impact: stopped; nothing was written.\n")
         assert names(tmp_path / "out") == ["result.zarr"]
         assert load_stored(tmp_path / "out") is not None
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+def test_a_calibration_goes_on_after_kill_9_at_any_time(tmp_path: Path):
+    """Alone or with its workers, while it starts, computes, or writes: same numbers, to the bit.
+
+    No computed stroke that was in the file is lost; at the end only the result is there.
+    """
+    draw = random.Random(1)
+    write_bench(tmp_path, 5, 3)
+    words = (*CALIBRATE, "--quiet", "--workers", "2", "--json", "n.json")
+    out, log = tmp_path / "out", tmp_path / "out" / TRIAL_LOG.file
+    begin = time.monotonic()
+    start(*words, "--out", "whole", folder=tmp_path).communicate(timeout=120)
+    duration = time.monotonic() - begin
+    undisturbed = json.loads((tmp_path / "n.json").read_text())
+    total = undisturbed["evaluations"]
+
+    count, found = 3 * LONGER, []
+    for i in range(count + 1):  # the last one while the result is written
+        kept = lines(log)
+        least = min(int((i + draw.random()) * total / count), total)
+        patience = draw.random() * duration if i % 3 == 1 else 60.0
+        process = start(*words, "--out", "out", folder=tmp_path)
+        wait_until(lambda least=least: lines(log) >= least, patience)
+        time.sleep(draw.random() * (0.02 if i < count else 0.2))
+        (os.kill if draw.random() < 0.5 else os.killpg)(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        assert wait_until(lambda group=process.pid: not members(group), 20)
+        assert lines(log) >= kept or is_result(out)
+        assert not is_result(out) or load_stored(out).evaluations == total
+        found.append(lines(log))
+    process = start(*words, "--out", "out", folder=tmp_path)
+    _, err = process.communicate(timeout=120)
+
+    assert process.returncode == 0, err
+    assert max(found) > 0
+    assert names(out) == ["case_calibrated.yaml", "result.zarr"]
+    after = json.loads((tmp_path / "n.json").read_text())
+    assert after["resumed"] == found[-1]
+    clocks = dict.fromkeys(("wall_time_s", "profile_time_s", "resumed"))
+    assert {**after, **clocks} == {**undisturbed, **clocks}
+
+
+def test_a_log_cut_at_any_byte_gives_back_whole_strokes(tmp_path: Path):
+    """What a process leaves that is killed while it writes; the next one appends to whole lines."""
+    motion = Motion(
+        step=2e-6,
+        channels={"lift": np.array([0.0, 1.0 / 3.0], dtype=np.float32)},
+        impacts={"seat": (1e-3 / 3.0,)},
+    )
+    keys: list[TrialKey] = [(1.5e-3, value / 3.0) for value in range(3)]
+    with trial_log(tmp_path, "mark") as log:
+        for key in keys:
+            log.add(key, motion)
+    path = tmp_path / TRIAL_LOG.file
+    whole = path.read_bytes()
+    header = whole[: whole.index(b"\n") + 1]
+    for end in range(len(whole) + 1):
+        path.write_bytes(whole[:end])
+        with trial_log(tmp_path, "mark") as log:
+            assert list(log.done) == keys[: max(whole.count(b"\n", 0, end) - 1, 0)]
+            for found in log.done.values():
+                assert found.channels["lift"].tobytes() == motion.channels["lift"].tobytes()
+                assert (found.step, found.impacts) == (motion.step, motion.impacts)
+        assert path.read_bytes() == (whole[: whole.rfind(b"\n", 0, end) + 1] or header)
 
 
 # --------------------------------------------------------------------------- stages and locks
