@@ -162,7 +162,7 @@ def test_two_processes_on_one_empty_cache(tmp_path):
         process.stdin.write("go\n")
         process.stdin.flush()
     for process in processes:
-        out, error = process.communicate(timeout=60)
+        out, error = process.communicate(timeout=300)
         assert process.returncode == 0, error
         _, missed = map(int, out.split())
         assert missed <= 20

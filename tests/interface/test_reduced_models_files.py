@@ -76,7 +76,7 @@ def test_what_octave_saves(tmp_path, option):
         + ", ".join(f"'{word}'" for word in what.split())
         + ");"
     )
-    subprocess.run(["octave-cli", "--norc", "--eval", script], check=True, timeout=60)
+    subprocess.run(["octave-cli", "--norc", "--eval", script], check=True, timeout=300)
     found = read_state_space(tmp_path / name)
     assert_read(found, rel=1e-15)
     if option != "-text":

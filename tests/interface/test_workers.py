@@ -45,7 +45,7 @@ def test_a_worker_that_dies_at_any_time_is_an_error(seconds: float, tmp_path: Pa
         env={**os.environ, "PYTHONPATH": places, "DIES_AFTER": str(seconds)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 
