@@ -243,3 +243,12 @@ def test_half_a_letter_is_no_text():
     for put in ('"\\ud800"', '"a\\0b"'):
         with pytest.raises(InputError, match="without such signs"):
             read_any_case(text.replace("klack: 1", f"klack: {put}", 1), Path("valve.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"), [("%YAML 3.0", "another version"), ("[[[[1]]]]: 1", "as a key")]
+)
+def test_what_the_parser_stumbles_over_is_no_yaml(line, words):
+    """Found by long runs: it raised KeyError and TypeError of its own."""
+    with pytest.raises(InputError, match=words):
+        read_any_case(f"klack: 1\n{line}\ntitle: x\n", Path("valve.yaml"))

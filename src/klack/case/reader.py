@@ -149,7 +149,7 @@ def parse(text: str, path: Path) -> tuple[Any, Lines]:
         raise _duplicate(error, path) from None
     except MarkedYAMLError as error:
         raise _syntax_error(error, path) from None
-    except (YAMLError, ValueError, RecursionError) as error:
+    except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise InputError(
             str(path),
             got=f"text that is no YAML ({_reason(error)})",
@@ -171,6 +171,10 @@ def parse(text: str, path: Path) -> tuple[Any, Lines]:
 def _reason(error: Exception) -> str:
     if isinstance(error, RecursionError):
         return "brackets nested without end"
+    if isinstance(error, LookupError):  # the parser looks up the version of a late '%YAML'
+        return "a line '%YAML' of another version"
+    if isinstance(error, TypeError):
+        return "a list or a mapping as a key"
     return (str(error).splitlines() or ["unreadable"])[0]
 
 

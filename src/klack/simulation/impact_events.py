@@ -12,8 +12,7 @@ __all__ = ["impact_events"]
 
 Vector = NDArray[np.float64]
 
-_FILM_PAUSE = 2e-6  # [s] a film is not recorded while its force passes through zero
-_SHORTEST_CLUSTER = 5e-6  # [s] contacts closer than this are one impact, also of rigid bodies
+_FILM_PAUSE = 100  # steps; a film is not recorded while its force passes through zero
 
 
 def impact_events(
@@ -25,10 +24,10 @@ def impact_events(
     """Find the impacts on all interfaces, in order of time.
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
-    so are contacts between which the centres of mass do not move apart.  A
-    contact that is closed at the start is none.  A film acts before the first touch and after the
-    last one: the speeds are the highest ones while it presses, and within two of these periods
-    while it pulls.
+    so are contacts between which the centres of mass do not move apart.  Rigid bodies have no
+    period; for it stands the time of the shorter contact.  A contact that is closed at the start is
+    none.  A film acts before the first touch and after the last one: the speeds are the highest
+    ones while it presses, and within two of these periods while it pulls.
     """
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     events: list[ImpactEvent] = []
@@ -55,9 +54,9 @@ def _effective_mass(bodies: Sequence[BodyRow | None]) -> float:
     return 1.0 / inverse if inverse > 0.0 else np.inf
 
 
-def _cluster_time(bodies: Sequence[BodyRow | None]) -> float:
-    """Longest period of the moving bodies."""
-    longest = _SHORTEST_CLUSTER
+def _longest_period(bodies: Sequence[BodyRow | None]) -> float:
+    """Longest period of the moving bodies; 0 for rigid ones."""
+    longest = 0.0
     for body in bodies:
         if body is not None and body.body.rigid_count > 0:
             elastic = body.body.omega[body.body.rigid_count :]
@@ -84,7 +83,8 @@ def _of_interface(
     open_ended = ends == len(closed)
     if open_ended[-1]:
         stop[-1] = np.nan
-    clusters = _clusters(begin, stop, _cluster_time(bodies), time, gap_rate)
+    period = _longest_period(bodies)
+    clusters = _clusters(begin, stop, period, time, gap_rate)
     mass = _effective_mass(bodies)
     total = record.contact_force + record.film_force
     events = []
@@ -101,7 +101,7 @@ def _of_interface(
         after = np.nan
         if np.isfinite(t1):
             leaving = _at(t1, time, gap_rate, earlier=False)
-            soon = min(let_go, t1 + 2.0 * _cluster_time(bodies))
+            soon = min(let_go, t1 + 2.0 * (period or t1 - begin[last]))
             after = max(_fastest(t1, soon, time, gap_rate), leaving)
         force, steps = total[window], record.step[window]
         peak = int(np.argmax(force))
@@ -144,12 +144,13 @@ def _at(t: float, time: Vector, rate: Vector, *, earlier: bool) -> float:
 
 
 def _clusters(
-    begin: Vector, stop: Vector, within: float, time: Vector, gap_rate: Vector
+    begin: Vector, stop: Vector, period: float, time: Vector, gap_rate: Vector
 ) -> list[tuple[int, int]]:
     """First and last contact of each impact; it lasts until the centres of mass move apart."""
     groups = [[0, 0]]
     for i in range(1, len(begin)):
-        near = begin[i] - stop[i - 1] < within
+        shorter = np.fmin(stop[i - 1] - begin[i - 1], stop[i] - begin[i])
+        near = begin[i] - stop[i - 1] < (period or shorter)
         if near or _fastest(stop[i - 1], begin[i], time, gap_rate) <= 0.0:
             groups[-1][1] = i
         else:
@@ -167,7 +168,7 @@ def _film_end(record: InterfaceRecord, end: int) -> int:
     """First step after ``end`` that no longer feels the film that follows the contact."""
     i = end
     while i < len(record.time):
-        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE
+        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE * record.step[i]
         if not gapless or record.contact_force[i] > 0.0:
             break
         i += 1
@@ -178,7 +179,7 @@ def _film_start(record: InterfaceRecord, first: int) -> int:
     """First step of the film force that leads into the contact at ``first``."""
     i = first
     while i > 0:
-        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE
+        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE * record.step[i]
         if not gapless or record.contact_force[i - 1] > 0.0 or record.film_force[i - 1] <= 0.0:
             break
         i -= 1

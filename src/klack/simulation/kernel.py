@@ -27,7 +27,9 @@ Matrix = NDArray[np.float64]  # two axes
 STATUS_FINE, STATUS_CONTACTS = 0, 1
 _SWEEP_LIMIT = 500
 _SWEEP_ACCEPTED = 1e-11  # change of a gap over the largest change that a contact force makes
-SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
+SEPARATED = 0.1
+"""Gap over the deepest indentation so far at which a contact forgets its approach speed."""
+
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
@@ -231,6 +233,7 @@ def run_steps(
     sum_force = np.zeros(contacts)
     peak = np.zeros(contacts)
     approaching = np.ones(contacts, np.bool_)
+    deepest = np.zeros(contacts)  # since a damped contact was touched
     row0 = rows[0]
     pushes = push_index.size
     pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
@@ -345,9 +348,11 @@ def run_steps(
                         release_loss += law_potential(kind, law_data, start, e[c] - after)
                         release_loss -= law_potential(kind, law_data, start, -after)
                         e[c] = 0.0
-                if after > SEPARATED:
-                    approaching[c] = True
-                    chi[c] = 0.0
+                if not approaching[c]:
+                    deepest[c] = max(deepest[c], -after)
+                    if after > SEPARATED * deepest[c]:
+                        approaching[c] = True
+                        chi[c] = deepest[c] = 0.0
 
         for c in range(contacts):
             out_force[record, c] = sum_force[c] / steps_per_record

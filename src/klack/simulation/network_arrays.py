@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "BEFORE",
+    "ELEMENTS",
+    "ELEMENTS_BEFORE",
     "FORCE",
     "FREE",
     "LAST",
@@ -51,7 +53,9 @@ PENDING = 6 * PORTS  # ... of the last step, not yet in the modes
 LAST = 7 * PORTS  # ... of the last step
 BEFORE = 8 * PORTS  # ... of the step before
 WORK = 9 * PORTS  # work done by the forces so far
-ROWS_AT = 10
+ELEMENTS = 10 * PORTS  # forces of elements and fluid in this sweep
+ELEMENTS_BEFORE = 11 * PORTS  # ... at the end of the last step
+ROWS_AT = 12
 
 
 class Bodies(NamedTuple):
@@ -66,7 +70,7 @@ class Bodies(NamedTuple):
     first: Index  # (ports,) first port of the body of each port
     last: Index
     G: Vector  # (2, PORTS, PORTS) displacement at the end of a step per unit force during it
-    at: Vector  # (10, PORTS) what the ports do, row by row: see ``Y0`` and the following names
+    at: Vector  # (12, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 
 class StepRows(NamedTuple):
@@ -135,12 +139,15 @@ class Interfaces(NamedTuple):
     linear: Vector
     cut_off: Vector
     suction: Vector
+    film_small: Vector  # film force that a coarse step may begin with; it may end with twice of it
+    film_felt: Vector  # film force from which on fine steps are recorded
     hint: Index
     e: Vector
     gap: Vector
     rate: Vector
     force: Vector
     chi: Vector
+    deepest: Vector  # indentation since a damped contact was touched
     since: Vector  # closed since; infinity while open
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
     contact_loss: Vector
@@ -161,7 +168,7 @@ class Scratch(NamedTuple):
 def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
     """Memory for a network of these sizes."""
     return Scratch(
-        interfaces=np.zeros((7, interfaces)),
+        interfaces=np.zeros((8, interfaces)),
         nodes=np.zeros((10, nodes)),
         branches=np.zeros((3, branches)),
         ends=np.zeros((3, ends)),

@@ -5,9 +5,9 @@ One step of length ``h`` (or ``M h`` while nothing touches):
 1. Every mode moves exactly, without the forces of this step.
 2. Sweeps: all elements, then all pressures (Newton), then all interfaces find their mean forces
    from the port displacements at both ends of the step; the forces move the ports by ``G F``;
-   again, until no port moves by more than :data:`SETTLED`, nor by more than a small share of
-   the way in the step.  Elements and fluid live on the
-   displacements that they saw last, so what is left of that change costs energy in second order.
+   again, until no port moves by more than a small share of the way in the step.  Elements and
+   fluid live on the displacements that they saw last, so what is left of that change costs energy
+   in second order: the change of their forces times it, a small share of the work of the step.
 3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
    the modes.
 
@@ -25,9 +25,12 @@ from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import call, first, pointer, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
+from klack.simulation.kernel import SEPARATED
 from klack.simulation.modal_step import ROW, advance, apply_forces, watch
 from klack.simulation.network_arrays import (
     BEFORE,
+    ELEMENTS,
+    ELEMENTS_BEFORE,
     FORCE,
     FREE,
     LAST,
@@ -63,21 +66,19 @@ Matrix = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
-SETTLED = 1e-12  # [m] change of a port displacement at which the forces of a step have settled
-SETTLED_COARSE = 1e-14  # [m] the same for a coarse step, whose forces change more
-_SETTLED_SHARE = 1e-4  # and of the longest way of a port in the step: small valves, slow motion
-_UNSEEN = 1e-18  # [m] no change smaller than this is asked for
+_SETTLED = 5e-5  # last change of a port displacement over the longest way of a port in the step
+_SETTLED_COARSE = 3e-8  # the same for a coarse step, whose forces change more
+_ENERGY_LEFT = 1e-10  # energy that what is left of that change costs, over the work of the step
+_UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
+_ROUND_OFF = 4e-16  # of the displacements themselves
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
 _PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
-_FILM_SMALL = 0.5  # [N] film force that a coarse step may begin with; it may end with twice of it
-_FILM_FELT = 0.02  # [N] film force from which on fine steps are recorded
-_REST_TIME = 50e-6  # [s] closed for so long: at rest
+_REST_STEPS = 2500  # fine steps; closed for so long: at rest
 _SLOWEST = 1e-3  # [m/s] approach speed from which on a dashpot of a given restitution is scaled
-_SEPARATED = 1e-7  # [m] gap at which a contact forgets its approach speed
 
 
 @njit(cache=True)
@@ -159,14 +160,26 @@ def _move(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> float:
 
 
 @njit(cache=True)
-def _settled(S: Any, ports: int, moved: float, most: float) -> bool:
-    """Whether a change of displacements is below ``most`` and small against the step's way."""
-    if moved <= _UNSEEN or moved > most:
-        return moved <= most
+def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: float) -> bool:
+    """Whether the last change of the displacements matters no more.
+
+    ``left`` and ``work`` are what the interfaces add to both sums.  What an element saw is ``d = Y1 - USED`` short of the end of the step, and catches up in the next one:
+    of ``F dy`` the energy ``F_n (d_n - d_(n-1))`` is lost, in sum ``(F_n - F_(n+1)) d_n``.
+    """
     way = 0.0
     for p in range(ports):
-        way = max(way, abs(S[Y1 + p] - S[Y0 + p]))
-    return moved <= _SETTLED_SHARE * way
+        y, force = S[Y1 + p], S[ELEMENTS + p]
+        here = abs(y - S[Y0 + p])
+        way = max(way, here)
+        left += abs((force - S[ELEMENTS_BEFORE + p]) * (y - S[USED + p]))
+        work += abs(force) * here
+    if moved <= share * way and left <= _ENERGY_LEFT * work:
+        return True
+    displacement, by_forces = 0.0, 0.0
+    for p in range(ports):
+        displacement = max(displacement, abs(S[Y1 + p]))
+        by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
+    return moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -275,8 +288,11 @@ def run_network(
     interface_contact_loss = first(interfaces.contact_loss)
     interface_cubic = first(interfaces.cubic)
     interface_cut_off = first(interfaces.cut_off)
+    interface_deepest = first(interfaces.deepest)
     interface_e = first(interfaces.e)
     interface_film_loss = first(interfaces.film_loss)
+    interface_film_small = first(interfaces.film_small)
+    interface_film_felt = first(interfaces.film_felt)
     interface_force = first(interfaces.force)
     interface_gap = first(interfaces.gap)
     interface_G = first(interfaces.G)
@@ -311,7 +327,7 @@ def run_network(
         first(at_interfaces[4]),
         first(at_interfaces[5]),
     )
-    peaks = first(at_interfaces[6])
+    peaks, gap1 = first(at_interfaces[6]), first(at_interfaces[7])
     rho, slope, g, p = (
         first(at_nodes[0]),
         first(at_nodes[1]),
@@ -355,7 +371,7 @@ def run_network(
             for c in range(count_interfaces):
                 rate = abs(interface_rate[c])
                 if interface_since[c] < np.inf:
-                    if step * h - interface_since[c] < _REST_TIME:
+                    if step * h - interface_since[c] < _REST_STEPS * h:
                         level = 0
                     continue
                 x = interface_gap[c] - 3.0 * rate * Hc
@@ -365,7 +381,7 @@ def run_network(
                         level = 0
                 elif interface_cubic[c] > 0.0:
                     film = rate * (interface_cubic[c] / x**3 + interface_linear[c] / x)
-                    if film > _FILM_SMALL and not creeping:
+                    if film > interface_film_small[c] and not creeping:
                         level = 0
         done = 0
         if level == 1 and not settle:
@@ -563,6 +579,8 @@ def run_network(
                             q0, q1 = branch_port0[k], branch_port0[k + 1]
                             for j in range(q0, q1):
                                 S[FORCE + branch_ports[j]] += branch_outputs[o0 + j - q0]
+                for i in range(ports):
+                    S[ELEMENTS + i] = S[FORCE + i]
                 # interfaces
                 for c in range(count_interfaces):
                     if fi[c] != 0.0:
@@ -574,6 +592,7 @@ def run_network(
                     Gc = interface_G[level * count_interfaces + c]
                     g0 = interface_gap[c]
                     gap_free = interface_gap0[c] + S[Y1 + u] - S[Y1 + low] - Gc * fi[c]
+                    gap1[c] = gap_free
                     if interface_dry[c] and g0 >= 0.0 and gap_free >= 0.0 and interface_e[c] == 0.0:
                         f_contact[c] = f_film[c] = e1[c] = lost_contact[c] = lost_film[c] = 0.0
                     else:
@@ -583,7 +602,7 @@ def run_network(
                         (
                             f_contact[c],
                             f_film[c],
-                            _,
+                            gap1[c],
                             e1[c],
                             interface_hint[c],
                             lost_contact[c],
@@ -618,7 +637,15 @@ def run_network(
                         for i in range(body_first[low], body_last[low]):
                             S[Y1 + i] -= own_G[i * PORTS + low] * change
                             moved = max(moved, abs(S[Y1 + i] - S[USED + i]))
-                settled = _settled(S, ports, moved, SETTLED if level == 0 else SETTLED_COARSE)
+                left, work = 0.0, 0.0
+                for c in range(count_interfaces):
+                    if fi[c] != 0.0:
+                        u, low = interface_upper[c], interface_lower[c]
+                        gap = interface_gap0[c] + S[Y1 + u] - S[Y1 + low]
+                        left += abs((fi[c] - interface_force[c]) * (gap - gap1[c]))
+                        work += abs(fi[c] * (gap - interface_gap[c]))
+                share = _SETTLED if level == 0 else _SETTLED_COARSE
+                settled = _settled(S, ports, moved, share, left, work)
                 if settled:
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
@@ -634,7 +661,7 @@ def run_network(
                     closed = interface_since[c] < np.inf
                     if closed != (f_contact[c] > 0.0):
                         fits = False
-                    if abs(f_film[c]) > 2.0 * _FILM_SMALL:
+                    if abs(f_film[c]) > 2.0 * interface_film_small[c]:
                         fits = False
                 if not fits:
                     level = 0
@@ -743,7 +770,7 @@ def run_network(
                     sums[column] += H * f_contact[c]
                     sums[column + 1] += H * f_film[c]
                     peaks[c] = max(peaks[c], fi[c])
-                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > _FILM_FELT
+                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > interface_film_felt[c]
                     if level == 0 and (felt or was_closed):
                         place = record_filled[c]
                         if place < record_fine.shape[1]:
@@ -753,14 +780,17 @@ def run_network(
                             record_fine[c, place, 3] = f_film[c]
                             record_fine[c, place, 4] = gap
                         record_filled[c] = place + 1
-                if gap > _SEPARATED:
-                    interface_chi[c] = 0.0
+                if interface_chi[c] != 0.0:
+                    interface_deepest[c] = max(interface_deepest[c], -gap)
+                    if gap > SEPARATED * interface_deepest[c]:
+                        interface_chi[c] = interface_deepest[c] = 0.0
             for i in range(width):
                 S[WORK + i] += S[FORCE + i] * (S[Y1 + i] - S[Y0 + i])
                 S[Y0 + i] = S[Y1 + i]
                 S[SEEN + i] = S[USED + i]
                 S[PENDING + i] = S[FORCE + i]
                 S[LAST + i] = S[FORCE + i]
+                S[ELEMENTS_BEFORE + i] = S[ELEMENTS + i]
             last_level = level
             done += m
             step += m

@@ -14,6 +14,7 @@ from klack.simulation.impact_events import impact_events
 from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
     BEFORE,
+    ELEMENTS_BEFORE,
     LAST,
     PORTS,
     SEEN,
@@ -48,8 +49,8 @@ Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
-_BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual, forces settle to 1e-12 m
-_SETTLE_STEP = 1e-6  # [s]
+_BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
+_SETTLE_STEP = 50  # fine steps
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
 
@@ -122,7 +123,7 @@ def simulate_network(
     if state is not None:
         _restore(network, clock, state)
     elif start == "rest":
-        _settle(network, recorder.recording)
+        _settle(network, recorder.recording, _SETTLE_STEP * step)
     first_step, done_before = int(clock[0]), clock[2:4].copy()
     reset_books(network)
     _read_stores(network)
@@ -220,9 +221,9 @@ def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
     )
 
 
-def _settle(network: CompiledNetwork, recording: Recording) -> None:
+def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None:
     """Find the static start: large steps, all velocities taken out after each."""
-    bodies, _ = compile_bodies(network.rows.bodies, (_SETTLE_STEP, _SETTLE_STEP))
+    bodies, _ = compile_bodies(network.rows.bodies, (step, step))
     own = interface_compliance(bodies, network.interfaces.upper, network.interfaces.lower)
     interfaces = network.interfaces._replace(G=own)
     report, clock = np.zeros(3), np.array([0, -1, 0, 0], dtype=np.int64)
@@ -232,7 +233,7 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
         0,
         clock,
         1,
-        _SETTLE_STEP,
+        step,
         False,
         True,
         bodies,
@@ -255,7 +256,8 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
     for k in range(len(real.modes)):
         begin = real.start[k]
         real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
-    for row, source in ((Y0, Y0), (SEEN, Y0), (LAST, LAST), (BEFORE, LAST)):
+    rows = ((Y0, Y0), (SEEN, Y0), (LAST, LAST), (BEFORE, LAST), (ELEMENTS_BEFORE, ELEMENTS_BEFORE))
+    for row, source in rows:
         real.at[row : row + PORTS] = bodies.at[source : source + PORTS]
     nodes = network.nodes
     for w in range(len(nodes.wall_node)):
@@ -264,7 +266,7 @@ def _settle(network: CompiledNetwork, recording: Recording) -> None:
             nodes.held[i] += nodes.wall_area[w] * real.at[Y0 + nodes.wall_port[w]]
     nodes.mass[:] *= nodes.held / nodes.volume
     interfaces.rate[:] = 0.0
-    interfaces.since[interfaces.gap + interfaces.e < 0.0] = -1.0
+    interfaces.since[interfaces.gap + interfaces.e < 0.0] = -np.inf
 
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
@@ -328,7 +330,7 @@ _SAVED = {
     "branches": ("state",),
     "nodes": ("mass", "held", "p", "before", "g", "hint"),
     "line_state": ("samples", "head", "memory", "cavity"),
-    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "since", "film_before"),
+    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "deepest", "since", "film_before"),
 }
 
 

@@ -151,7 +151,7 @@ def run_one_contact(
     pushes = push_index.size
     pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
     gap = gap_offset[0] + row @ q
-    F, F_before, e, chi, lost = 0.0, 0.0, 0.0, 0.0, 0.0
+    F, F_before, e, chi, lost, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     last_force = np.zeros(1)
     q0, v0 = np.zeros(modes), np.zeros(modes)
     hint = 0
@@ -213,8 +213,10 @@ def run_one_contact(
                 release_loss += law_potential(kind, law_data, start, e - after)
                 release_loss -= law_potential(kind, law_data, start, -after)
                 e = 0.0
-            if after > SEPARATED:
-                approaching, chi = True, 0.0
+            if not approaching:
+                deepest = max(deepest, -after)
+                if after > SEPARATED * deepest:
+                    approaching, chi, deepest = True, 0.0, 0.0
         out_force[record, 0] = sum_force / steps_per_record
         out_peak[record, 0] = peak
         out_gap[record, 0] = sum_gap / steps_per_record

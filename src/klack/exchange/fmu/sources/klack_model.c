@@ -243,7 +243,7 @@ int klack_update_events(klack_model *m) {
         if (k->closed && k->approaching && klack_dissipation[c] > 0.0) {
             k->rate = klack_dissipation[c] / klack_largest(-rate, KLACK_FILMS ? SLOWEST : 1e-30);
             k->approaching = 0;
-        } else if (g > SEPARATED) {
+        } else if (!k->closed) { /* events are located: each touch has its own speed */
             k->approaching = 1;
             k->rate = 0.0;
         }

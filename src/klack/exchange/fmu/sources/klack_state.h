@@ -18,7 +18,8 @@
 #define FIRST_STATE (KLACK_INTERNAL_STEP + 1 + 2 * KLACK_PAIR)
 #define FIRST_RATE (FIRST_STATE + 2 * M)
 
-#define SEPARATED 1e-7   /* [m] gap at which a contact forgets its approach speed */
+#define SEPARATED 0.1    /* gap over the deepest indentation so far at which a contact forgets its
+                            approach speed */
 #define LEAST_STEP 1e-12 /* [s] */
 #define SLOWEST 1e-3     /* [m/s] least approach speed of a damped law beside films */
 
@@ -31,6 +32,7 @@ typedef struct {
     double force, force_before; /* of the contact in the last steps */
     double film, film_before;   /* of the film; as solve_interface wants it */
     double rate;                /* dissipation over approach speed, 0 before first touch */
+    double deepest;             /* indentation since a damped contact was touched */
     double mean, peak;          /* over the communication step */
     klack_slope of_force, of_film;
     int hint, closed, approaching, unused;

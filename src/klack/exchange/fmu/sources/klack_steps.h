@@ -233,9 +233,12 @@ static void commit(klack_model *m, const double *free, const klack_forces *f, co
         k->closed = k->force > 0.0;
         k->mean += k->force;
         k->peak = klack_largest(k->peak, k->force);
-        if (gap > SEPARATED) {
-            k->approaching = 1;
-            k->rate = 0.0;
+        if (!k->approaching) {
+            k->deepest = klack_largest(k->deepest, -gap);
+            if (gap > SEPARATED * k->deepest) {
+                k->approaching = 1;
+                k->rate = k->deepest = 0.0;
+            }
         }
     }
 }
@@ -261,7 +264,7 @@ int klack_do_step(klack_model *m, double time, double step) {
             k->gap = gap_now(m, c);
             k->closed = 0;
             k->approaching = 1;
-            k->rate = 0.0;
+            k->rate = k->deepest = 0.0;
             k->force = k->force_before = k->film = k->film_before = k->e = 0.0;
         }
         k->mean = k->peak = 0.0;
