@@ -5,6 +5,8 @@ import pytest
 
 from klack.errors import AccuracyWarning, InputError
 from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.voltage_step import VoltageStep
+from klack.verification.single_coil import run_coil
 
 CURRENT = np.linspace(0.0, 10.0, 21)
 GAP = np.linspace(20e-6, 120e-6, 21)
@@ -104,3 +106,63 @@ def test_agreeing_force_is_accepted(recwarn):
 def test_bad_tables(current, linkage, words):
     with pytest.raises(InputError, match=words):
         FluxMap.of(current=current, gap=GAP, linkage=linkage, force=None)
+
+
+def small_coil(scale, soft, current):
+    """Linkage of a coil that saturates sooner the smaller ``soft`` is."""
+    gap = np.linspace(10e-6, 30e-6, 4)
+    i = np.array(current)[:, None]
+    linkage = scale * (np.tanh(i / (soft * (gap + 20e-6) / 20e-6)) + 0.02 * i)
+    return FluxMap.of(current=current, gap=gap, linkage=linkage, force=None)
+
+
+def test_current_rises_everywhere_on_a_map_that_saturates_within_its_first_row():
+    """Energy like psi^4 within one cell: the plain cubic through it would bend downwards."""
+    made = small_coil(0.14, 0.1, [0.0, 0.9, 3.2])
+
+    for gap in np.linspace(made.gap[0], made.gap[-1], 7):
+        current = [made.current_at(psi, gap) for psi in np.geomspace(1e-9, 0.15, 200)]
+        assert np.all(np.diff(current) > 0.0)
+
+
+def test_a_table_that_jumps_between_two_gaps_is_refused():
+    """Splines over such gaps swing, and somewhere the current falls with rising linkage."""
+    current, gap = [1.0, 2.0, 3.0], [1e-5, 2e-5, 3e-5, 4e-5, 5e-5]
+    rise = np.array([[1.0, 1.0, 1.0, 1.0, 1.0], [5e-3, 5e-3, 1.0, 5e-3, 5e-3], [1.0] * 5])
+
+    with pytest.raises(InputError, match="so abruptly between the gaps 1e-05 m and 2e-05 m"):
+        FluxMap.of(current=current, gap=gap, linkage=1e-3 * np.cumsum(rise, axis=0), force=None)
+
+
+@pytest.mark.parametrize("volts", [5.0, 45.0])
+def test_a_coil_far_beyond_its_map_takes_its_ohmic_current(volts):
+    """Fifty times the current of the map: the iteration ends at the last digits of the linkage."""
+    made = small_coil(5e-7, 1.0, np.linspace(0.0, 1.0, 5))
+    lift = np.linspace(0.0, -1e-6, 101)
+    run = run_coil(
+        made,
+        VoltageStep(voltage=volts).program(),
+        resistance=1.0,
+        gap=30e-6,
+        step=1e-6,
+        lift=lift,
+    )
+
+    assert run.current[-1] == pytest.approx(volts, rel=1e-3)  # the moving armature induces a little
+    assert run.residual < 1e-14
+
+
+def test_a_coil_without_slope_at_rest_starts():
+    """Its first row rose like psi^3, without slope at zero, and no flux was found."""
+    run = run_coil(
+        small_coil(0.14, 0.1, [0.0, 0.9, 3.2]),
+        VoltageStep(voltage=13.0).program(),
+        resistance=1.0,
+        gap=30e-6,
+        step=0.3e-6,
+        lift=np.zeros(101),
+    )
+
+    # almost all of the voltage becomes flux
+    assert run.flux[-1] == pytest.approx(13.0 * 30e-6, rel=1e-3)
+    assert run.residual < 1e-14

@@ -8,6 +8,8 @@ so a force that was given besides is not used, only compared: two tables that co
 other would make a machine that creates energy.  Per gap of the table, ``psi(i)`` is a monotone
 cubic; its inverse ``i(psi)`` is tabulated on common linkages, integrated exactly, and joined over
 the gap by cubic splines.  The result is one bicubic surface, C1: current and force are continuous.
+The current rises with the linkage everywhere on it, :math:`\partial^2 W/\partial\psi^2 > 0`, so a
+voltage leads to one current only; a table whose splines fall between two gaps is refused.
 
 Limits: no eddy currents (add them as a resistance, or describe the circuit); beyond the table
 the surface goes on straight in each direction, in ``psi`` with the last differential inductance.
@@ -28,6 +30,8 @@ Vector = NDArray[np.float64]
 
 _LINKAGES = 129
 _ACCEPTED = 0.05  # largest disagreement of a given force, of its peak
+_SHARE = 0.34  # a little above a third, where the curvature ends
+_PLACES = 33  # looked at between two gaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +76,12 @@ class FluxMap:
         -----
         AccuracyWarning
             If the given force differs by more than 5 % of its peak.
+
+        Raises
+        ------
+        InputError
+            If the table is not increasing, or too rough over the gap: the current would fall with
+            rising linkage between two of its gaps.
         """
         i, x, psi = _checked(current, gap, linkage)
         common = np.linspace(0.0, float(psi.max()), _LINKAGES)
@@ -86,6 +96,7 @@ class FluxMap:
             CubicSpline(x, energy, axis=1)(x, 1),
             CubicSpline(x, through, axis=1)(x, 1),
         )
+        made._require_rising()
         if force is not None:
             made._compare(psi, x, np.array(force, dtype=float).reshape(psi.shape))
         return made
@@ -153,6 +164,28 @@ class FluxMap:
             current += p * q * W[2, 1]
         return float(energy), float(current), float(slope)
 
+    def _require_rising(self) -> None:
+        """Refuse a surface on which the current falls somewhere as the linkage rises."""
+        values = _bending(self.energy, self.linkage[1] * self.current)
+        slopes = _bending(self.slope, self.linkage[1] * self.mixed)
+        wide = np.diff(self.gap)
+        corners = np.stack(
+            [values[..., :-1], values[..., 1:], wide * slopes[..., :-1], wide * slopes[..., 1:]],
+            axis=-1,
+        )
+        v = np.linspace(0.0, 1.0, _PLACES)[:, None] ** np.arange(4.0)
+        least = np.min(corners @ _HERMITE.T @ v.T, axis=(0, 3))
+        if np.min(least) <= 0.0:
+            k, j = np.unravel_index(int(np.argmin(least)), least.shape)
+            raise InputError(
+                "FluxMap",
+                got=f"a table that changes so abruptly between the gaps {self.gap[j]:.4g} m and "
+                f"{self.gap[j + 1]:.4g} m that the current falls as the linkage rises, "
+                f"near {self.linkage[k]:.3g} Wb",
+                expected="linkages that change smoothly with the gap",
+                hint="put more gaps into the table there, or smooth its noise.",
+            )
+
     def _compare(self, psi: Vector, x: Vector, force: Vector) -> None:
         derived = np.array(
             [[self.force_at(p, g) for p, g in zip(row, x, strict=True)] for row in psi]
@@ -175,6 +208,16 @@ _HERMITE = np.array(
     [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]]
 )
 """Values and slopes at 0 and 1 -> coefficients of a cubic."""
+
+
+def _bending(W: Vector, i: Vector) -> Vector:
+    """Second derivative by the linkage at both ends of all cells, shape (2, m - 1, n).
+
+    ``W`` and ``i`` are values and slopes at the linkages, in lengths of a cell; between its ends
+    the second derivative of a cubic is straight.
+    """
+    rise = 6.0 * np.diff(W, axis=0)
+    return np.stack([rise - 4.0 * i[:-1] - 2.0 * i[1:], 4.0 * i[1:] + 2.0 * i[:-1] - rise])
 
 
 def _checked(
@@ -212,4 +255,17 @@ def _column(i: Vector, psi: Vector, common: Vector) -> tuple[Vector, Vector]:
     work = curve.antiderivative()
     at_end = float(curve(psi[-1]))
     energy = work(inside) + beyond * (at_end + 0.5 * slope * beyond)
-    return np.asarray(energy), np.asarray(curve(inside) + slope * beyond)
+    current = np.asarray(curve(inside) + slope * beyond)
+    return _convex(np.asarray(energy), current, float(common[1])), current
+
+
+def _convex(energy: Vector, current: Vector, step: float) -> Vector:
+    """Energies between which a cubic with the slopes ``current`` bends upwards everywhere.
+
+    A current like ``psi^p`` with ``p > 2`` within one cell would not: above straight lines the
+    energy of a cell must be one to two thirds of what the rise of the current would give.
+    """
+    rise = step * np.diff(current)
+    least, most = _SHARE * rise, (1.0 - _SHARE) * rise
+    above = np.diff(energy) - step * current[:-1]
+    return np.concatenate(([0.0], np.cumsum(step * current[:-1] + np.clip(above, least, most))))

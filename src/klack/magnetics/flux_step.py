@@ -78,7 +78,8 @@ CHANNELS = (
 
 FAILURES = {
     1: "the magnetic circuit found no fluxes; a smaller step or a smoother magnetisation curve"
-    " helps, and the circuit must hold back every flux (no reluctance of zero)",
+    " helps, the circuit must hold back every flux (no reluctance of zero), and the gaps of a force"
+    " map must reach as far as its armature goes",
     2: "the driver switches more than 30 times in one step: its current band is narrower than what"
     " the current moves in a step; widen the band, take a smaller step, or give the coil more"
     " leakage",

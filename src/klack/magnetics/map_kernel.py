@@ -30,6 +30,7 @@ _TABLE = HEADER + 1 + BRANCH_SIZE + 1
 _FLUX = HEADER + 1 + BRANCH_SIZE
 _MOST = 60
 _SETTLED = 1e-14
+_ROUND = 2e-15
 
 Vector = NDArray[np.float64]
 
@@ -159,12 +160,13 @@ def _mean_current(par: Any, at: int, psi0: float, psi1: float, x: float) -> tupl
     work = 0.0
     for k in range(min(k0, k1), max(k0, k1) + 1):
         _, c1, c2, c3 = _over_linkage(par, t, k, j, x)
-        u0 = max(low / step - k, 0.0)
-        u1 = high / step - k
+        # lengths of linkage, which add up to the change without round-off
+        s0, s1 = max(low, k * step), high
         if k < max(k0, k1):
-            u1 = 1.0
+            s1 = (k + 1) * step
+        u0, u1 = s0 / step - k, s1 / step - k
         total = u0 + u1
-        work += (u1 - u0) * (c1 + c2 * total + c3 * (total * total - u0 * u1))
+        work += (s1 - s0) * (c1 + c2 * total + c3 * (total * total - u0 * u1)) / step
     change = psi1 - psi0
     mean = (work if a1 >= a0 else -work) / change
     return mean, (map_current(par, at, psi1, x) - mean) / change
@@ -227,13 +229,17 @@ def map_step(
         current, slope = 0.5 * (first + second), 0.5 * (first_slope + second_slope)
         if not slope > 0.0:
             return False, 0.0
+        sides = abs(first) + abs(second)
         if conducts:
             stiff = per_time + resistance * slope
             move = (voltage - d * per_time - resistance * current) / stiff
+            sides = (abs(voltage) + resistance * sides) / stiff
         else:
             move = -current / slope
+            sides = sides / slope
         d += move
-        if abs(move) <= _SETTLED * scale:
+        # a linkage far beyond the map, and what cancels in the balance, have their own last digits
+        if abs(move) <= _SETTLED * scale + _ROUND * (abs(psi) + abs(d) + sides):
             change[0] = d
             return True, (current + slope * move if conducts else 0.0)
     return False, 0.0

@@ -38,6 +38,8 @@ class CoilRun:
         Supply, losses, and work done on the armature.
     stored : array, shape (2,) [J]
         Magnetic energy before and after.
+    most_stored : float [J]
+        At the end of any step: it may have come and gone.
     """
 
     time: Vector
@@ -52,13 +54,15 @@ class CoilRun:
     eddy: float
     work: float
     stored: Vector
+    most_stored: float
 
     @property
     def residual(self) -> float:
         """Energy that does not balance, over the largest of the amounts [-]."""
         parts = [self.electric, -self.ohmic, -self.eddy, -self.work, self.stored[0]]
         parts.append(-self.stored[1])
-        return abs(sum(parts)) / max(abs(part) for part in parts)
+        largest = max(self.most_stored, *(abs(part) for part in parts))
+        return abs(sum(parts)) / largest if largest else 0.0
 
     def switches(self) -> Vector:
         """Ends of the steps in which the driver changed its state [s]."""
@@ -89,6 +93,7 @@ def _march(
         else:
             sums[4] = out[5 + size]
         sums[5] = out[5 + size]
+        sums[6] = max(sums[6], out[5 + size])
     return 0
 
 
@@ -125,7 +130,7 @@ def run_coil(
     y = np.array(lift, dtype=float)
     par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
     start = flux_state(par, fluxes)
-    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(6)
+    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(7)
     status = _march(address_of(magnet_step), par, np.append(start, 0.0), y, step, log, sums)
     if status != 0:
         raise ConvergenceError(f"coil: {FAILURES[status]}.")
@@ -142,5 +147,6 @@ def run_coil(
         ohmic=sums[1],
         eddy=sums[2],
         work=sums[3],
-        stored=sums[4:],
+        stored=sums[4:6],
+        most_stored=float(sums[6]),
     )
