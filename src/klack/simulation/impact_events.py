@@ -25,9 +25,9 @@ def impact_events(
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
     so are contacts between which the centres of mass do not move apart.  Rigid bodies have no
-    period; for it stands the time of the shorter contact.  A contact that is closed at the start is
-    none.  A film acts before the first touch and after the last one: the speeds are the highest
-    ones while it presses, and within two of these periods while it pulls.
+    period; for it stands half the time of the shorter contact.  A contact that is closed at the
+    start is none.  A film acts before the first touch and after the last one: the speeds are the
+    highest ones while it presses, and within two of these periods while it pulls.
     """
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     events: list[ImpactEvent] = []
@@ -150,7 +150,7 @@ def _clusters(
     groups = [[0, 0]]
     for i in range(1, len(begin)):
         shorter = np.fmin(stop[i - 1] - begin[i - 1], stop[i] - begin[i])
-        near = begin[i] - stop[i - 1] < (period or shorter)
+        near = begin[i] - stop[i - 1] < (period or 0.5 * shorter)
         if near or _fastest(stop[i - 1], begin[i], time, gap_rate) <= 0.0:
             groups[-1][1] = i
         else:

@@ -163,8 +163,9 @@ def _move(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> float:
 def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: float) -> bool:
     """Whether the last change of the displacements matters no more.
 
-    ``left`` and ``work`` are what the interfaces add to both sums.  What an element saw is ``d = Y1 - USED`` short of the end of the step, and catches up in the next one:
-    of ``F dy`` the energy ``F_n (d_n - d_(n-1))`` is lost, in sum ``(F_n - F_(n+1)) d_n``.
+    ``left`` and ``work`` are what the interfaces add to both sums.  What an element saw is
+    ``d = Y1 - USED`` short of the end of the step, and catches up in the next one: of ``F dy`` the
+    energy ``F_n (d_n - d_(n-1))`` is lost, in sum ``(F_n - F_(n+1)) d_n``.
     """
     way = 0.0
     for p in range(ports):

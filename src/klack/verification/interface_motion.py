@@ -10,6 +10,7 @@ from klack.contact.laws import ContactLaw, FlatLaw, HuntCrossley
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.interface_step import NO_LAW, interface_store, solve_interface
+from klack.simulation.kernel import SEPARATED
 from klack.simulation.propagator import modal_propagator
 
 __all__ = ["InterfaceMotion", "interface_motion"]
@@ -168,7 +169,7 @@ def _run(
 ) -> None:
     cubic, linear, cut_off, suction, series, h = numbers
     G = np.sum(c * c * A[4])
-    g, e, force, chi, hint = gaps[0], 0.0, 0.0, 0.0, 0
+    g, e, force, chi, deepest, hint = gaps[0], 0.0, 0.0, 0.0, 0.0, 0
     start = g
     closed, film_before = False, 0.0
     for n in range(gaps.size - 1):
@@ -203,6 +204,10 @@ def _run(
         q += A[4] * c * force
         v += A[5] * c * force
         g = start + np.sum(c * q)
+        if chi != 0.0:
+            deepest = max(deepest, -g)
+            if g > SEPARATED * deepest:
+                chi = deepest = 0.0
         gaps[n + 1], compressions[n + 1] = g, e
         forces[0, n], forces[1, n] = contact, film
         losses[0, n], losses[1, n] = lost_contact, lost_film
