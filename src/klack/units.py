@@ -150,8 +150,8 @@ FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"))
 TEMPERATURE = Kind(
     "a temperature",
     "K",
-    "293.15 K",
-    ("K",),
+    "20 degC",
+    ("degC", "K"),
     {"K": 1.0},
 )
 RATIO = Kind(

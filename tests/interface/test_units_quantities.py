@@ -46,6 +46,13 @@ def test_quantity_becomes_si(kind, text, expected):
     assert parse_quantity(text, getattr(units, kind)) == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("text", [60, "60", "60 C", "140 degF"])
+def test_a_temperature_that_cannot_be_read_is_told_of_degc(text):
+    """Celsius is what everybody has; a hint that knows kelvin only sends people to a table."""
+    with pytest.raises(InputError, match="degC"):
+        parse_quantity(text, units.TEMPERATURE)
+
+
 BAD = [
     ("LENGTH", "80 bar", "a pressure"),  # the error names what came
     ("PRESSURE", "80 um", "a length"),
