@@ -118,7 +118,7 @@ def answer(study: ImpactStudy) -> str:
         text += f" (the first of {numbers.sub_contacts} contacts in quick succession)"
     if isfinite(numbers.restitution):
         text += (
-            f" and rebounds with {numbers.restitution:.3g} of its speed; "
+            f" and rebounds with {share(numbers.restitution, 2)} of its speed; "
             f"{share(numbers.vibration_share)} of the impact energy is left behind as vibration. "
         )
     else:
