@@ -1,10 +1,12 @@
 """Numbers as text, by hand."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from klack.report.wording import listed, quantity, share, signed, signed_share
+from klack.cli.notes import ends_in_contact
+from klack.report.wording import answer, listed, quantity, share, signed, signed_share
 from klack.workflow.study import ImpactStudy
 from klack.workflow.summary import SUMMARY_COLUMNS, study_to_json, summary_rows
 
@@ -62,3 +64,21 @@ def test_summary_rows_fit_their_columns(impact_study: ImpactStudy) -> None:
     assert [row[0] for row in rows] == ["full", "reduced"]
     assert all(len(row) == len(SUMMARY_COLUMNS) for row in rows)
     assert rows[0][2] == "15.000"
+
+
+def with_restitution(study: ImpactStudy, restitution: float) -> ImpactStudy:
+    level = study.levels["reduced"]
+    measures = replace(level.measures, restitution=restitution)
+    return replace(study, levels={"reduced": replace(level, measures=measures)})
+
+
+def test_a_rebound_that_loses_little_is_not_rounded_to_none(lonely_study: ImpactStudy) -> None:
+    said = answer(with_restitution(lonely_study, 0.9997))
+    assert "rebounds with 99.97\N{NO-BREAK SPACE}% of its speed" in said
+
+
+def test_a_run_that_ends_in_the_contact_says_so(lonely_study: ImpactStudy) -> None:
+    assert ends_in_contact(with_restitution(lonely_study, 0.9).levels) == ()
+    (note,) = ends_in_contact(with_restitution(lonely_study, float("nan")).levels)
+    assert note.startswith("reduced: the run ends before the bodies have parted.")
+    assert "run.duration" in note
