@@ -1,5 +1,7 @@
 """What a user reads when two surfaces cannot be in contact, and what is warned of."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -72,7 +74,16 @@ def test_contact_that_grows_to_the_rim():
 
     with pytest.raises(InputError, match=r"rim of the candidate points above .* N") as caught:
         problem.solve(4.0)
-    assert "enlarge the reach" in str(caught.value)
+    hint = re.search(r"'reach: (\S+) um', under contact", str(caught.value))
+    assert hint
+    wider = half_spaces(
+        parabola(RADIUS, 4 * WIDTH),
+        contact=WIDTH,
+        cells=(6, 5),
+        far=100,
+        reach=1e-6 * float(hint[1]),
+    )
+    assert wider.solve(4.0).max_force == pytest.approx(4.0, rel=0.02)  # what is advised suffices
 
 
 def test_automatic_reach_holds_the_contact():

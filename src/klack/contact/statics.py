@@ -378,7 +378,8 @@ def check_rim(static: StaticContact) -> None:
         got=f"contact at the rim of the candidate points above {below:.4g} N "
         f"(reach {static.space.reach * 1e6:.4g} um)",
         expected=f"a reach that holds the contact up to {static.max_force:.4g} N",
-        hint=f"enlarge the reach to about {2e6 * static.approach[-1]:.3g} um, or the surface.",
+        hint=f"enlarge the reach: in a case 'reach: {2e6 * static.approach[-1]:.3g} um', under "
+        "contact or beside the stop; or let the surfaces go on further.",
     )
 
 
