@@ -200,3 +200,17 @@ def test_nodes_of_all_instances_are_limited(tmp_path, monkeypatch):
 
     with pytest.raises(InputError, match=r"x.inp:12: .INSTANCE: got 8 nodes with this"):
         read_abaqus(tmp_path / "x.inp", 1.0)
+
+
+def test_a_set_of_nodes_is_no_surface(tmp_path):
+    path = tmp_path / "x.inp"
+    path.write_text(TET + "*NSET, NSET=foot\n1, 2, 3\n*SURFACE, NAME=face\nbody, S1\n")
+    with pytest.raises(InputError, match=r"surface 'foot': got a set of nodes.*one of: face"):
+        read_abaqus(path, 1.0).surface("foot")
+
+
+def test_a_lost_include_says_where_it_is_looked_for(tmp_path):
+    path = tmp_path / "x.inp"
+    path.write_text("*INCLUDE, INPUT=lost.inp\n" + TET)
+    with pytest.raises(InputError, match=r"(?s)lost.inp: got no such file.*the file it stands in"):
+        read_abaqus(path, 1.0)

@@ -241,7 +241,7 @@ class _Source:
                 str(path)[:200],
                 got=(error.strerror or str(error)).lower(),
                 expected="an Abaqus or CalculiX input file (.inp)",
-                hint="check the path; it is relative to where you started the program.",
+                hint="check the path; that of an *INCLUDE is relative to the file it stands in.",
             ) from None
         raise InputError(
             str(path),

@@ -125,11 +125,14 @@ class Mesh:
         """
         if name not in self.surfaces:
             known = ", ".join(sorted(self.surfaces)) or "none"
+            got, hint = "a name that the mesh does not have", "check the spelling, or name the face"
+            if name in self.node_sets:
+                got, hint = "a set of nodes, which knows no faces", "name its faces as a surface"
             raise InputError(
                 f"surface '{name}'",
-                got="a name that the mesh does not have",
+                got=got,
                 expected=f"one of: {known}",
-                hint="check the spelling, or name the face in the CAD or mesh file.",
+                hint=f"{hint} in the CAD or mesh file.",
             )
         return self.surfaces[name]
 
