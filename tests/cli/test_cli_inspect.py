@@ -148,6 +148,15 @@ def test_a_wrong_name_in_a_mesh_is_told_by_inspect(tmp_path: Path, capsys):
     assert "did you mean 'top'?" in told
 
 
+def test_a_unit_beside_a_step_file_is_refused(tmp_path: Path, capsys):
+    """The file says its unit; another one on the command line would be passed over."""
+    pin = tmp_path / "pin.step"
+    pin.write_text("ISO-10303-21;")
+
+    assert main(["inspect", str(pin), "--unit", "inch"]) == 2
+    assert "--unit: got 'inch' for a STEP file, which says its own unit" in capsys.readouterr().err
+
+
 def test_a_mesh_without_unit_is_refused(capsys):
     assert main(["inspect", str(NEEDLE)]) == 2
     assert "unit" in capsys.readouterr().err

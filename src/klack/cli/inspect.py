@@ -35,8 +35,9 @@ def inspect(
     Of a case: the bodies that come from other programs, checked as a run checks them.
     """
     from klack.case.shipped import find_case, shipped_cases
+    from klack.errors import InputError
     from klack.units import LENGTH, parse_quantity
-    from klack.workflow.inspection import inspect_case, inspect_file
+    from klack.workflow.inspection import STEP_ENDINGS, inspect_case, inspect_file
 
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()
     if is_case or (not file.exists() and str(file) in shipped_cases()):
@@ -46,5 +47,12 @@ def inspect(
             print_table(name, _COLUMNS, rows, left=3)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
+    if unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS:
+        raise InputError(
+            "--unit",
+            got=f"'{unit}' for a STEP file, which says its own unit",
+            expected="no --unit",
+            hint="leave it out; klack shows sizes in mm.",
+        )
     print_table(file.name, _COLUMNS, inspect_file(file, length, matrix), left=3)
     return 0
