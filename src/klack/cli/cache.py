@@ -18,9 +18,10 @@ def cache(
 ) -> int:
     """Show where results are kept for later runs, and how much; KLACK_CACHE=off turns that off.
 
-    KLACK_CACHE names another folder, KLACK_CACHE_SIZE the size at which the oldest results go
-    (5 GB).  Meshes, modes and static solutions are kept, under a key of all that they depend on;
-    deleting them costs nothing but time.
+    KLACK_CACHE names another folder.
+    KLACK_CACHE_SIZE is the size at which the oldest results go (5 GB).
+    Meshes, modes and static solutions are kept, under a key of all that matters.
+    Deleting them costs nothing but time.
     """
     from klack.cache.setting import result_cache
     from klack.errors import InputError
