@@ -281,7 +281,14 @@ DRIVERS = st.one_of(
         duty=st.floats(0.05, 0.95),
         **TIMING,
     ),
-    st.lists(st.tuples(st.floats(0.0, 400e-6), st.floats(-50.0, 50.0)), min_size=1, max_size=8).map(
+    # to 1 nV: the energy of 1e-152 V is a number without digits
+    st.lists(
+        st.tuples(
+            st.floats(0.0, 400e-6), st.floats(-50.0, 50.0).map(lambda volts: round(volts, 9))
+        ),
+        min_size=1,
+        max_size=8,
+    ).map(
         lambda points: VoltageTable(
             time=tuple(t for t, _ in sorted(points)), voltage=tuple(u for _, u in sorted(points))
         )
