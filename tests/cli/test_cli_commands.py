@@ -90,7 +90,8 @@ def test_module_is_the_command():
 BAD = {
     "unknown command": (["impct"], ["klack impct:", 'Did you mean "impact"', "klack --help"]),
     "no case": (["impact"], ["klack impact:", "CASE", "klack impact --help"]),
-    "two cases": (["impact", "a", "b"], ["'b'"]),
+    "two cases": (["impact", "a", "b"], ["got 'b', which belongs to no option"]),
+    "two formats": (["export", "a", "--to", "mat", "csv"], ["got 'csv', which belongs to no"]),
     "unknown option": (["impact", "a", "--modes"], ["--modes"]),
     "missing file": (["impact", "valve.yaml"], ["valve.yaml", "neither a file nor a shipped"]),
     "misspelled shipped case": (["impact", "demo-vave"], ["did you mean 'demo-valve'"]),

@@ -21,7 +21,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
 from klack.cli import (
@@ -140,6 +140,9 @@ def _complain(text: str, code: int) -> int:
 
 
 def _one_line(error: CycloptsError) -> str:
+    if isinstance(error, UnusedCliTokensError):
+        words = ", ".join(f"'{word}'" for word in error.unused_tokens or ())
+        return f"got {words}, which belongs to no option, expected one value for each option."
     return " ".join(str(error).split())
 
 
