@@ -325,6 +325,14 @@ def test_a_valve_that_does_nothing_has_a_report(study: StrokeStudy, tmp_path: Pa
     assert "Variant 'dry' has no impacts" in unescape((tmp_path / "report.html").read_text())
 
 
+def test_a_speed_before_the_film_is_not_told_as_that_of_the_touch(study: StrokeStudy):
+    """By definition: with a film the speed of an impact is the highest since it began to press."""
+    bare = replace(study, stops=tuple(replace(stop, film=False) for stop in study.stops))
+
+    assert "m/s (the highest since its film began to press) and a peak" in stroke_answer(study)
+    assert "film began" not in stroke_answer(bare)
+
+
 def test_a_stored_study_gives_the_same_page(study: StrokeStudy, page: str, tmp_path: Path):
     save_stroke(study, tmp_path)
 

@@ -42,7 +42,7 @@ def _opening(study: StrokeStudy, variant: StrokeVariant) -> str:
         return f"The {study.needle} lifts by {quantity(way, 'm', 3)}{end}"
     return (
         f"The {study.needle} reaches the opening stop after "
-        f"{quantity(variant.opening_time, 's', 4)} {_hit(event)}."
+        f"{quantity(variant.opening_time, 's', 4)} {_hit(study, variant, event)}."
     )
 
 
@@ -59,12 +59,14 @@ def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
         return f"{text}."
     bounces = len(variant.impacts(seat)) - 1
     more = f", and bounces {bounces} times" if bounces > 1 else ""
-    return f"{text}, {_hit(event)}{more}."
+    return f"{text}, {_hit(study, variant, event)}{more}."
 
 
-def _hit(event: ImpactEvent) -> str:
+def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
+    filmed = variant.wet and any(stop.film for stop in study.stops if stop.name == event.stop)
+    since = " (the highest since its film began to press)" if filmed else ""
     text = (
-        f"with {event.approach_speed:.3g} m/s and a peak force of "
+        f"with {event.approach_speed:.3g} m/s{since} and a peak force of "
         f"{quantity(event.peak_force, 'N', 3)}"
     )
     if isfinite(event.restitution):
