@@ -223,10 +223,11 @@ class HuntCrossley:
     .. math:: F = F_e(d)\,\bigl(1 + \chi \dot d\bigr), \qquad \chi = \alpha / v_0
 
     (Hunt and Crossley 1975); ``v0`` is the approach speed at first touch, which the time
-    integration finds by itself.  With ``alpha`` from :func:`gonthier_coefficient` two rigid bodies
-    rebound with exactly the prescribed restitution, for every elastic law.  On bodies with modes
-    the wave loss would be counted twice.  The law is clipped where it would pull, and the clipped
-    work is booked.
+    integration finds by itself, and anew once the contact has been open by a tenth of its deepest
+    indentation: bounces are damped each by their own speed, trembling is not.  With ``alpha`` from
+    :func:`gonthier_coefficient` two rigid bodies rebound with exactly the prescribed restitution,
+    for every elastic law.  On bodies with modes the wave loss would be counted twice.  The law is
+    clipped where it would pull, and the clipped work is booked.
 
     Parameters
     ----------

@@ -4,8 +4,9 @@ Restitution is a *result* and belongs to the centres of mass, never to a point o
 
 .. math:: e = -\frac{(v_a - v_b)_\text{after}}{(v_a - v_b)_\text{before}}
 
-(``v_b = 0`` for a supported body).  Contacts closer than two longest periods of body a, or 50 us,
-form one cluster = one impact; ``after`` is after the last of them.
+(``v_b = 0`` for a supported body).  Contacts closer than two longest periods of body a, or than
+twice the longest contact before, form one cluster = one impact; ``after`` is after the last of
+them.
 
 Times are found inside the records: the impulse gathered since first touch grows like a power ``1
 + n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the
@@ -26,8 +27,8 @@ from klack.errors import InputError
 
 __all__ = ["ContactPhase", "Deviation", "ImpactMeasures", "find_contacts", "measure_impact"]
 
-_CLUSTER_TIME = 50e-6  # [s]
-_SETTLING = (10e-6, 40e-6)  # window after the last contact for the speed of rebound [s]
+_CLUSTER = 2.0  # longest periods, or longest contacts, without one
+_SETTLING = (0.2, 0.8)  # window after the last contact for the speed of rebound, of that distance
 _EXPONENTS = (1.0, 2.0)  # of the force at touch, clamps what noise could suggest
 
 
@@ -187,7 +188,7 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> Impact
             expected="at least one contact",
             hint="simulate longer: the gap takes gap / speed seconds to close.",
         )
-    clusters = _clusters(phases, max(_CLUSTER_TIME, 2.0 * history.longest_period))
+    clusters = _clusters(phases, history.longest_period)
     cluster = clusters[0]
     first, last = cluster[0].first, cluster[-1].last
     touch, release = cluster[0].start, cluster[-1].end
@@ -195,7 +196,8 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> Impact
 
     inverse_a, inverse_b = 1.0 / history.mass_a, 1.0 / history.mass_b
     before = _velocity_before(history, first, touch)
-    after = _velocity_after(history, last, release, until)
+    distance = _distance(cluster, history.longest_period)
+    after = _velocity_after(history, last, release, until, distance)
     e = -after / before
 
     strongest = max(cluster, key=lambda phase: phase.peak_force)
@@ -281,10 +283,15 @@ def _time_since_touch(force: NDArray[np.float64], h: float) -> float:
     return float(min(h, h * x[0] / (x[1] - x[0])))
 
 
-def _clusters(phases: tuple[ContactPhase, ...], distance: float) -> list[list[ContactPhase]]:
+def _distance(cluster: list[ContactPhase], longest_period: float) -> float:
+    """Time without contact that ends a cluster [s]."""
+    return _CLUSTER * max(longest_period, *(phase.duration for phase in cluster))
+
+
+def _clusters(phases: tuple[ContactPhase, ...], longest_period: float) -> list[list[ContactPhase]]:
     clusters = [[phases[0]]]
     for phase in phases[1:]:
-        if phase.start - clusters[-1][-1].end < distance:
+        if phase.start - clusters[-1][-1].end < _distance(clusters[-1], longest_period):
             clusters[-1].append(phase)
         else:
             clusters.append([phase])
@@ -304,7 +311,9 @@ def _velocity_before(history: ImpactHistory, first: int, touch: float) -> float:
     return float(relative + history.external_force[first] / history.mass_a * since)
 
 
-def _velocity_after(history: ImpactHistory, last: int, release: float, until: int) -> float:
+def _velocity_after(
+    history: ImpactHistory, last: int, release: float, until: int, distance: float
+) -> float:
     """Relative velocity at separation: mean over the window, drift by outside forces removed."""
     edges = history.edges[last : until + 1]
     if edges.size < 2:
@@ -312,6 +321,7 @@ def _velocity_after(history: ImpactHistory, last: int, release: float, until: in
     outside = _outside_speed(history)
     drift = outside[last : until + 1] - np.interp(release, history.edges, outside)
     relative = history.velocity_a[last : until + 1] - history.velocity_b[last : until + 1] - drift
-    settled = (edges >= release + _SETTLING[0]) & (edges <= release + _SETTLING[1])
+    first, final = (release + share * distance for share in _SETTLING)
+    settled = (edges >= first) & (edges <= final)
     chosen = settled if np.any(settled) else np.ones(edges.size, dtype=bool)
     return float(np.mean(relative[chosen]))

@@ -29,7 +29,7 @@ from klack.workflow.step_names import require_step_names
 
 __all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
 
-_SAME_HEIGHT = 1e-6  # [m] clearances that differ by less belong to one touch
+_SAME_HEIGHT = 5e-4  # of the narrower surface; clearances that differ by less belong to one touch
 _SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of the contact
 
 
@@ -246,7 +246,11 @@ def _touch_height(
 ) -> float:
     """Height z [m] in the drawing of the upper body where it touches first when centred."""
     if touch is None or not touch.upper:
-        touch = first_touch_of_meshes(upper, surface, lower, other, tolerance=_SAME_HEIGHT)
+        width = min(
+            float(np.max(np.ptp(mesh.points[of.nodes][:, :2], axis=0)))
+            for mesh, of in ((upper, surface), (lower, other))
+        )
+        touch = first_touch_of_meshes(upper, surface, lower, other, tolerance=_SAME_HEIGHT * width)
     return float(np.mean([place[-1] for place in touch.upper]))
 
 
