@@ -121,10 +121,16 @@ def _variables(group):
 def test_what_makes_no_sense_is_refused_at_once(tmp_path, capsys, arguments, words):
     assert main(["export", str(VALVE), *arguments, "--out", str(tmp_path / "x"), "-q"]) == 2
 
-    assert words in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count("klack export:") == 1  # named once
+    assert "klack export --to" not in told
+    assert "klack export --part" not in told
     assert not (tmp_path / "x").exists()
 
 
 def test_models_do_not_come_from_a_result(stored, capsys):
     assert main(["export", str(stored), "--to", "fmu"]) == 2
-    assert "case" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert told.startswith(f"klack export: {stored}: got a stored result with --to fmu")
+    assert "case" in told

@@ -180,7 +180,7 @@ def _require_used(to: str, options: Mapping[str, object]) -> None:
     for name, value in options.items():
         if value is not None and to not in _USED_BY[name]:
             raise InputError(
-                f"klack export {name}",
+                name,
                 got=f"it with --to {to}",
                 expected=f"it with --to {' or '.join(_USED_BY[name])} only",
                 hint=f"leave {name} out.",
@@ -190,7 +190,7 @@ def _require_used(to: str, options: Mapping[str, object]) -> None:
 def _export_stored(source: Path, to: str, out: Path | None, *, quiet: bool) -> None:
     if to not in _RESULTS:
         raise InputError(
-            f"klack export {source}",
+            str(source),
             got=f"a stored result with --to {to}",
             expected=f"--to {', '.join(_RESULTS)} for a result",
             hint="models, decks and fields come from the case: give the case file or its name.",
@@ -208,7 +208,7 @@ def _impact_only(case: Any, to: str) -> Any:
 
     if not isinstance(case, Case):
         raise InputError(
-            f"{case.path}: klack export --to {to}",
+            f"{case.path}: --to {to}",
             got="the case of a whole valve",
             expected="the case of one impact of two bodies",
             hint="describe the impact on one stop as a case of its own; see demo-valve.",

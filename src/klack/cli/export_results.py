@@ -22,7 +22,7 @@ def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
 
     if not isinstance(study, ImpactStudy | StrokeStudy):
         raise InputError(
-            "klack export",
+            "the stored result",
             got=f"a stored {type(study).__name__}",
             expected="the result of klack impact or klack stroke",
             hint="its numbers are in --json of the command that made it.",
