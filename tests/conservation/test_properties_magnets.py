@@ -145,7 +145,7 @@ def test_a_magnet_pulls_with_the_slope_of_its_coenergy(magnet, open_share, curre
     assert right.linkage > left.linkage
 
 
-FINE = np.linspace(0.0, 1.0, 200)
+FINE = np.linspace(0.0, 1.0, 60)
 
 
 @st.composite
