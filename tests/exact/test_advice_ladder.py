@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from klack.advice.advice import Measured, settle
+from klack.advice.advice import Advice, Measured, settle
+from klack.advice.cost import added
 from klack.advice.ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
 from klack.advice.settings import Setting, SettingValue, rounded_down, rounded_up
 
@@ -138,3 +139,49 @@ def test_a_frequency_follows_the_number_of_modes_below_it():
     assert value.advised(0.8) == pytest.approx(80e3)  # four
     assert value.factor_of(80e3) == pytest.approx(3 / 4)
     assert value.factor_of(value.advised(2.9)) == pytest.approx(3 / 2)
+
+
+def test_degrees_of_freedom_of_a_region_of_fixed_extent():
+    """Exact: 700 elsewhere and 300 f^-3 in the region, whichever run it was learnt from."""
+    for known in (1.5, 0.5, 2 / 3):
+        run = (known, round(700 + 300 * known**-3))
+        for factor in (2.0, 1.0, 0.25):
+            expected = 300 * (factor**-3 - 1)
+            assert added(1000, run, factor, 3) == pytest.approx(expected, abs=200 * 0.5)
+    assert added(1000, (0.5, 990), 0.25, 3) == 0.0  # a finer mesh with fewer nodes: scatter
+
+
+def test_a_grading_reaches_only_what_a_case_accepts():
+    key = ("bodies", "a", "mesh", "grading")
+    value = SettingValue(key=key, value=0.7, most=1.0)
+    setting = Setting(name="growth in a", group="mesh", values=(value,))
+
+    assert not setting.reaches(1.5)
+    assert setting.reaches(1.4)
+    assert setting.reaches(0.25)
+
+
+def test_a_reference_is_as_fine_as_runs_and_advice():
+    """Sizes the smaller, counts the larger of what was run and what is advised."""
+    count = SettingValue(key=("reduction", "modes", "a", "count"), value=10.0, kind="count")
+    modes = Setting(name="modes of a", group="modes", values=(count,))
+    measured = [
+        Measured(setting=size("a"), ladder=power_law(1.0, error=0.1), runs=""),
+        Measured(setting=size("b"), ladder=power_law(2.0, error=1e-6, level=0.0), runs=""),
+        Measured(setting=modes, ladder=power_law(1.0, error=0.03, level=0.0), runs=""),
+    ]
+    counsels = settle(measured, (), MEASURES)
+    advice = Advice(
+        case="",
+        title="",
+        level="reduced",
+        measures=MEASURES,
+        up_to=1e5,
+        band_from_case=True,
+        counsels=counsels,
+    )
+    a, b, c = (item.values for item in counsels)
+
+    assert a[("bodies", "a", "mesh", "size")] < 0.5e-3 < b[("bodies", "b", "mesh", "size")]
+    assert advice.finest == {**a, ("bodies", "b", "mesh", "size"): 0.5e-3, **c}
+    assert c[count.key] > 20

@@ -136,6 +136,8 @@ class Advice:
     counsels : tuple of Counsel
     fixed : tuple of Fixed
     notes : tuple of str
+    unmeshed : tuple of str
+        Bodies whose meshes were given: their errors are in no sum.
     dofs : pair of int or None
         Of all bodies now, and with the advice.
     times : pair of float [s]
@@ -158,6 +160,7 @@ class Advice:
     counsels: tuple[Counsel, ...]
     fixed: tuple[Fixed, ...] = ()
     notes: tuple[str, ...] = ()
+    unmeshed: tuple[str, ...] = ()
     dofs: tuple[int, int] | None = None
     times: tuple[float, float] = (float("nan"), float("nan"))
     checked: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
@@ -177,6 +180,17 @@ class Advice:
         """Sum of the expected errors with the advice, shape (m,)."""
         parts = [item.then for item in self.counsels] + [item.errors for item in self.fixed]
         return np.sum(parts, axis=0) if parts else np.zeros(len(self.measures))
+
+    @property
+    def finest(self) -> dict[Key, float]:
+        """Values [SI] at least as fine as every run and as the advice."""
+        return {
+            item.key: item.finer(counsel.measured.setting.at(min(factors))[item.key], advised)
+            for counsel in self.counsels
+            for factors in (counsel.measured.ladder.factors,)
+            for item in counsel.measured.setting.values
+            for advised in (counsel.values[item.key],)
+        }
 
     @property
     def is_good(self) -> bool:

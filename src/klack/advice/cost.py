@@ -5,7 +5,7 @@ Rough, and meant to be: they decide whether a finer mesh is tried, and what a us
 
 from klack.memory import available_memory
 
-__all__ = ["fits", "larger", "memory_of", "time_of"]
+__all__ = ["added", "fits", "larger", "memory_of", "time_of"]
 
 _SHARE = 0.5  # of the free memory
 
@@ -19,6 +19,32 @@ _TIME = {2: 1.2, 3: 1.5}
 def larger(dofs: int, factor: float, dimension: int) -> int:
     """Most degrees of freedom that refining one region by a factor below 1 can make."""
     return round(dofs * factor**-dimension)
+
+
+def added(present: int, run: tuple[float, int], factor: float, dimension: int) -> float:
+    r"""Degrees of freedom that one region adds at a factor, from one run with that region changed.
+
+    A region of fixed extent holds :math:`b f^{-d}` of them: :math:`b` from the run.
+
+    Parameters
+    ----------
+    present : int
+        Of the case.
+    run : pair of float and int
+        Factor of the run, and its degrees of freedom.
+    factor : float
+    dimension : int
+
+    Examples
+    --------
+    Half the size once made 1000 into 8000; two thirds of it make 3375:
+
+    >>> round(1000 + added(1000, (0.5, 8000), 2 / 3, 3))
+    3375
+    """
+    known, dofs = run
+    share = (dofs - present) / (known**-dimension - 1.0)
+    return max(share, 0.0) * (factor**-dimension - 1.0)
 
 
 def memory_of(dofs: int, dimension: int) -> float:

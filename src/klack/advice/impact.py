@@ -4,15 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from klack.advice.advice import Advice, Fixed, Measured
 from klack.advice.affordable import affordable
-from klack.advice.cost import fits, larger, memory_of, time_of
+from klack.advice.cost import added, fits, larger, memory_of, time_of
 from klack.advice.modes import (
     counted,
+    expected_count,
     explicit_modes,
     history_ladder,
     interface_history,
@@ -25,7 +26,8 @@ from klack.advice.regions import (
     axisymmetric_twin,
     layer_setting,
     mesh_settings,
-    unmeshed_note,
+    unmeshed,
+    unmeshed_notes,
 )
 from klack.advice.settings import Setting, SettingValue, applied
 from klack.advice.target import (
@@ -37,6 +39,7 @@ from klack.advice.target import (
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
+from klack.contact.statics import check_resolution
 from klack.elasticity.eigen import Modes
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
@@ -66,6 +69,7 @@ _REST_OF_LARGE = (2.0, 1.0, 0.5)
 _LARGE = 50_000  # degrees of freedom of finest meshes that take seconds
 _GROWTH = 6  # of the degrees of freedom with a quarter of the size: 4 to 7 on shipped cases
 _COARSE = (1.5, 1.0)
+_AROUND = (1.5, 1.0, 1.0 / 1.5)
 # lowest orders measured on shipped cases: contact of curved faces, corners of a body, the circle
 _CONTACT_ORDER, _REST_ORDER, _LAYER_ORDER = 1.4, 1.0, 2.0
 
@@ -177,14 +181,16 @@ def advise_impact(
         measures = impact_measures(error, level_error)
         measured, fixed = _modes_and_step(base, wanted, judged, log, progress)
         family = _family(base, log)
-        meshes, finest = _mesh_ladders(base, family, judged, log, progress, threads)
+        meshes, sizes = _mesh_ladders(base, family, judged, log, progress, threads)
         measured = [*meshes, *measured]
-        _unmeshed(case, log)
+        touching = {n: case.bodies[n] for n in (case.contact.moving.body, case.contact.stop.body)}
+        peak = measure_impact(base.now).peak_force
+        log.notes += unmeshed_notes(touching, check_resolution(base.problem.static, peak))
         counsels, dofs, dear = affordable(
             measured,
             fixed,
             measures,
-            size_with=lambda values: _size_with(base, family, values),
+            size_with=lambda values: _size_with(base, family, meshes, sizes, values),
             present=base.dofs,
             dimension=case.dimension,
         )
@@ -198,12 +204,13 @@ def advise_impact(
             band_from_case=up_to is None,
             counsels=counsels,
             fixed=tuple(fixed),
+            unmeshed=unmeshed(touching),
             dofs=(base.dofs, dofs),
             times=(base.time, base.time * _growth(base, dofs)),
         )
         base.problem.close()
         if confirm:
-            advice = _confirmed(base, family, finest, advice, log, progress, threads)
+            advice = _confirmed(base, family, meshes, sizes, advice, log, progress, threads)
     return replace(advice, notes=tuple(log.notes), runs=log.runs, wall_time=perf_counter() - begin)
 
 
@@ -247,7 +254,7 @@ def _base(case: Case, level: AdviceLevel, progress: Progress, threads: int | Non
         case=case,
         level=level,
         problem=problem,
-        pools=richer_pools(problem, pools, progress),
+        pools=richer_pools(problem, {n: 2 * count for n, count in counts.items()}, progress),
         pair=pair,
         counts=counts,
         time=spent,
@@ -366,47 +373,61 @@ def _runs_words(level: str, factors: Sequence[float], count: int) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Family:
-    """Cases on which meshes are compared: the case itself, or its axisymmetric twin."""
+    """Cases on which meshes are compared: the case itself, or its axisymmetric twin.
+
+    The other regions stay at their finest, or, ``around`` the case, as they are.
+    """
 
     case: Case
-    words: str
-    fine: bool
-    large: bool = False
+    words: str = ""
+    near: tuple[float, ...] = _NEAR
+    rest: tuple[float, ...] = _REST
+    around: bool = False
+
+    @property
+    def fine(self) -> bool:
+        """Whether anything was made finer than the case."""
+        return min(self.rest) < 1.0
 
     @cached_property
     def dofs(self) -> int:
         return _dofs(build_bodies(self.case, silent))
 
+    def factors(self, setting: Setting) -> tuple[float, ...]:
+        near = setting.name.startswith(("contact of", "growth in"))
+        return tuple(f for f in (self.near if near else self.rest) if setting.reaches(f))
+
 
 def _family(base: _Base, log: _Log) -> _Family:
     case = base.case
+    names = (case.contact.moving.body, case.contact.stop.body)
+    if len(unmeshed({name: case.bodies[name] for name in names})) == len(names):
+        return _Family(case=case, around=True)
     if case.dimension == 2:
-        fine = fits(larger(base.dofs, 0.25, 2), 2)
-        if not fine:
-            log.notes.append(_too_big(base.dofs, 2))
-        return _Family(case=case, words="", fine=fine, large=_GROWTH * base.dofs > _LARGE)
+        if not fits(larger(base.dofs, 0.25, 2), 2):
+            log.notes.append(_too_big(base.dofs, 0.25, 2))
+            return _Family(case=case, near=_COARSE, rest=_COARSE, around=True)
+        return _Family(case=case, rest=_REST_OF_LARGE if _GROWTH * base.dofs > _LARGE else _REST)
     highest = {
-        name: 1.001 * float(base.pools[name].frequency[base.counts[name] - 1])
-        for name in (case.contact.moving.body, case.contact.stop.body)
+        name: 1.001 * float(base.pools[name].frequency[base.counts[name] - 1]) for name in names
     }
     twin = axisymmetric_twin(case, highest)
     if twin is None:
-        log.notes.append(
-            "The meshes of these solids were made coarser only, and an order was assumed: "
-            "their errors are less certain than those of swept or axisymmetric bodies."
-        )
-        return _Family(case=case, words="", fine=False)
+        if not fits(larger(base.dofs, _AROUND[-1], 3), 3):
+            log.notes.append(_too_big(base.dofs, _AROUND[-1], 3))
+            return _Family(case=case, near=_COARSE, rest=_COARSE, around=True)
+        return _Family(case=case, near=_AROUND, rest=_AROUND, around=True)
     words = ", axisymmetric half sections"
     if any(s.sectors for b in case.bodies.values() for s in b.fixed or ()):
         words += " held all round"
-    return _Family(case=twin, words=words, fine=True)
+    return _Family(case=twin, words=words)
 
 
-def _too_big(dofs: int, dimension: int) -> str:
+def _too_big(dofs: int, factor: float, dimension: int) -> str:
     return (
-        f"Refining meshes of {dofs} degrees of freedom would take more memory than is free "
-        f"(estimated {memory_of(larger(dofs, 0.25, dimension), dimension) / 1e9:.2g} GB): they "
-        "were made coarser instead, and an order was assumed."
+        f"Refining meshes of {dofs} degrees of freedom could take more than half of the free "
+        f"memory (estimated {memory_of(larger(dofs, factor, dimension), dimension) / 1e9:.2g} GB): "
+        "they were made coarser instead, and an order was assumed."
     )
 
 
@@ -417,59 +438,59 @@ def _mesh_ladders(
     log: _Log,
     progress: Progress,
     threads: int | None,
-) -> tuple[list[Measured], dict[Key, float]]:
-    """Ladders of every region, the other regions at their finest; and these finest sizes."""
+) -> tuple[list[Measured], dict[str, tuple[float, int]]]:
+    """Ladders of every region; and a factor and the degrees of freedom of one run of each."""
     case = family.case
     surfaces = (case.contact.moving, case.contact.stop)
     wanted = {surface.body for surface in surfaces}
     bodies = {name: body for name, body in case.bodies.items() if name in wanted}
     settings = mesh_settings(bodies, surfaces)
-    factors = {s.name: _factors(s, family) for s in settings}
-    finest = {k: v for s in settings for k, v in s.at(factors[s.name][-1]).items()}
+    factors = {s.name: family.factors(s) for s in settings}
+    at = 1.0 if family.around else None
+    others = {k: v for s in settings for k, v in s.at(at or factors[s.name][-1]).items()}
     total = 1 + sum(len(f) - 1 for f in factors.values())
     result: list[Measured] = []
-    if not family.fine:
-        reference = base.now
-    else:
+    sizes: dict[str, tuple[float, int]] = {}
+    reference = base.now
+    if settings and not family.around:
         progress("meshes", 0.0)
-        reference = _run(applied(case, finest), base.level, threads)
+        reference, _ = _run(applied(case, others), base.level, threads)
         log.runs += 1
     done = 1
     for setting in settings:
-        used: list[float] = []
-        runs: list[ImpactHistory] = []
-        for factor in factors[setting.name][:-1]:
+        runs: dict[float, ImpactHistory] = {}
+        for factor in factors[setting.name]:
+            if factor == (at or factors[setting.name][-1]):
+                runs[factor] = reference
+                continue
             try:
-                runs.append(
-                    _run(applied(case, {**finest, **setting.at(factor)}), base.level, threads)
+                runs[factor], dofs = _run(
+                    applied(case, {**others, **setting.at(factor)}), base.level, threads
                 )
-                used.append(factor)
+                sizes[setting.name] = (factor, dofs)
             except KlackError as error:
-                if factor <= 1.0:
+                if factor <= 1.0 and not family.around:
                     raise
-                log.notes.append(
-                    f"No run with '{setting.name}' {factor:g} times as coarse: "
-                    f"{str(error).splitlines()[0]}"
-                )
+                log.notes.append(_no_run(setting, factor, error))
             log.runs += 1
             done += 1
             progress("meshes", done / total)
-        if not used:
+        if len(runs) < 2:
+            log.notes.append(f"The error of '{setting.name}' is not in the sums.")
             continue
-        used.append(factors[setting.name][-1])
         order = _CONTACT_ORDER if setting.name.startswith("contact of") else _REST_ORDER
-        words = ", ".join(f"{factor:g}" for factor in used)
+        words = ", ".join(f"{factor:.3g}" for factor in runs)
         result.append(
             Measured(
                 setting=setting,
-                ladder=history_ladder(used, [*runs, reference], judged, order),
+                ladder=history_ladder(list(runs), list(runs.values()), judged, order),
                 runs=f"{base.level}{family.words}: sizes times {words}",
             )
         )
     layers = layer_setting(base.case.bodies)
     if layers is not None and min(v.at(_COARSE[0]) for v in layers.values) > 6:
         progress("layers", 0.0)
-        coarse = _run(applied(base.case, layers.at(_COARSE[0])), base.level, threads)
+        coarse, _ = _run(applied(base.case, layers.at(_COARSE[0])), base.level, threads)
         log.runs += 1
         ladder = history_ladder(list(_COARSE), [coarse, base.now], judged, _LAYER_ORDER)
         words = " and ".join(f"{v.at(_COARSE[0]):g}" for v in layers.values[:1])
@@ -480,63 +501,57 @@ def _mesh_ladders(
                 runs=f"{base.level}: {layers.values[0].value:g} and {words} layers",
             )
         )
-    return result, finest
+    return result, sizes
 
 
-def _factors(setting: Setting, family: _Family) -> tuple[float, ...]:
-    if not family.fine:
-        return _COARSE
-    if setting.name.startswith(("contact of", "growth in")):
-        return _NEAR
-    return _REST_OF_LARGE if family.large else _REST
+def _no_run(setting: Setting, factor: float, error: KlackError) -> str:
+    how = f"{factor:.2g} times as coarse" if factor > 1.0 else f"{1.0 / factor:.2g} times as fine"
+    return f"No run with '{setting.name}' {how}: {str(error).splitlines()[0]}"
 
 
-def _run(case: Case, level: AdviceLevel, threads: int | None) -> ImpactHistory:
-    """One impact from its meshes on."""
+def _run(case: Case, level: AdviceLevel, threads: int | None) -> tuple[ImpactHistory, int]:
+    """One impact from its meshes on, and the degrees of freedom of both bodies."""
     problem = build_problem(case, silent, threads=threads)
     try:
         pools = mode_pools(problem, at_least=1, progress=silent)
         pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        dofs = _dofs(problem.pair)
         if level == "reduced":
-            return _reduced(case, pair, case.run.reduced_step)
+            return _reduced(case, pair, case.run.reduced_step), dofs
         model = build_interface(problem, pools, ports=pair.ports)
-        return simulate_case(case, model).history
+        return simulate_case(case, model).history, dofs
     finally:
         problem.close()
 
 
-def _unmeshed(case: Case, log: _Log) -> None:
-    for name in (case.contact.moving.body, case.contact.stop.body):
-        if case.bodies[name].mesh is None:
-            log.notes.append(unmeshed_note(name, case.bodies[name]))
-
-
-def _size_with(base: _Base, family: _Family, changes: Mapping[Key, float]) -> int:
+def _size_with(
+    base: _Base,
+    family: _Family,
+    meshes: Sequence[Measured],
+    sizes: Mapping[str, tuple[float, int]],
+    changes: Mapping[Key, float],
+) -> int:
     """Degrees of freedom of both bodies with other values; estimated for solids."""
-    meshes = {k: v for k, v in changes.items() if k[0] == "bodies"}
-    if not meshes:
+    changed = {k: v for k, v in changes.items() if k[0] == "bodies"}
+    if not changed:
         return base.dofs
     if base.case.dimension == 2:
-        return _dofs(build_bodies(applied(base.case, meshes), silent))
-    sections = {k: v for k, v in meshes.items() if k[-1] != "layers"}
+        return _dofs(build_bodies(applied(base.case, changed), silent))
+    sections = {k: v for k, v in changed.items() if k[-1] != "layers"}
     layers = [
         value / float(base.case.bodies[str(k[1])].geometry.layers or value)
-        for k, value in meshes.items()
+        for k, value in changed.items()
         if k[-1] == "layers"
     ]
     ratio = max(layers, default=1.0)
     if family.case is not base.case:
         after = _dofs(build_bodies(applied(family.case, sections), silent))
         return round(base.dofs * ratio * after / family.dofs)
-    factors = [v / _value_at(base.case, k) for k, v in sections.items()]
-    return round(larger(base.dofs, min(1.0, *factors), 3) * ratio)
-
-
-def _value_at(case: Case, key: Key) -> float:
-    node: Any = case
-    for part in key:
-        node = node[part] if isinstance(node, Mapping) else getattr(node, str(part))
-    return float(node)
+    dofs = float(base.dofs)
+    for setting in (item.setting for item in meshes if item.setting.name in sizes):
+        factor = min(v.factor_of(sections.get(v.key, v.value)) for v in setting.values)
+        dofs += added(base.dofs, sizes[setting.name], factor, 3)
+    return round(max(dofs, 1.0) * ratio)
 
 
 def _growth(base: _Base, dofs: int) -> float:
@@ -547,46 +562,62 @@ def _growth(base: _Base, dofs: int) -> float:
 def _confirmed(
     base: _Base,
     family: _Family,
-    finest: Mapping[Key, float],
+    meshes: Sequence[Measured],
+    sizes: Mapping[str, tuple[float, int]],
     advice: Advice,
     log: _Log,
     progress: Progress,
     threads: int | None,
 ) -> Advice:
-    """Lay the case and the advised one over a run in which everything is finest."""
-    if not family.fine:
-        return replace(advice, check_words="not run again: no finer meshes were affordable")
-    progress("advised case", 0.0)
+    """Lay the case and the advised one over a run at least as fine as all others and as both."""
     case = family.case
-    reference = _richest(applied(case, finest), base.step / 2.0, threads)
-    present = base.now if case is base.case else _run(case, base.level, threads)
+    finest = {k: v for k, v in advice.finest.items() if k[0] == "bodies" and k[-1] != "layers"}
+    if meshes and not family.fine:
+        return replace(advice, check_words="not run again: no finer meshes were affordable")
+    if family.around:
+        dofs = _size_with(base, family, meshes, sizes, finest)
+    else:
+        dofs = _dofs(build_bodies(applied(case, finest), silent))
+    if not fits(dofs, case.dimension):
+        needed = f"about {dofs:.2g} degrees of freedom, too many for the free memory"
+        return replace(advice, check_words=f"not run again: the finest run has {needed}")
+    progress("advised case", 0.0)
+    advised_case = _advised(base, case, advice.changes)
+    step = min(base.step / 2.0, _step_of(advised_case, base.level))
+    reference = _richest(applied(case, finest), advised_case, step, threads)
+    present = base.now if case is base.case else _run(case, base.level, threads)[0]
     progress("advised case", 0.5)
-    advised = _run(_advised(base, case, advice.changes), base.level, threads)
+    advised, _ = _run(advised_case, base.level, threads)
     log.runs += 2 + (case is not base.case)
     progress("advised case", 1.0)
     checked = (
         impact_errors(reference, present, advice.up_to),
         impact_errors(reference, advised, advice.up_to),
     )
+    on = "the finest meshes" if meshes else "the same meshes"
     return replace(
         advice,
         checked=checked,
-        check_words=f"both run again{family.words}, against the interface level on the finest "
-        "meshes, with twice the modes and half the step",
+        check_words=f"both run again{family.words}, against the interface level on {on}, with "
+        "twice the modes and half the step, or those of the advice where they are finer",
     )
 
 
-def _richest(case: Case, step: float, threads: int | None) -> ImpactHistory:
-    """Interface level with twice the modes."""
+def _richest(case: Case, advised: Case, step: float, threads: int | None) -> ImpactHistory:
+    """Interface level with twice the modes, or those of the advised case if they are more."""
     problem = build_problem(case, silent, threads=threads)
     try:
         pools = mode_pools(problem, at_least=1, progress=silent)
-        twice = {
-            name: 2 * counted(case.reduction.choice(name), pool) for name, pool in pools.items()
+        counts = {
+            name: max(
+                2 * counted(case.reduction.choice(name), pool),
+                expected_count(advised.reduction.choice(name), pool),
+            )
+            for name, pool in pools.items()
         }
+        richer = richer_pools(problem, counts, silent)
         pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
-        richer = richer_pools(problem, pools, silent)
-        return interface_history(problem, richer, pair.ports, twice, step=step)
+        return interface_history(problem, richer, pair.ports, counts, step=step)
     finally:
         problem.close()
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
+from math import ceil
 from typing import TypeVar
 
 import numpy as np
@@ -25,7 +26,7 @@ from klack.workflow.progress import Progress
 
 __all__ = [
     "counted",
-    "doubled",
+    "expected_count",
     "explicit_modes",
     "history_ladder",
     "interface_history",
@@ -61,9 +62,13 @@ def counted(choice: ModeChoice, pool: Modes) -> int:
     return min(choice.count or choice.participation or 1, len(pool.omega))
 
 
-def doubled(choice: ModeChoice, pool: Modes) -> ModeChoice:
-    """Choice of twice as many modes."""
-    return _choice(choice, 2 * counted(choice, pool))
+def expected_count(choice: ModeChoice, pool: Modes) -> int:
+    """Modes that a choice would keep of a larger pool, their frequencies evenly spaced above."""
+    asked = choice.count or choice.participation
+    if asked is not None:
+        return asked
+    share = (choice.frequency or 0.0) / float(pool.frequency[-1])
+    return ceil(share * len(pool.omega)) if share > 1.0 else counted(choice, pool)
 
 
 def _choice(choice: ModeChoice, count: int) -> ModeChoice:
@@ -73,10 +78,12 @@ def _choice(choice: ModeChoice, count: int) -> ModeChoice:
 
 
 def richer_pools(
-    problem: ContactProblem, pools: Mapping[str, Modes], progress: Progress
+    problem: ContactProblem, counts: Mapping[str, int], progress: Progress
 ) -> Mapping[str, Modes]:
-    """Modes of each body, twice as many as the case keeps."""
-    choices = {name: doubled(problem.case.reduction.choice(name), pools[name]) for name in pools}
+    """Modes of each body, as many as are counted."""
+    choices = {
+        name: _choice(problem.case.reduction.choice(name), count) for name, count in counts.items()
+    }
     richer = replace(problem, case=_with_choices(problem.case, choices))
     return mode_pools(richer, at_least=1, progress=progress)
 

@@ -1,13 +1,14 @@
 """Regions of a case's meshes, and the axisymmetric twin of bodies that are swept."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import isnan, nan
 
 from klack.advice.settings import Setting, SettingValue
 from klack.case.bodies import CaseBody, ModeChoice, Reduction, SurfaceName
 from klack.case.placement import Placement
 from klack.case.schema import Case
 
-__all__ = ["axisymmetric_twin", "layer_setting", "mesh_settings", "unmeshed_note"]
+__all__ = ["axisymmetric_twin", "layer_setting", "mesh_settings", "unmeshed", "unmeshed_notes"]
 
 
 def mesh_settings(
@@ -110,17 +111,58 @@ def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
     )
 
 
-def unmeshed_note(name: str, body: CaseBody) -> str:
-    """Why the mesh of a body has no advice, and what to do instead."""
-    what = "its nodes and matrices are" if body.geometry.nodes is not None else "its mesh is"
-    if body.reduced is not None:
-        return (
-            f"'{name}' is a reduced model: neither its mesh nor the modes that it left out can be "
-            "measured here. Try: ask its source for a second one, reduced from a finer mesh with "
-            "more modes, and compare both runs."
+def unmeshed(bodies: Mapping[str, CaseBody]) -> tuple[str, ...]:
+    """Bodies that klack did not mesh and cannot refine."""
+    return tuple(name for name, body in bodies.items() if body.mesh is None)
+
+
+def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> list[str]:
+    """Why the meshes of some bodies have no advice, and what to do instead.
+
+    Parameters
+    ----------
+    bodies : mapping of str to CaseBody
+    size_ratio : float [-]
+        Element size across the contact over its half width; nan where nobody knows.
+    """
+    names = unmeshed(bodies)
+    reduced = [name for name in names if bodies[name].reduced is not None]
+    matrices = [
+        name for name in names if name not in reduced and bodies[name].geometry.nodes is not None
+    ]
+    meshes = [name for name in names if name not in (*reduced, *matrices)]
+    notes = []
+    if meshes:
+        notes.append(
+            f"{_mesh_of(meshes)} given: klack cannot refine a finished mesh, so its error is not "
+            "in the sums, and modes and step alone are advised there. Try: export a second mesh "
+            "of half the element size and compare both runs."
         )
+        if not isnan(size_ratio):
+            notes.append(
+                f"Elements across the contact are {size_ratio:.2g} half widths long: "
+                + ("fine enough." if size_ratio <= 1.0 else "too coarse, 1 or less is good.")
+            )
+    if matrices:
+        notes.append(
+            f"Nodes and matrices of {_names(matrices)} are given, and klack cannot refine them: "
+            "their error is not in the sums. Try: export them from a second mesh of half the "
+            "element size and compare both runs."
+        )
+    if reduced:
+        notes.append(
+            f"Reduced models ({_names(reduced)}): neither their meshes nor the modes that they "
+            "left out can be measured here. Try: ask their source for a second one, reduced from a "
+            "finer mesh with more modes, and compare both runs."
+        )
+    return notes
+
+
+def _mesh_of(names: Sequence[str]) -> str:
     return (
-        f"The mesh of '{name}' cannot be advised: {what} given, and klack cannot refine it, so its "
-        "error is not in the sums. Try: export a second mesh of half the element size and compare "
-        "both runs."
+        f"The mesh of {_names(names)} is" if len(names) == 1 else f"Meshes of {_names(names)} are"
     )
+
+
+def _names(names: Sequence[str]) -> str:
+    return " and ".join(f"'{name}'" for name in names)

@@ -65,6 +65,10 @@ class SettingValue:
         decade = 10.0 ** (floor(log10(frequency)) - 2)
         return ceil(frequency / decade) * decade
 
+    def finer(self, first: float, second: float) -> float:
+        """Finer of two values."""
+        return min(first, second) if self.kind == "size" else max(first, second)
+
     def factor_of(self, value: float) -> float:
         """Factor at which this value stands."""
         if self.kind == "frequency":
@@ -104,6 +108,10 @@ class Setting:
     def at(self, factor: float) -> dict[Key, float]:
         """Values [SI] at a factor."""
         return {item.key: item.at(factor) for item in self.values}
+
+    def reaches(self, factor: float) -> bool:
+        """Whether every value can follow the factor: a grading ends at 1."""
+        return all(item.kind != "size" or item.value * factor <= item.most for item in self.values)
 
     def advised(self, factor: float) -> dict[Key, float]:
         """Values [SI] that are advised for a factor; those of the case if they are good enough."""

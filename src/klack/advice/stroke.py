@@ -16,21 +16,21 @@ from klack.advice.affordable import affordable
 from klack.advice.cost import time_of
 from klack.advice.ladder import Ladder, Measure, score
 from klack.advice.modes import explicit_modes, mode_setting
-from klack.advice.regions import mesh_settings, unmeshed_note
+from klack.advice.regions import mesh_settings, unmeshed, unmeshed_notes
 from klack.advice.settings import Setting, SettingValue, applied
 from klack.case.valve import ValveCase, Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
-from klack.input.problem import Key
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import collected_warnings
 from klack.workflow.stroke import run_variant, variant_network
 from klack.workflow.valve import Valve, build_valve, build_valve_bodies
 
-__all__ = ["advise_stroke", "first_impacts", "stroke_measures"]
+__all__ = ["advise_stroke", "first_impacts", "step_ladder", "stroke_measures"]
 
-_STEPS = (2.0, 1.0, 0.5)
-_PAIR = (1.0, 0.5)
+_NEAR = (2.0, 1.0, 0.5)
+_REST = (1.0, 0.5, 0.25)
+_SPARE = 2.0  # of the time until the first impacts have come
 _MODE_ORDER, _MESH_ORDER, _STEP_ORDER = 1.0, 1.0, 2.0
 
 
@@ -97,8 +97,9 @@ def advise_stroke(
 ) -> Advice:
     """Measure what step, modes and meshes of a valve cost in accuracy at its first impacts.
 
-    Each body keeps its modes and twice as many; the contact regions and each body away from them
-    are meshed once more with half the size; the step is doubled and halved.
+    Contact regions and step are doubled and halved; growth, bodies away from their contacts and
+    modes are refined twice.  Nothing is simulated beyond the first impacts, and no sound is
+    prepared.
 
     Parameters
     ----------
@@ -117,11 +118,13 @@ def advise_stroke(
     """
     begin = perf_counter()
     measures = stroke_measures(error)
-    case = explicit_modes(case)
+    case = explicit_modes(case).model_copy(update={"noise": None})
     with collected_warnings() as notes:
         valve = build_valve(case, progress, threads=threads)
         spent = perf_counter() - begin
+        progress("first impacts", 0.0)
         now = first_impacts(valve)
+    runs = 1
     if not now:
         raise InputError(
             f"{case.path or 'case'}: run.duration",
@@ -129,28 +132,28 @@ def advise_stroke(
             expected="a run that reaches a stop",
             hint="look at the lift with klack stroke, and enlarge run.duration.",
         )
+    case = _shortened(case, now)
     with collected_warnings():
-        measured = [_step_ladder(valve, now, measures)]
-        settings = [*_mesh_settings(case), *_mode_settings(valve)]
         log = list(notes)
+        measured = []
+        settings = [*_mesh_settings(case), *_mode_settings(valve)]
         for i, setting in enumerate(settings):
-            progress("finer bodies", i / len(settings))
-            try:
-                finer = _impacts(applied(case, setting.at(_PAIR[-1])), threads)
-            except KlackError as trouble:
-                log.append(f"No run with a finer '{setting.name}': {str(trouble).splitlines()[0]}")
-                continue
-            order = _MODE_ORDER if setting.group == "modes" else _MESH_ORDER
-            ladder = _ladder(_PAIR, [now, finer], measures, order)
-            measured.insert(
-                -1,
-                Measured(
-                    setting=setting, ladder=ladder, runs=f"{_variant(case)}: {_words(setting)}"
-                ),
-            )
-        log += [
-            unmeshed_note(name, body) for name, body in case.bodies.items() if body.mesh is None
-        ]
+            found = {1.0: now}
+            for factor in (f for f in _factors(setting) if f != 1.0):
+                progress("other bodies", (i + 0.5 * (len(found) - 1)) / len(settings))
+                runs += 1
+                try:
+                    found[factor] = _impacts(applied(case, setting.at(factor)), threads)
+                except KlackError as trouble:
+                    log.append(
+                        f"No run with '{setting.name}' times {factor:g}: "
+                        f"{str(trouble).splitlines()[0]}"
+                    )
+            if len(found) > 1:
+                measured.append(_measured(case, setting, found, measures))
+        measured.append(step_ladder(replace(valve, case=case), now, measures))
+        runs += 2
+        log += unmeshed_notes(case.bodies)
         dofs = _dofs(valve.bodies)
         counsels, size, dear = affordable(
             measured,
@@ -158,7 +161,7 @@ def advise_stroke(
             measures,
             size_with=lambda values: _dofs(build_valve_bodies(applied(case, values), silent)),
             present=dofs,
-            dimension=next(iter(valve.bodies.values())).dimension,
+            dimension=max((body.dimension for body in valve.bodies.values()), default=2),
         )
         log += [dear] if dear else []
         advice = Advice(
@@ -169,9 +172,9 @@ def advise_stroke(
             up_to=float("nan"),
             band_from_case=False,
             counsels=counsels,
-            dofs=(dofs, size),
+            unmeshed=unmeshed(case.bodies),
+            dofs=(dofs, size) if dofs else None,
         )
-        runs = 2 + len(settings)
         if confirm:
             progress("advised case", 0.0)
             advice = _confirmed(case, advice, now, threads)
@@ -185,15 +188,56 @@ def advise_stroke(
     )
 
 
-def _step_ladder(
+def _shortened(case: ValveCase, now: Mapping[str, NDArray[np.float64]]) -> ValveCase:
+    """The case until a while after the first impacts."""
+    end = max(_SPARE * (numbers[0] + np.nan_to_num(numbers[3])) for numbers in now.values())
+    run = case.run.model_copy(update={"duration": min(case.run.duration, float(end))})
+    return case.model_copy(update={"run": run})
+
+
+def _factors(setting: Setting) -> tuple[float, ...]:
+    near = setting.name.startswith("contact of")
+    if setting.values[0].key[-1] == "participation":
+        return _REST[:2]  # of a pool that holds twice as many
+    return tuple(f for f in (_NEAR if near else _REST) if setting.reaches(f))
+
+
+def _measured(
+    case: ValveCase,
+    setting: Setting,
+    found: Mapping[float, Mapping[str, NDArray[np.float64]]],
+    measures: Sequence[Measure],
+) -> Measured:
+    factors = sorted(found, reverse=True)
+    if setting.group == "modes":
+        words, order = ", ".join(f"{setting.values[0].at(f):g}" for f in factors), _MODE_ORDER
+    else:
+        words, order = "sizes times " + ", ".join(f"{f:g}" for f in factors), _MESH_ORDER
+    return Measured(
+        setting=setting,
+        ladder=_ladder(factors, [found[f] for f in factors], measures, order),
+        runs=f"{_variant(case)}: {words}",
+    )
+
+
+def step_ladder(
     valve: Valve, now: Mapping[str, NDArray[np.float64]], measures: Sequence[Measure]
 ) -> Measured:
+    """Twice, once and half the step of the network.
+
+    Parameters
+    ----------
+    valve : Valve
+    now : mapping of str to array
+        First impacts with the step of the case.
+    measures : sequence of Measure
+    """
     step = valve.case.run.step
-    runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in _STEPS]
+    runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in _NEAR]
     value = SettingValue(key=("run", "step"), value=step, unit="s")
     return Measured(
         setting=Setting(name="step of the network", group="step", values=(value,)),
-        ladder=_ladder(_STEPS, runs, measures, _STEP_ORDER),
+        ladder=_ladder(_NEAR, runs, measures, _STEP_ORDER),
         runs=f"{_variant(valve.case)}: 2h, h, h/2",
     )
 
@@ -229,12 +273,6 @@ def _mode_settings(valve: Valve) -> list[Setting]:
     return found
 
 
-def _words(setting: Setting) -> str:
-    if setting.group == "modes":
-        return ", ".join(f"{setting.values[0].at(f):g}" for f in _PAIR)
-    return "sizes times 1, 0.5"
-
-
 def _impacts(case: ValveCase, threads: int | None) -> dict[str, NDArray[np.float64]]:
     return first_impacts(build_valve(case, silent, threads=threads))
 
@@ -245,17 +283,14 @@ def _confirmed(
     now: Mapping[str, NDArray[np.float64]],
     threads: int | None,
 ) -> Advice:
-    """Lay the valve and the advised one over one with everything finest."""
-    finest: dict[Key, float] = {}
-    for item in advice.counsels:
-        finest.update(item.measured.setting.at(min(item.measured.ladder.factors)))
-    reference = _impacts(applied(case, finest), threads)
+    """Lay the valve and the advised one over one at least as fine as all runs and as both."""
+    reference = _impacts(applied(case, advice.finest), threads)
     advised = _impacts(applied(case, advice.changes), threads)
     return replace(
         advice,
         checked=(_deviation(reference, now), _deviation(reference, advised)),
-        check_words="both run again, against the valve with the finest meshes, twice the modes and "
-        "half the step",
+        check_words="both run again, against the valve with every setting at its finest, "
+        "that of the runs or of the advice",
     )
 
 

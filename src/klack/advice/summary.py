@@ -33,13 +33,17 @@ def advice_rows(advice: Advice) -> tuple[tuple[str, ...], ...]:
         error = _errors(fixed.errors, measures)
         rows.append((fixed.name, "-", "-", "-", error, error, "reduced and interface"))
     now, then = _errors(advice.now, measures), _errors(advice.then, measures)
-    rows.append(("sum", "", "", "", now, then, ""))
+    rows.append((_sum(advice), "", "", "", now, then, ""))
     limits = np.array([measure.limit for measure in measures])
     rows.append(("target", "", "", "", *[_errors(limits, measures)] * 2, ""))
     if advice.checked is not None:
         checked = [_errors(item, measures) for item in advice.checked]
         rows.append(("run again", "", "", "", *checked, "against the finest run"))
     return tuple(rows)
+
+
+def _sum(advice: Advice) -> str:
+    return f"sum, without the mesh of {', '.join(advice.unmeshed)}" if advice.unmeshed else "sum"
 
 
 def _row(item: Counsel, measures: Sequence[Measure]) -> tuple[str, ...]:
@@ -98,8 +102,8 @@ def advice_lines(advice: Advice) -> tuple[str, ...]:
             _verdict(advice),
             _band(advice),
             _cost(advice),
-            *_reaches(advice),
             f"Check: {advice.check_words}." if advice.check_words else "",
+            *_reaches(advice),
             *(f"Note: {note}" for note in advice.notes),
         )
         if line
@@ -107,15 +111,41 @@ def advice_lines(advice: Advice) -> tuple[str, ...]:
 
 
 def _verdict(advice: Advice) -> str:
+    if not advice.unmeshed:
+        return _verdict_of_sums(advice)
+    meshes = "a mesh that was given" if len(advice.unmeshed) == 1 else "meshes that were given"
+    whole = any(item.measured.setting.group == "mesh" for item in advice.counsels)
+    what = "" if whole else "Modes and step alone can be advised here. "
+    return f"{what}But for the error of {meshes}: {_lowered(_verdict_of_sums(advice))}"
+
+
+def _lowered(text: str) -> str:
+    return text[0].lower() + text[1:]
+
+
+def _verdict_of_sums(advice: Advice) -> str:
     if advice.is_good:
         text = "The case meets the target as it is"
         return f"{text}; the advice makes it cheaper." if advice.changes else f"{text}: keep it."
     if advice.meets:
         return "The case is expected to miss the target, and the advised one to meet it."
     return (
-        "By the sum of expected errors the target is not reached: the advice goes as far as the "
-        "runs can be extrapolated and the meshes be afforded."
+        "By the sum of expected errors the target is not reached: the advice goes as far as runs "
+        "can be extrapolated and larger models be afforded."
+        + _narrower(advice)
         + (" Run again, the advised case is within it." if _within(advice) else "")
+    )
+
+
+def _narrower(advice: Advice) -> str:
+    """A way out where third octaves miss the target that force and time meet."""
+    relative = [(e, m) for e, m in zip(advice.then, advice.measures, strict=True) if not m.decibel]
+    met = score(np.array([e for e, _ in relative]), [m for _, m in relative]) <= 1.0
+    if not (met and advice.band_from_case):
+        return ""
+    return (
+        " Peak force, contact time and history are within it, third octaves are not. Try: "
+        "--up-to with the highest frequency that matters, or a larger --bands."
     )
 
 
@@ -152,12 +182,17 @@ def _reaches(advice: Advice) -> list[str]:
             lines.append(
                 f"Note: '{name}' is advised {item.extrapolated:.2g} times beyond what was run."
             )
-        if not item.reached:
+        if not item.reached and item.measured.ladder.scattered:
+            lines.append(
+                f"Note: '{name}' scatters by more than its share of the target: refining it "
+                "changes no less than it did before, so nothing finer is advised."
+            )
+        elif not item.reached:
             lines.append(
                 f"Note: '{name}' does not reach its share of the target within {REACH:g} times "
                 "finer than the finest run. Try: apply the advice and ask again."
             )
-        if item.measured.ladder.scattered and item.measured.setting.group == "mesh":
+        elif item.measured.ladder.scattered and item.measured.setting.group == "mesh":
             lines.append(
                 f"Note: refining '{name}' changes no less than it did before: what is left there "
                 "is the scatter of meshes."
@@ -196,6 +231,7 @@ def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> dict[str, Any]:
             if np.isfinite(measure.limit)
         },
         "meets_target": {"now": advice.is_good, "advised": advice.meets},
+        "meshes_given": list(advice.unmeshed),
         "settings": [_setting_json(item, errors) for item in advice.counsels],
         "fixed": [{"name": item.name, "error": errors(item.errors)} for item in advice.fixed],
         "expected_error": {"now": errors(advice.now), "advised": errors(advice.then)},
