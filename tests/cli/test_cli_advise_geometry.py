@@ -90,7 +90,7 @@ def test_given_meshes_are_left_alone_and_said_to_be(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_solids_from_step_are_refined_around_the_case(tmp_path, monkeypatch, capsys):
-    """Convergence: a case far too coarse is nearer to the finest run with the advice than before."""
+    """Convergence: advice brings a case that is far too coarse nearer to the finest run."""
     from netgen.occ import Box, Pnt, Sphere, Z
 
     monkeypatch.chdir(tmp_path)
