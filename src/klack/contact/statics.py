@@ -104,7 +104,13 @@ def _remembered_compliance(
 
 
 class ReachError(InputError):
-    """The contact grew to the border of the candidate points: their reach is too small."""
+    """The contact grew to the border of the candidate points: their reach is too small.
+
+    ``held`` is the highest force [N] of the ladder whose contact stayed within the candidates, 0
+    where none did.
+    """
+
+    held: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -373,7 +379,7 @@ def check_rim(static: StaticContact) -> None:
         return
     first = int(np.argmax(touched))
     below = static.force[first - 1] if first else 0.0
-    raise ReachError(
+    error = ReachError(
         "contact: reach",
         got=f"contact at the rim of the candidate points above {below:.4g} N "
         f"(reach {static.space.reach * 1e6:.4g} um)",
@@ -381,6 +387,8 @@ def check_rim(static: StaticContact) -> None:
         hint=f"enlarge the reach: in a case 'reach: {2e6 * static.approach[-1]:.3g} um', under "
         "contact or beside the stop; or let the surfaces go on further.",
     )
+    error.held = float(below)
+    raise error
 
 
 def check_resolution(static: StaticContact, force: float | None = None) -> float:

@@ -25,7 +25,11 @@ _FIRST_POINTS = 48
 _REACH_MARGIN = 1.25
 # The ladder of static loads ends this much above the quasi-static bound of the impact force.
 _LOAD_MARGIN = 1.15
-_ATTEMPTS = 5
+# Growth of a reach that was too small: between spheres the gap at the border of the contact is half
+# the approach.
+_REACH_GROWTH = 2.0
+# What a reach holds, without the state at its border itself.
+_HELD = 0.98
 
 
 def effective_mass(pair: BodyPair) -> float:
@@ -84,7 +88,7 @@ def static_ladder(
     force = approach / compliance
     if given is None:
         reach = _REACH_MARGIN * approach
-    for attempt in range(_ATTEMPTS):
+    while True:
         candidates = contact_space(*surfaces, reach=reach)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
@@ -92,9 +96,10 @@ def static_ladder(
         try:
             static = _ladder(candidates, C, energy, closing, force)
         except ReachError:
-            if given is not None or attempt == _ATTEMPTS - 1:
+            if given is not None:
                 raise
-            reach *= 1.5
+            # ends with the whole surfaces as candidates, which have no border
+            reach *= _REACH_GROWTH
             continue
         break
     progress("static contact", 1.0)
@@ -123,8 +128,16 @@ def _ladder(
     The closing force goes on working while the bodies approach: the turning point is where the
     stored energy has reached ``energy + closing * approach``.
     """
+    refused: ReachError | None = None
     while True:
-        static = static_contact(space, C, force)
+        try:
+            static = static_contact(space, C, force)
+        except ReachError as error:
+            # elements as wide as the contact bound the force far too high: less may do
+            if not error.held > 0 or refused is not None:
+                raise
+            refused, force = error, _HELD * error.held
+            continue
         # energy stored along the ladder, by the trapezoidal rule from first touch
         approach, load = np.append(0.0, static.approach), np.append(0.0, static.force)
         stored = np.concatenate(
@@ -133,6 +146,8 @@ def _ladder(
         surplus = stored - closing * approach
         if surplus[-1] >= energy:
             break
+        if refused is not None:
+            raise refused
         force *= 1.5
     # falls up to the closing force, rises from there
     rising = load >= closing
