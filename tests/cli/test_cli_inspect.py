@@ -212,8 +212,8 @@ def test_a_case_shows_the_bodies_of_other_programs(capsys):
     assert "port tip elastic compliance" in shown
 
 
-def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path, capsys):
-    """Truth: two unit bricks, written by hand."""
+def bricks_case(folder: Path) -> Path:
+    """Two unit bricks, written by hand."""
     brick = "*NODE\n" + "".join(
         f"{8 * k + i + 1}, {x}, {y}, {3 * k + z}\n"
         for k in range(2)
@@ -225,17 +225,35 @@ def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path
         numbers = ", ".join(str(8 * k + i + 1) for i in range(8))
         brick += f"*ELEMENT, TYPE=C3D8, ELSET={name}\n{k + 1}, {numbers}\n"
         brick += f"*SURFACE, NAME=END_{name}, TYPE=ELEMENT\n{k + 1}, S{2 - k}\n"
-    (tmp_path / "bricks.inp").write_text(brick)
+    brick += "*NSET, NSET=FEET\n1, 2, 3, 4\n"
+    (folder / "bricks.inp").write_text(brick)
     body = "geometry: {{mesh: {{file: bricks.inp, unit: mm}}}}\n    material: {{{}: steel}}\n"
     case = CASE[: CASE.index("bodies:")] + "bodies:\n"
     case += "  pin:\n    " + body.format("UPPER")
     case += "  block:\n    " + body.format("LOWER") + "    fixed: [{surface: END_LOWER}]\n"
     case += CASE[CASE.index("contact:") :].replace("pin.foot", "pin.END_UPPER")
-    (tmp_path / "case.yaml").write_text(case.replace("block.head", "block.END_LOWER"))
+    path = folder / "case.yaml"
+    path.write_text(case.replace("block.head", "block.END_LOWER"))
+    return path
 
-    assert main(["inspect", str(tmp_path / "case.yaml")]) == 0
+
+def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path, capsys):
+    assert main(["inspect", str(bricks_case(tmp_path))]) == 0
     pin, block = " ".join(capsys.readouterr().out.split()).split("block what")
     assert "volume 1 mm^3" in pin
     assert "UPPER" in pin
     assert "LOWER" not in pin
     assert "UPPER" not in block
+
+
+def test_a_support_on_a_node_set_is_refused_as_by_a_run(tmp_path: Path, capsys):
+    """A mesh with elements is held on surfaces; its node sets know no faces."""
+    path = bricks_case(tmp_path)
+    path.write_text(path.read_text().replace("{surface: END_LOWER}", "{surface: FEET}"))
+
+    assert main(["inspect", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "bodies.block.fixed[0].surface: got the unknown surface 'FEET' of block" in told
+    assert "END_LOWER" in told
+    assert main(["impact", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "'FEET'" in capsys.readouterr().err

@@ -92,7 +92,7 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
             mesh = body.geometry.mesh
             solids = tuple(body.material) if isinstance(body.material, dict) else None
             model = read_mesh_file(mesh.file, mesh.unit, solids=solids)
-            known[name] = (*model.mesh.surfaces, *model.mesh.node_sets)
+            known[name] = tuple(model.mesh.surfaces)
             yield name, tuple(_mesh_rows(model))
         elif body.geometry.step is not None:
             content = step_content(body.geometry.step.file)
