@@ -232,6 +232,10 @@ def _no_level(impact: Path, heard: Path, folder: Path) -> list[str]:
     return [str(impact), "--level", "ful"]
 
 
+def _variant(impact: Path, heard: Path, folder: Path) -> list[str]:
+    return [str(impact), "--variant", "wet"]
+
+
 def _older(impact: Path, heard: Path, folder: Path) -> list[str]:
     save_study(replace(load_study(impact), structures=()), folder / "old")
     return [str(folder / "old")]
@@ -243,6 +247,7 @@ def _older(impact: Path, heard: Path, folder: Path) -> list[str]:
         (_no_result, ["neither a file nor a shipped case"]),
         (_its_own, ["klack noise study", "the result of an impact or a stroke"]),
         (_no_level, ["'ful'", "reduced", "lumped"]),
+        (_variant, ["level: got 'wet'", "impacts have levels, variants are of strokes: --level"]),
         (_older, ["an earlier version of klack", "run the case again"]),
     ],
 )

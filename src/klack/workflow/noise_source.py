@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 from klack.acoustics.comparison import first_impact
 from klack.case.bodies import CaseMaterial
 from klack.case.noise import CaseNoise
-from klack.case.schema import Case
-from klack.case.valve import ValveCase
+from klack.case.schema import LEVELS, Case
+from klack.case.valve import VARIANTS, ValveCase
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.reduction.structure import Structure
@@ -336,13 +336,19 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
 
 
 def _require(what: str, name: str, held: Mapping[str, object]) -> None:
-    if name not in held:
-        raise InputError(
-            what,
-            got=f"'{name}', which the result does not hold",
-            expected=f"one of: {one_of(held)}",
-            hint=nearest(name, held, f"run the case with --{what} {name} first."),
-        )
+    if name in held:
+        return
+    hint = nearest(name, held, f"run the case with --{what} {name} first.")
+    if what == "level" and name in VARIANTS:
+        hint = f"impacts have levels, variants are of strokes: --level {next(iter(held))}."
+    elif what == "variant" and name in LEVELS:
+        hint = f"strokes have variants, levels are of impacts: --variant {next(iter(held))}."
+    raise InputError(
+        what,
+        got=f"'{name}', which the result does not hold",
+        expected=f"one of: {one_of(held)}",
+        hint=hint,
+    )
 
 
 def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
