@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from klack.network.rows import GROUND, BodyRow, InterfaceRow, Rows
 from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord
+from klack.simulation.rest import effective_mass, longest_period, rest_time
 
 __all__ = ["impact_events"]
 
 Vector = NDArray[np.float64]
 
-_FILM_PAUSE = 100  # steps; a film is not recorded while its force passes through zero
+_PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many steps
+_PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 
 
 def impact_events(
@@ -27,7 +29,8 @@ def impact_events(
     so are contacts between which the centres of mass do not move apart.  Rigid bodies have no
     period; for it stands half the time of the shorter contact.  A contact that is closed at the
     start is none.  A film acts before the first touch and after the last one: the speeds are the
-    highest ones while it presses, and within two of these periods while it pulls.
+    highest ones while it presses, and within two of these periods while it pulls.  An impact whose
+    last contact lasts until the bodies are at rest ends there; the stop is left later.
     """
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     events: list[ImpactEvent] = []
@@ -49,22 +52,6 @@ def _gap_rate(
     return rate
 
 
-def _effective_mass(bodies: Sequence[BodyRow | None]) -> float:
-    inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.rigid_count > 0)
-    return 1.0 / inverse if inverse > 0.0 else np.inf
-
-
-def _longest_period(bodies: Sequence[BodyRow | None]) -> float:
-    """Longest period of the moving bodies; 0 for rigid ones."""
-    longest = 0.0
-    for body in bodies:
-        if body is not None and body.body.rigid_count > 0:
-            elastic = body.body.omega[body.body.rigid_count :]
-            if len(elastic):
-                longest = max(longest, 2.0 * np.pi / float(elastic[0]))
-    return longest
-
-
 def _of_interface(
     row: InterfaceRow,
     record: InterfaceRecord,
@@ -75,7 +62,7 @@ def _of_interface(
     closed = record.contact_force > 0.0
     if not np.any(closed):
         return []
-    # a contact runs from a closed step to the next recorded open one: rests may lie between
+    # a contact runs from a closed step to the next recorded open one
     edges = np.diff(np.concatenate([[0], closed.astype(np.int8), [0]]))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     begin = record.time[starts]
@@ -83,23 +70,34 @@ def _of_interface(
     open_ended = ends == len(closed)
     if open_ended[-1]:
         stop[-1] = np.nan
-    period = _longest_period(bodies)
+    period, rest = longest_period(bodies), rest_time(row, bodies)
     clusters = _clusters(begin, stop, period, time, gap_rate)
-    mass = _effective_mass(bodies)
+    mass = effective_mass(bodies)
     total = record.contact_force + record.film_force
     events = []
     for first, last in clusters:
         if begin[first] <= time[0] + record.step[starts[first]]:
             continue  # closed from the start
-        t0, t1 = begin[first], stop[last]
-        window = slice(_film_start(record, starts[first]), _film_end(record, ends[last]))
+        t0, left = begin[first], stop[last]
+        rests = [i for i in range(first, last + 1) if _end(record, ends[i]) - begin[i] >= rest]
+        if rests:  # the impact is over then
+            last = rests[0]
+            t1 = begin[last] + rest
+        else:
+            t1 = left
+        end = int(np.searchsorted(record.time, t1)) if rests else ends[last]
+        pause = _PAUSE_SHARE * rest
+        window = slice(
+            _film_start(record, starts[first], pause),
+            end if rests else _film_end(record, end, pause),
+        )
         felt = record.time[window.start]
         let_go = record.time[window.stop - 1] + record.step[window.stop - 1]
         before = -max(_fastest(felt, t0, time, -gap_rate), -_at(t0, time, gap_rate, earlier=True))
         if not before < 0.0:
             continue  # trembles while the stop is left: nothing was hit
-        after = np.nan
-        if np.isfinite(t1):
+        after = 0.0 if rests else np.nan
+        if np.isfinite(t1) and not rests:
             leaving = _at(t1, time, gap_rate, earlier=False)
             soon = min(let_go, t1 + 2.0 * (period or t1 - begin[last]))
             after = max(_fastest(t1, soon, time, gap_rate), leaving)
@@ -111,6 +109,7 @@ def _of_interface(
                 for s, e in zip(starts[first : last + 1], ends[first : last + 1], strict=True)
             ]
         )
+        closed_steps = closed_steps[closed_steps < end]
         events.append(
             ImpactEvent(
                 stop=row.component,
@@ -119,7 +118,7 @@ def _of_interface(
                 peak_force=float(force[peak]),
                 peak_time=float(record.time[window][peak] + 0.5 * steps[peak]),
                 contact_time=float(record.step[closed_steps].sum()),
-                separation_time=float(t1),
+                separation_time=float(left),
                 impulse=float(force @ steps),
                 restitution=-after / before,
                 energy_loss=0.5 * mass * (before**2 - after**2),
@@ -164,22 +163,29 @@ def _fastest(begin: float, end: float, time: Vector, speed: Vector) -> float:
     return float(np.max(speed[int(first) : int(last)], initial=-np.inf))
 
 
-def _film_end(record: InterfaceRecord, end: int) -> int:
+def _end(record: InterfaceRecord, end: int) -> float:
+    """End of the step before this one [s]."""
+    return float(record.time[end - 1] + record.step[end - 1])
+
+
+def _film_end(record: InterfaceRecord, end: int, pause: float) -> int:
     """First step after ``end`` that no longer feels the film that follows the contact."""
     i = end
     while i < len(record.time):
-        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE * record.step[i]
+        longest = max(pause, _PAUSE_STEPS * record.step[i])
+        gapless = record.time[i] - record.time[i - 1] < longest
         if not gapless or record.contact_force[i] > 0.0:
             break
         i += 1
     return i
 
 
-def _film_start(record: InterfaceRecord, first: int) -> int:
+def _film_start(record: InterfaceRecord, first: int, pause: float) -> int:
     """First step of the film force that leads into the contact at ``first``."""
     i = first
     while i > 0:
-        gapless = record.time[i] - record.time[i - 1] < _FILM_PAUSE * record.step[i]
+        longest = max(pause, _PAUSE_STEPS * record.step[i])
+        gapless = record.time[i] - record.time[i - 1] < longest
         if not gapless or record.contact_force[i - 1] > 0.0 or record.film_force[i - 1] <= 0.0:
             break
         i -= 1

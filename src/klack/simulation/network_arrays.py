@@ -141,6 +141,7 @@ class Interfaces(NamedTuple):
     suction: Vector
     film_small: Vector  # film force that a coarse step may begin with; it may end with twice of it
     film_felt: Vector  # film force from which on fine steps are recorded
+    rest: Vector  # closed for so long: at rest [s]
     hint: Index
     e: Vector
     gap: Vector

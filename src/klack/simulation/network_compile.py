@@ -35,6 +35,7 @@ from klack.simulation.network_arrays import (
     StepRows,
 )
 from klack.simulation.propagator import modal_propagator
+from klack.simulation.rest import rest_time
 
 __all__ = [
     "CompiledNetwork",
@@ -49,7 +50,7 @@ __all__ = [
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_FILM_TIME = 10_000  # fine steps, about a flight; a film force is judged by what it moves in it
+_FLIGHT_SPEED = 0.5  # [m/s] over the stroke: a film force is judged by what it moves in this time
 _FILM_SMALL = 1.64e-2  # [m/s] mean speed of a gap under a small force: 0.5 N on a needle of 3 g
 _FILM_FELT = 6.55e-4  # [m/s] the same for one that is worth a record: 0.02 N
 
@@ -133,7 +134,7 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         lines=lines,
         line_state=line_state,
         line_books=np.zeros((max(len(rows.lines), 1), 3)),
-        interfaces=_interfaces(rows, port_of, bodies, _FILM_TIME * step),
+        interfaces=_interfaces(rows, port_of, bodies),
         books=np.zeros(len(books.kinds)),
         book_kind=np.array(books.kinds, dtype=np.int64),
         book_names=tuple(books.names),
@@ -360,10 +361,9 @@ def _nodes(
     )
 
 
-def _interfaces(
-    rows: Rows, port_of: Mapping[int, int], bodies: Bodies, film_time: float
-) -> Interfaces:
+def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Interfaces:
     count = len(rows.interfaces)
+    owner = {handle: row for row in rows.bodies for handle in row.ports}
     kind = np.full(count, NO_LAW, np.int64)
     law0, alpha = np.zeros(count, np.int64), np.zeros(count)
     law = [np.zeros(0)]
@@ -379,8 +379,11 @@ def _interfaces(
     gap = np.array([row.gap for row in rows.interfaces], dtype=float)
     upper = np.array([port_of[row.upper] for row in rows.interfaces], dtype=np.int64)
     lower = np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64)
+    stroke = float(np.max(np.maximum(gap, film[2]), initial=0.0))
+    film_time = stroke / _FLIGHT_SPEED or 1.0  # nothing to fly, no film to judge
     moved, _ = compile_bodies(rows.bodies, (film_time, film_time))
     force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
+    rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
     return Interfaces(
         upper=upper,
         lower=lower,
@@ -398,6 +401,7 @@ def _interfaces(
         suction=film[3].copy(),
         film_small=_FILM_SMALL * force,
         film_felt=_FILM_FELT * force,
+        rest=np.array(rest, dtype=float),
         hint=np.zeros(count, np.int64),
         e=np.zeros(count),
         gap=gap.copy(),

@@ -77,7 +77,6 @@ _MOST_NEWTON = 80
 _PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
-_REST_STEPS = 2500  # fine steps; closed for so long: at rest
 _SLOWEST = 1e-3  # [m/s] approach speed from which on a dashpot of a given restitution is scaled
 
 
@@ -294,6 +293,7 @@ def run_network(
     interface_film_loss = first(interfaces.film_loss)
     interface_film_small = first(interfaces.film_small)
     interface_film_felt = first(interfaces.film_felt)
+    interface_rest = first(interfaces.rest)
     interface_force = first(interfaces.force)
     interface_gap = first(interfaces.gap)
     interface_G = first(interfaces.G)
@@ -372,7 +372,7 @@ def run_network(
             for c in range(count_interfaces):
                 rate = abs(interface_rate[c])
                 if interface_since[c] < np.inf:
-                    if step * h - interface_since[c] < _REST_STEPS * h:
+                    if step * h - interface_since[c] < interface_rest[c]:
                         level = 0
                     continue
                 x = interface_gap[c] - 3.0 * rate * Hc
@@ -771,8 +771,8 @@ def run_network(
                     sums[column] += H * f_contact[c]
                     sums[column + 1] += H * f_film[c]
                     peaks[c] = max(peaks[c], fi[c])
-                    felt = f_contact[c] > 0.0 or abs(f_film[c]) > interface_film_felt[c]
-                    if level == 0 and (felt or was_closed):
+                    felt = level == 0 and abs(f_film[c]) > interface_film_felt[c]
+                    if felt or was_closed or f_contact[c] > 0.0:
                         place = record_filled[c]
                         if place < record_fine.shape[1]:
                             record_fine[c, place, 0] = t

@@ -122,7 +122,7 @@ class Recorder:
         return result
 
     def interfaces(self) -> dict[str, InterfaceRecord]:
-        """Every fine step in which an interface carried force."""
+        """Every step in which an interface carried force: see :class:`InterfaceRecord`."""
         result = {}
         for c, row in enumerate(self.network.rows.interfaces):
             filled = int(self.recording.filled[c])

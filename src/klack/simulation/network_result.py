@@ -29,7 +29,7 @@ class ChannelData:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterfaceRecord:
-    """Every fine step in which an interface carried force.
+    """Every step in which an interface carried force: coarse ones only while it is closed.
 
     Parameters
     ----------
@@ -69,16 +69,18 @@ class ImpactEvent:
         Of contact and film together.
     peak_time : float [s]
     contact_time : float [s]
-        Closed, all contacts of the impact together.
+        Closed, all contacts of the impact together; up to rest if the bodies come to rest, which
+        is when they have been closed for :func:`~klack.simulation.rest.rest_time`.
     separation_time : float [s]
-        End of the last contact; nan if it stays closed to the end of the run.
+        End of the last contact, with the rest; nan if it stays closed to the end of the run.
     impulse : float [N s]
-        Of contact and film, while it presses before and pulls after the contact.
+        Of contact and film, while it presses before and pulls after the contact; up to rest.
     restitution : float [-]
-        Opening speed over approach speed of the centres of mass; nan without separation.  With a
-        film the opening speed is the highest one while it pulls.
+        Opening speed over approach speed of the centres of mass; 0 if the bodies come to rest, nan
+        if the run ends in the contact.  With a film the opening speed is the highest one while it
+        pulls.
     energy_loss : float [J]
-        Kinetic energy of the centre of mass before less after; nan without separation.
+        Kinetic energy of the centre of mass before less after; nan if the run ends in the contact.
     """
 
     stop: str

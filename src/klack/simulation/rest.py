@@ -1,0 +1,69 @@
+"""How long two bodies have to lie on each other before their impact counts as over."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from klack.contact.laws import ContactLaw
+from klack.network.rows import BodyRow, InterfaceRow
+
+__all__ = ["effective_mass", "longest_period", "rest_time"]
+
+_PERIODS = 3.0
+_BOUNCES = 4.0
+_SPEED = 1.0  # [m/s] of the bounce
+_DEPTHS = 2.0 ** np.arange(-80, 21)  # [m]
+
+
+def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
+    r"""Time closed after which two bodies are at rest on each other [s].
+
+    Three of the longest periods of the moving bodies or four bounces of their masses on the law,
+    whichever is longer: both belong to the bodies, not to the steps of a run.  A bounce at the
+    speed :math:`v = 1` m/s, to the depth :math:`d` where the law holds :math:`m v^2 / 2`, takes
+    :math:`3 d / v` (linear law: :math:`\pi`, law of Hertz: 2.94) beside :math:`\pi \sqrt{m c}` of
+    the series compliance; faster ones are as long or shorter.
+
+    Parameters
+    ----------
+    row : InterfaceRow
+    bodies : sequence of BodyRow or None
+        Upper and lower one; None is the ground.
+
+    Returns
+    -------
+    float
+        0 without a law: nothing is ever closed.
+    """
+    if row.law is None:
+        return 0.0
+    mass = effective_mass(bodies)
+    bounce = 0.0
+    if np.isfinite(mass):
+        depth = _depth(row.law, 0.5 * mass * _SPEED**2)
+        bounce = np.hypot(3.0 * depth / _SPEED, np.pi * np.sqrt(mass * row.series_compliance))
+    return float(max(_PERIODS * longest_period(bodies), _BOUNCES * bounce))
+
+
+def longest_period(bodies: Sequence[BodyRow | None]) -> float:
+    """Longest elastic period of the moving bodies [s]; 0 for rigid ones."""
+    longest = 0.0
+    for body in bodies:
+        if body is not None and body.body.rigid_count > 0:
+            elastic = body.body.omega[body.body.rigid_count :]
+            if len(elastic):
+                longest = max(longest, 2.0 * np.pi / float(elastic[0]))
+    return longest
+
+
+def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
+    """Mass of the relative motion of the moving bodies [kg]; infinite if none moves."""
+    inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.rigid_count > 0)
+    return 1.0 / inverse if inverse > 0.0 else np.inf
+
+
+def _depth(law: ContactLaw, energy: float) -> float:
+    """Indentation that stores this energy [m], to some per cent."""
+    stored = law.potential(_DEPTHS)
+    held = stored > 0.0
+    return float(np.exp(np.interp(np.log(energy), np.log(stored[held]), np.log(_DEPTHS[held]))))
