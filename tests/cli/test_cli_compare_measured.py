@@ -44,7 +44,7 @@ def record(result: Path, path: Path, variant: str = "wet", **changes: float) -> 
     run = load_stroke(result).variants[variant].result
     lift = run.channels["needle.tip displacement"].values
     period = REST + float(run.time[-1])
-    time = np.arange(0.0, STROKES * period, 1.0 / RATE)
+    time = np.arange(0.0, changes.get("strokes", STROKES) * period, 1.0 / RATE)
     # the clock of the recorder is no multiple of the stroke
     shown = np.interp(time % period - REST, run.time, lift)
     shown = changes.get("gain", 1.0) * shown + changes.get("offset", 0.0)
@@ -97,6 +97,7 @@ def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
     assert "opening stop #1" in out
     assert f"Excellent agreement of 'wet' with {STROKES} measured strokes" in out
     assert "Rule: the agreement is excellent if" in out
+    assert "Later impacts and the lift between the stops are shown, not counted." in out
 
 
 def test_dry_impacts_have_the_restitution_of_the_case(result, tmp_path):
@@ -129,6 +130,20 @@ def test_an_offset_is_a_residual_until_the_sensor_has_it(result, tmp_path):
 def test_lift_that_is_zeroed_forgets_the_offset(result, tmp_path):
     path = record(result, tmp_path / "strokes.csv", offset=3e-6)
     assert compared(result, "--measurement", str(path))["lift_rms_m"] < NOISE
+
+
+def test_one_stroke_has_no_scatter(result, tmp_path):
+    """What strokes scatter is not known of one; differences are judged by its reading error."""
+    path = record(result, tmp_path / "strokes.csv", strokes=1)
+    found = compared(result, "--measurement", str(path))
+
+    assert found["strokes"] == 1
+    assert "times the reading error" in found["verdict"]
+    assert "one stroke cannot tell" in found["verdict"]
+    for impact in found["impacts"]:
+        assert impact["time_scatter_s"] is None
+        expected = impact["time_difference_s"] / impact["time_reading_error_s"]
+        assert impact["time_difference_in_scatter"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_another_lift_is_told_from_the_computed_one(result, tmp_path):
@@ -173,6 +188,7 @@ def test_both_variants_and_the_report(result, tmp_path):
         ((), "neither of them"),
         (("--measurement", "a.csv", "--calculix", "b.dat"), "both of them"),
         (("--measurement", "nowhere.csv"), "no such file"),
+        (("--measurement", "{here}", "--variant", "dry"), "Try: --measurement dry=FILE"),
         (("--measurement", "dry=nowhere.csv"), "VARIANT=FILE"),
         (("--measurement", "wet-lumped={here}"), "without the variant 'wet-lumped'"),
         (("--measurement", "{here}", "--case", "nowhere"), "neither a file nor a shipped case"),

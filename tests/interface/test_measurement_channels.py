@@ -147,6 +147,7 @@ def test_a_pattern_gives_one_stroke_per_match_in_the_order_of_the_file(tmp_path)
     [
         (("hub_a [um]", "hub_b [um]"), {}, r"several that could be the lift: hub_a, hub_b"),
         (("T [K]", "level"), {}, r"none that could be the lift: T \[K\], level"),
+        (("lift [V]",), {"lift": "lift"}, r"'scale' is how many m one 'V' of a sensor stands for"),
         (("lift [um]",), {"lift": "hub"}, r"channels.lift: got no channel 'hub', expected one of"),
         (("lift",), {"lift": "lift"}, "got no unit, expected the unit of a length"),
         (("lift [A]",), {"lift": "lift"}, r"the unit 'A' \(a current\)"),
@@ -170,6 +171,11 @@ def test_needed_channels_must_be_there_and_clear(tmp_path):
             find_channels(recording, needed=("lift", "current"))
         with pytest.raises(InputError, match="several that could be the pressure: p_rail, p_ret"):
             find_channels(recording, needed=("pressure",))
+    with (
+        open_recording(some(tmp_path / "volts.csv", "out [V]")) as recording,
+        pytest.raises(InputError, match=r"scale: 1\}\}\}, with the m that one V stands for"),
+    ):
+        find_channels(recording, needed=("lift",))
 
 
 # time -------------------------------------------------------------------------------------------

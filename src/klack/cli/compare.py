@@ -52,6 +52,7 @@ def compare(
             "make one set. VARIANT=FILE for another variant than the first: dry=FILE.",
         ),
     ] = None,
+    variant: Annotated[list[str] | None, Parameter(name="--variant", show=False)] = None,
     case: _Case = None,
     calculix: Annotated[
         Path | None,
@@ -80,6 +81,13 @@ def compare(
 ) -> int:
     """Compare a result with a measurement, or with CalculiX: curves, numbers, residuals."""
     require_json_target(json)
+    if variant is not None:
+        raise InputError(
+            "--variant",
+            got=", ".join(variant),
+            expected="the variant in front of its recording",
+            hint=f"--measurement {variant[0] if variant else 'dry'}=FILE.",
+        )
     if (calculix is None) == (not measurement):
         raise InputError(
             "--measurement and --calculix",

@@ -244,10 +244,14 @@ def _not_found(recording: Recording, role: Role) -> InputError:
     listed = [
         f"{info.name} [{info.unit}]" if info.unit else info.name for info in recording.channels[:12]
     ]
+    first, unit = recording.channels[0], ROLES[role].common[0]
+    choice, meaning = f"{{name: {first.name}, unit: {unit}}}", ""
+    if not no_unit(first.unit):
+        choice = f"{{name: {first.name}, unit: {unit}, scale: 1}}"
+        meaning = f", with the {unit} that one {first.unit} stands for as scale"
     return InputError(
         f"{recording.path.name}: channels",
         got=f"none that could be the {role}: {', '.join(listed)}",
         expected=f"a channel of {ROLES[role].name} that is called '{role}' or the like",
-        hint=f"name it in the case: measurement: {{channels: {{{role}: "
-        f"{{name: {recording.channels[0].name}, unit: {ROLES[role].common[0]}}}}}}}.",
+        hint=f"name it in the case: measurement: {{channels: {{{role}: {choice}}}}}{meaning}.",
     )

@@ -384,7 +384,7 @@ def compare_numbers(
     return Compared(
         computed=computed,
         measured=float(np.median(known)),
-        scatter=float(np.std(known, ddof=1)) if known.size > 1 else error,
+        scatter=float(np.std(known, ddof=1)) if known.size > 1 else float("nan"),
         error=error,
         count=int(known.size),
     )

@@ -38,7 +38,7 @@ class Compared:
     measured : float
         Median of the strokes; nan if they have none.
     scatter : float
-        Standard deviation from stroke to stroke; of a single stroke, its reading error.
+        Standard deviation from stroke to stroke; nan for a single stroke, which has none.
     error : float
         Standard error of reading it off one stroke, median of the strokes.
     count : int
@@ -58,8 +58,11 @@ class Compared:
 
     @property
     def in_scatter(self) -> float:
-        """Difference over the scatter, or over the reading error where that is larger [-]."""
-        width = max(self.scatter, self.error)
+        """Difference over the scatter, or over the reading error where that is larger [-].
+
+        Of a single stroke, whose scatter is not known, over the reading error.
+        """
+        width = max(self.error, self.scatter) if isfinite(self.scatter) else self.error
         if not isfinite(self.difference) or not width > 0.0:
             return float("nan")
         return self.difference / width

@@ -45,7 +45,8 @@ RULE = (
     "Rule: the agreement is excellent if every number of the first impact on each stop lies within "
     "{excellent:g} standard deviations of single strokes from the measured median, and the root "
     "mean square differences of lift and velocity are at most {excellent:g} times those of single "
-    "strokes; fair up to {fair:g}."
+    "strokes; fair up to {fair:g}. Later impacts and the lift between the stops are shown, not "
+    "counted."
 )
 HIGHEST_COLUMNS = (
     "highest rebound",
@@ -85,10 +86,12 @@ def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
             f"'{variant.variant}' beside {strokes}: no scatter, no impact to compare; look at the "
             "curves."
         )
+    width = "the scatter" if variant.count > 1 else "the reading error"
     called = {"excellent": "Excellent agreement", "fair": "Fair agreement", "none": "No agreement"}
     return (
-        f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference is "
-        f"{worst:.1f} times the scatter, in the {words}."
+        f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference that "
+        f"counts is {worst:.1f} times {width}, in the {words}."
+        + ("" if variant.count > 1 else " What strokes scatter, one stroke cannot tell.")
     )
 
 
