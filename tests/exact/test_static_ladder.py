@@ -1,62 +1,21 @@
 """The static contact reaches as far as an impact can press it, on any mesh."""
 
 from math import sqrt
+from pathlib import Path
 
 import pytest
 
-from klack.case.reader import read_case
+from klack.case.reader import load_case
 from klack.contact.statics import ReachError
 from klack.workflow.ladder import effective_mass
 from klack.workflow.problem import build_problem
 
 RADIUS, YOUNG, POISSON = 20e-3, 210e9, 0.3
-_RISE = 20.0 - sqrt(20.0**2 - 5.0**2)  # of the crown over the radius of the disc [mm]
-CROWN = f"""\
-klack: 1
-title: Disc with a crown on a flat
-materials:
-  steel: {{young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}
-bodies:
-  disc:
-    geometry:
-      model: axisymmetric
-      profile:
-        unit: mm
-        parts:
-          disc:
-            start: [0, 0]
-            edges:
-              - {{arc: [5, {_RISE:.12f}], centre: [0, 20], name: crown}}
-              - {{line: [5, 2], name: rim}}
-              - {{line: [0, 2], name: top}}
-              - {{close: true, name: axis}}
-    material: steel
-    mesh: {{size: 0.25 mm}}
-  seat:
-    geometry:
-      model: axisymmetric
-      profile:
-        unit: mm
-        parts:
-          seat:
-            start: [0, -10]
-            edges:
-              - {{line: [10, -10], name: foot}}
-              - {{line: [10, 0], name: side}}
-              - {{line: [0, 0], name: face}}
-              - {{close: true, name: axis}}
-    material: steel
-    mesh: {{size: 0.25 mm}}
-    fixed: [{{surface: foot}}]
-contact: {{between: [disc.crown, seat.face], gap: 0 um}}
-motion: {{speed: 0.25 m/s}}
-run: {{levels: [reduced], duration: 100 us, reduced_step: 50 ns, full_step: 200 ns}}
-reduction: {{correction: consistent, modes: {{disc: {{count: 5}}, seat: {{count: 5}}}}}}
-"""
+CROWN = Path(__file__).parents[1] / "data" / "case" / "crown.yaml"
 
 
-def _problem(tmp_path, speed, reach=None):
-    case = read_case(CROWN, tmp_path / "crown.yaml")
+def _problem(speed, reach=None):
+    case = load_case(CROWN)
     given = {
         "motion": case.motion.model_copy(update={"speed": speed}),
         "contact": case.contact.model_copy(update={"reach": reach}),
@@ -72,23 +31,23 @@ def _hertz(energy):
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.25, 1.0])
-def test_reach_is_found_on_faces_as_wide_as_the_contact(tmp_path, speed):
+def test_reach_is_found_on_faces_as_wide_as_the_contact(speed):
     """Reference: Hertz (Johnson 1985, 4.2); 15 % for faces as wide as the contact, and the bulk.
 
     The first guess of the force is up to nine times too high here: its load covers the whole face.
     """
-    problem = _problem(tmp_path, speed)
+    problem = _problem(speed)
 
     static = problem.static
     energy = 0.5 * effective_mass(problem.pair) * speed**2
     assert static.max_force == pytest.approx(1.15 * _hertz(energy), rel=0.15)
 
 
-def test_given_reach_is_judged_by_the_force_that_is_needed(tmp_path):
+def test_given_reach_is_judged_by_the_force_that_is_needed():
     """Reference: the reach found for the case does (1 %: where a ladder ends); a tenth does not."""
-    found = _problem(tmp_path, 0.25).static
+    found = _problem(0.25).static
 
-    again = _problem(tmp_path, 0.25, found.space.reach).static
+    again = _problem(0.25, found.space.reach).static
     assert again.max_force == pytest.approx(found.max_force, rel=0.01)
     with pytest.raises(ReachError, match="rim of the candidate points"):
-        _problem(tmp_path, 0.25, 0.1 * found.space.reach)
+        _problem(0.25, 0.1 * found.space.reach)

@@ -120,7 +120,8 @@ def run_impact(
             needed.append(certificate_modes(case))
         pools = mode_pools(problem, at_least=max(needed), progress=clock)
         clock("reduced", 0.0)
-        preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        with warnings_of("modes of the case"):
+            preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
         classical = classical_stiffness(problem, peak)
         own = preview

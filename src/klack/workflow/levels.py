@@ -44,6 +44,7 @@ from klack.workflow.damping_choice import damping_of
 from klack.workflow.pressure import pressure_record
 from klack.workflow.problem import ContactProblem
 from klack.workflow.progress import Progress
+from klack.workflow.stages import show, trial
 from klack.workflow.study import LevelResult, ModalEnergy, PressureRecord
 
 __all__ = [
@@ -223,12 +224,14 @@ def reduce_pair(
     """
     force = 0.7 * problem.static.max_force
     for _ in range(_PATTERN_ROUNDS):
-        pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
-        peak = float(np.max(_simulate(problem.case, pair).peak_force))
+        with trial() as caught:
+            pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
+            peak = float(np.max(_simulate(problem.case, pair).peak_force))
         settled = abs(peak - force) <= 0.02 * force
         force = min(peak, problem.static.max_force)
         if settled or not force > 0:
             break
+    show(caught)
     return pair
 
 

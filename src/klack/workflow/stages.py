@@ -1,7 +1,7 @@
 """Watching a long run: how long each stage takes, and what it warns of."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from time import perf_counter
 
@@ -14,7 +14,9 @@ __all__ = [
     "WITH_CACHED",
     "StageClock",
     "collected_warnings",
+    "show",
     "stages_with_cached",
+    "trial",
     "warnings_of",
 ]
 
@@ -95,6 +97,20 @@ def collected_warnings() -> Iterator[list[str]]:
                 notes.append(text)
         else:
             warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+@contextmanager
+def trial() -> Iterator[list[warnings.WarningMessage]]:
+    """Keep the warnings of a trial to itself; :func:`show` shows those of the one that counts."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield caught
+
+
+def show(caught: Iterable[warnings.WarningMessage]) -> None:
+    """Show warnings that a :func:`trial` has kept."""
+    for item in caught:
+        warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
 
 
 @contextmanager

@@ -30,6 +30,7 @@ from klack.workflow.bodies import BodyPair
 from klack.workflow.ladder import effective_mass, static_ladder
 from klack.workflow.levels import damping_of, selection_of
 from klack.workflow.progress import Progress
+from klack.workflow.stages import trial
 
 __all__ = ["StopContact", "build_stop", "split_law", "stop_law"]
 
@@ -97,7 +98,8 @@ def build_stop(
     force = _FIRST_FORCE * static.max_force
     for _ in range(_ROUNDS):
         ports = _contact_ports(pair, static, force)
-        peak = _peak_force(case, stop, pair, static, ports, flexibility, pools)
+        with trial():  # the law of the stop comes with all its ports, and says what it lacks
+            peak = _peak_force(case, stop, pair, static, ports, flexibility, pools)
         settled = abs(peak - force) <= _SETTLED * force
         force = min(peak, static.max_force)
         if settled:

@@ -27,6 +27,7 @@ from klack.reduction.structure import Structure
 from klack.workflow.bodies import assemble_body, find_touch, mesh_body
 from klack.workflow.levels import damping_of, mode_pool, selection_of
 from klack.workflow.progress import Progress, silent
+from klack.workflow.stages import warnings_of
 from klack.workflow.step_names import require_step_names
 from klack.workflow.stops import StopContact, build_stop, split_law, stop_law
 from klack.workflow.structures import valve_structures
@@ -99,11 +100,12 @@ def build_valve(
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
     for flexibility in flexibilities.values():
         flexibility.close()
-    laws = {
-        name: stop_law(contact, reduced[contact.pair.upper.name], reduced[contact.pair.lower.name])
-        for name, contact in contacts.items()
-        if is_consistent(case.network.components[name])
-    }
+    laws = {}
+    for name, contact in contacts.items():
+        if is_consistent(case.network.components[name]):
+            upper, lower = (reduced[body.name] for body in (contact.pair.upper, contact.pair.lower))
+            with warnings_of(f"stop '{name}'"):
+                laws[name] = stop_law(contact, upper, lower)
     network = filled_network(case, reduced, laws)
     return Valve(
         case=case,
