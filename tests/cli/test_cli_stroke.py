@@ -123,6 +123,7 @@ def test_the_terminal_shows_variants_and_impacts(capsys):
     for words in ("opens [ms]", "real-time factor", "peak force [N]", "dry, rigid bodies"):
         assert words in out
     assert "1.2247 " in out  # as on the page
+    assert "at 1.01 bar, rigid bodies" in out  # absolute, as in the case
     assert out.index("wet:") < out.index("dry:")
 
 

@@ -209,8 +209,7 @@ def _stops(roles: ValveRoles) -> tuple[str, ...]:
 def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
     fluid = "dry"
     if wet and rows.fluid is not None:
-        excess = _highest_pressure(rows) - rows.ambient.pressure
-        fluid = f"{rows.fluid.name} at {excess / 1e5:.3g} bar"
+        fluid = f"{rows.fluid.name} at {_highest_pressure(rows) / 1e5:.3g} bar"
     elastic = [
         row.body.mode_count - row.body.rigid_count for row in rows.bodies if row.body.mode_count
     ]
@@ -223,7 +222,7 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
 
 
 def _highest_pressure(rows: Rows) -> float:
-    """Highest pressure of the valve at the start [Pa]."""
+    """Highest pressure of the valve at the start, absolute [Pa]."""
     return max(
         (float(node.pressure[0]) for node in rows.nodes.values()), default=rows.ambient.pressure
     )
