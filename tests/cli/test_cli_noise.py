@@ -185,7 +185,25 @@ def test_two_designs_stand_side_by_side(impact, tmp_path, capsys):
     assert {path.name for path in Path("ab").glob("*.wav")} == {
         f"{what}-{name}.wav" for what in ("click", "pattern") for name in ("out", "other")
     }
-    assert "0.5 % of critical damping is assumed" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "0.5 % of critical damping is assumed" in out
+    assert re.search(r"other - out( +\+0\.0 dB){7}( +x 1){2}", out)
+
+
+def test_differences_of_two_designs_are_levels(heard):
+    """Truth: 3.01 dB of twice the energy."""
+    study = load_noise(heard)
+    (design,) = study.designs
+    bodies = tuple(replace(body, injected=2.0 * body.injected) for body in design.bodies)
+    loud = replace(design, name="loud", net_share=4.0 * design.net_share, bodies=bodies)
+
+    *_, row = noise_rows(replace(study, designs=(design, loud)))
+
+    shown = dict(zip(NOISE_COLUMNS, row, strict=True))
+    assert shown["design"] == f"loud - {design.name}"
+    assert shown["force [dB]"] == "+6.0 dB"
+    assert shown["injected [uJ]"] == "+3.0 dB"
+    assert shown["SEL [dBA]"] == "+0.0 dB"
 
 
 def test_levels_of_one_result_are_compared(impact):

@@ -27,13 +27,64 @@ NOISE_COLUMNS = (
 
 
 def noise_rows(study: NoiseStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`NOISE_COLUMNS`, one per design, as text."""
-    return tuple(_row(design) for design in study.designs)
+    """Rows of :data:`NOISE_COLUMNS` as text: one per design, then how far each is from the first.
+
+    Differences are levels; those of loudness and sharpness are factors.
+    """
+    first, *others = study.designs
+    return (
+        *(_row(design) for design in study.designs),
+        *(_difference_row(design, first) for design in others),
+    )
+
+
+def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:
+    now, then = design.sound, first.sound
+    heard = (
+        ("–",) * 5
+        if now is None or then is None
+        else (
+            _decibels(now.statistics.exposure_level_A - then.statistics.exposure_level_A),
+            _decibels(now.statistics.exposure_level - then.statistics.exposure_level),
+            _decibels(now.statistics.peak_level - then.statistics.peak_level),
+            _factor(now.loudness.maximum, then.loudness.maximum),
+            _factor(now.loudness.sharpness, then.loudness.sharpness),
+        )
+    )
+    return (
+        f"{design.name} - {first.name}",
+        _decibels(_ratio_level(_peak(design), _peak(first), 20.0)),
+        _decibels(_force_level(design) - _force_level(first)),
+        _decibels(_ratio_level(design.injected_energy, first.injected_energy, 10.0)),
+        _decibels(_ratio_level(design.radiated_energy, first.radiated_energy, 10.0)),
+        *heard,
+        "",
+    )
+
+
+def _ratio_level(value: float, other: float, factor: float) -> float:
+    """Level of a ratio [dB], ``factor`` 20 of forces and 10 of energies; nan unless both are."""
+    return factor * float(np.log10(value / other)) if value > 0.0 and other > 0.0 else float("nan")
+
+
+def _decibels(value: float) -> str:
+    return f"{round(value, 1) + 0.0:+.1f} dB" if np.isfinite(value) else "–"
+
+
+def _factor(value: float, other: float) -> str:
+    return f"x {value / other:.3g}" if value > 0.0 and other > 0.0 else "–"
+
+
+def _peak(design: NoiseDesign) -> float:
+    return max(stop.peak_force for stop in design.stops)
+
+
+def _force_level(design: NoiseDesign) -> float:
+    return float(10.0 * np.log10(max(design.unbalanced_energy.sum(), 1e-300) / ENERGY_REFERENCE))
 
 
 def _row(design: NoiseDesign) -> tuple[str, ...]:
     sound = design.sound
-    level = 10.0 * np.log10(max(design.unbalanced_energy.sum(), 1e-300) / ENERGY_REFERENCE)
     heard = (
         ("–",) * 5
         if sound is None
@@ -47,8 +98,8 @@ def _row(design: NoiseDesign) -> tuple[str, ...]:
     )
     return (
         design.name,
-        f"{max(stop.peak_force for stop in design.stops):.4g}",
-        f"{level:.1f}",
+        f"{_peak(design):.4g}",
+        f"{_force_level(design):.1f}",
         _number(1e6 * design.injected_energy),
         _number(1e9 * design.radiated_energy),
         *heard,
