@@ -129,6 +129,14 @@ def test_what_makes_no_sense_is_refused_at_once(tmp_path, capsys, arguments, wor
     assert not (tmp_path / "x").exists()
 
 
+def test_a_valve_on_the_ground_is_refused_and_told_why(tmp_path, capsys):
+    valve = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
+    words = ["export", str(valve), "--to", "fmu", "--out", str(tmp_path / "x"), "-q"]
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert "network.components.seat: got an end stop on the ground, expected" in told
+
+
 def test_models_do_not_come_from_a_result(stored, capsys):
     assert main(["export", str(stored), "--to", "fmu"]) == 2
     told = capsys.readouterr().err

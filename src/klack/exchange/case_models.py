@@ -126,11 +126,14 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
     for row in rows.interfaces:
         met = meetings[row.component]
         if met.upper is None or met.lower is None or row.law is None:
+            lawless = met.upper is not None and met.lower is not None
             raise InputError(
                 f"{case.path or 'case'}: network.components.{row.component}",
-                got="an end stop on the ground, or without a law",
+                got="an end stop without a law" if lawless else "an end stop on the ground",
                 expected="a contact law between two bodies",
-                hint="give the stop a body of its own, held by a support.",
+                hint="give it a law."
+                if lawless
+                else "give the stop a body of its own, held by a support.",
             )
         (upper, a), (lower, b) = met.upper, met.lower
         contacts.append(
