@@ -24,6 +24,7 @@ from klack.advice.modes import (
 )
 from klack.advice.regions import (
     axisymmetric_twin,
+    coarse_contact_notes,
     layer_setting,
     mesh_settings,
     unmeshed,
@@ -185,7 +186,10 @@ def advise_impact(
         measured = [*meshes, *measured]
         touching = {n: case.bodies[n] for n in (case.contact.moving.body, case.contact.stop.body)}
         peak = measure_impact(base.now).peak_force
-        log.notes += unmeshed_notes(touching, check_resolution(base.problem.static, peak))
+        ratio = check_resolution(base.problem.static, peak)
+        log.notes += unmeshed_notes(touching, ratio)
+        if not unmeshed(touching):
+            log.notes += coarse_contact_notes(ratio)
         counsels, dofs, dear = affordable(
             measured,
             fixed,

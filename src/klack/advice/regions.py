@@ -7,8 +7,16 @@ from klack.advice.settings import Setting, SettingValue
 from klack.case.bodies import CaseBody, ModeChoice, Reduction, SurfaceName
 from klack.case.placement import Placement
 from klack.case.schema import Case
+from klack.contact.statics import COARSE
 
-__all__ = ["axisymmetric_twin", "layer_setting", "mesh_settings", "unmeshed", "unmeshed_notes"]
+__all__ = [
+    "axisymmetric_twin",
+    "coarse_contact_notes",
+    "layer_setting",
+    "mesh_settings",
+    "unmeshed",
+    "unmeshed_notes",
+]
 
 
 def mesh_settings(
@@ -156,6 +164,23 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
             "finer mesh with more modes, and compare both runs."
         )
     return notes
+
+
+def coarse_contact_notes(size_ratio: float) -> list[str]:
+    """What to make of the warning of a run where finer elements were measured to change little.
+
+    Parameters
+    ----------
+    size_ratio : float [-]
+        Element size across the contact over its half width.
+    """
+    if not size_ratio > COARSE:
+        return []
+    return [
+        f"Elements across the contact are {size_ratio:.2g} half widths long, and a run warns above "
+        f"{COARSE:g}. That rule is for pressures and the width of the contact; this advice is for "
+        "the numbers judged here, by runs with other elements."
+    ]
 
 
 def _mesh_of(names: Sequence[str]) -> str:

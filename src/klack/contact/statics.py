@@ -30,6 +30,7 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_
 from klack.memory import require_memory
 
 __all__ = [
+    "COARSE",
     "ReachError",
     "StaticContact",
     "check_resolution",
@@ -41,6 +42,9 @@ __all__ = [
 
 _CHUNK = 64
 """Right-hand sides solved at once."""
+
+COARSE = 1.5
+"""Element size over half width of a contact above which :func:`check_resolution` warns."""
 
 _RING = 0.25
 """Spread of the pressure over its mean radius below which the contact is a ring.
@@ -411,11 +415,11 @@ def check_resolution(static: StaticContact, force: float | None = None) -> float
     width = static.half_width_at(force)
     size = float(np.average(static.space.size, weights=lam))
     ratio = size / width if width > 0 else float("inf")
-    if ratio > 1.5:
+    if ratio > COARSE:
         warnings.warn(
             f"contact: elements of {size * 1e6:.3g} um across a contact of half width "
             f"{width * 1e6:.3g} um at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful "
-            f"above 1.5). Refine the contact surfaces to about {width * 1e6:.2g} um.",
+            f"above {COARSE:g}). Refine the contact surfaces to about {width * 1e6:.2g} um.",
             AccuracyWarning,
             stacklevel=2,
         )
