@@ -26,7 +26,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
+__all__ = ["BOOKS", "FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
 
 FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 """Why :func:`march` returned.
@@ -38,6 +38,9 @@ other way (the other stop), and that step is not taken.
 _FAST_ROUNDS = 60
 _REFRESH = 256
 """Changes of the active set after which its inverse is computed afresh."""
+
+BOOKS = 10
+"""Length of the ``books`` of :func:`march`."""
 
 _OPEN_CONTACTS = 2.0  # times the steps in contact without one end an impact
 _PAY_LIMIT = 1e-3
@@ -358,7 +361,7 @@ def march(
         Of :func:`solve_active`.
     guide_force : array, shape (k, 2) [N]
         On the shaft, at the start of the next step.
-    books : array, shape (10,)
+    books : array, shape (BOOKS,)
         0 damping loss, 1 work of the constant force, 2 guide (friction and its numerical part),
         3 energy debt of the contact, 4 strain energy of the guides, 5 steps since the last contact
         (-1 before the first), 6 LCP rounds, 7 steps with contact, 8 direction of the last contact

@@ -21,7 +21,7 @@ from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import FAILED, OPEN, TURNED, march, safe_flight
+from klack.transient.interface_kernel import BOOKS, FAILED, OPEN, TURNED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import (
     ImpactSegment,
@@ -199,7 +199,7 @@ class _Run:
         self.index = np.zeros(n, dtype=np.int64)
         self.B = np.zeros((n, n))
         self.counts = np.zeros(2, dtype=np.int64)
-        self.books = np.zeros(10)
+        self.books = np.zeros(BOOKS)
         self.carried = np.zeros(n, dtype=bool)
         self.guide_arrays = _guide_arrays(guide, M)
         self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
