@@ -26,7 +26,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["BOOKS", "FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
+__all__ = ["FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
 
 FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 """Why :func:`march` returned.
@@ -39,10 +39,6 @@ _FAST_ROUNDS = 60
 _REFRESH = 256
 """Changes of the active set after which its inverse is computed afresh."""
 
-BOOKS = 10
-"""Length of the ``books`` of :func:`march`."""
-
-_OPEN_CONTACTS = 2.0  # times the steps in contact without one end an impact
 _PAY_LIMIT = 1e-3
 """Largest share of a contact force that pays the energy debt."""
 
@@ -328,8 +324,7 @@ def march(
     ----------
     steps : int
     wait : int
-        Return :data:`OPEN` when no point has carried for so many steps after a contact, and for
-        twice as many as points have carried in; 0: never.
+        Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
     step : float [s]
     A : array, shape (n, n) [m/N]
         ``C_l + Phi diag(B1) Phi^T / 2``; n = 0: flight, no contact is looked at.
@@ -361,11 +356,11 @@ def march(
         Of :func:`solve_active`.
     guide_force : array, shape (k, 2) [N]
         On the shaft, at the start of the next step.
-    books : array, shape (BOOKS,)
+    books : array, shape (9,)
         0 damping loss, 1 work of the constant force, 2 guide (friction and its numerical part),
         3 energy debt of the contact, 4 strain energy of the guides, 5 steps since the last contact
         (-1 before the first), 6 LCP rounds, 7 steps with contact, 8 direction of the last contact
-        force (0 before the first), 9 steps with contact in this impact.
+        force (0 before the first).
     carried : bool array, shape (n,)
         Points that have carried a force.
     out_force, out_gap, out_outside : array, shape (>= steps,)
@@ -575,7 +570,6 @@ def march(
             if counts[0] > 0:
                 books[5] = 0.0
                 books[7] += 1.0
-                books[9] += 1.0
             elif books[5] >= 0.0:
                 books[5] += 1.0
         # other books, then the end of the step becomes the state
@@ -619,6 +613,6 @@ def march(
         smallest = least
         out_outside[taken] = outside + braking
         books[3] = debt
-        if wait and books[5] > max(float(wait), _OPEN_CONTACTS * books[9]):
+        if wait and books[5] > wait:
             return taken + 1, OPEN
     return steps, FINISHED

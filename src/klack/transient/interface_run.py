@@ -21,7 +21,7 @@ from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import BOOKS, FAILED, OPEN, TURNED, march, safe_flight
+from klack.transient.interface_kernel import FAILED, OPEN, TURNED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import (
     ImpactSegment,
@@ -37,15 +37,16 @@ Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _BALANCE = 1e-3  # energy residual that a run keeps at its usual step
 _CHUNK = 500
+_CLUSTER_TIME = 50e-6  # open for so long ends an impact [s]
 _DOUBLINGS = 9  # of the fine step in flight
 _GUIDED_DOUBLINGS = 0  # a shaft meets its stiff bore for a microsecond or two only
-_FLIGHT_CHUNK = 500  # fine steps
+_FLIGHT_CHUNK = 20e-6  # [s]
 _NEAR = 8.0  # fine steps before a possible touch
 _FAR = 200.0  # fine steps that end a segment without a touch
 _STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
-_FRESH = 1.0  # fine steps; gaps as good as new may be wrong by the way in them
+_FRESH = 0.04e-6  # gaps as good as new [m]
 _WARY_SHARE = 0.25  # of the safe time, while the guide may kick
-_SLIP_SPEED = 1e-3  # [m/s] friction in the guide turns round within it, at every size
+_SLIP_SPEED = 1e-3  # [m/s]
 _RIM_RESERVE = 1.1
 
 
@@ -199,7 +200,7 @@ class _Run:
         self.index = np.zeros(n, dtype=np.int64)
         self.B = np.zeros((n, n))
         self.counts = np.zeros(2, dtype=np.int64)
-        self.books = np.zeros(BOOKS)
+        self.books = np.zeros(9)
         self.carried = np.zeros(n, dtype=bool)
         self.guide_arrays = _guide_arrays(guide, M)
         self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
@@ -287,7 +288,7 @@ class _Run:
         progress: Callable[[float], None] | None,
     ) -> None:
         end = duration * (1.0 - 1e-9)
-        wait = ceil(2.0 * self.model.longest_period / self.step) + 1
+        wait = ceil(max(_CLUSTER_TIME, 2.0 * self.model.longest_period) / self.step)
         while self.time < end:
             if flight:
                 self.fly(duration, progress)
@@ -304,10 +305,10 @@ class _Run:
         empty = np.zeros((0, self.model.mode_count))
         while self.time < duration:
             stale = self.stale()
-            horizon = min(2.0 * _FLIGHT_CHUNK * self.step, duration - self.time + self.step)
+            horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
             safe = self.safe(self.gap0 - stale, horizon)
             if safe < _NEAR * self.step:
-                if stale <= self.fresh():
+                if stale <= _FRESH:
                     return
                 self.take_gaps()
                 continue
@@ -315,7 +316,7 @@ class _Run:
             if not self.unguided(safe):
                 safe, doublings = _WARY_SHARE * safe, _GUIDED_DOUBLINGS
             length = self.step * 2.0**doublings
-            steps = max(1, int(min(safe, _FLIGHT_CHUNK * self.step) / length))
+            steps = max(1, int(min(safe, _FLIGHT_CHUNK) / length))
             self.march(self.stepper(doublings), steps, 0, empty, np.zeros(0), np.zeros((0, 0)))
             self.time += steps * length
             self.keep_motion()
@@ -331,13 +332,7 @@ class _Run:
             return 0.0
         moved = self.model.rigid @ self.q - self.taken_at
         way = float(np.linalg.norm(moved[:3] + np.cross(moved[3:], self.arm)))
-        return _STALE_SHARE * way + 0.5 * self.fresh()
-
-    def fresh(self) -> float:
-        """Error of gaps as good as new [m]."""
-        speed = self.model.rigid @ self.v
-        along = speed[:3] + np.cross(speed[3:], self.arm)
-        return _FRESH * self.step * float(np.linalg.norm(along))
+        return _STALE_SHARE * way + 0.5 * _FRESH
 
     def safe(self, gap: NDArray[np.float64], horizon: float) -> float:
         outside = self.constant - self.spring * float(self.push @ self.q)
@@ -366,7 +361,7 @@ class _Run:
     def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
         """Fine steps through one impact, or to the end of the run."""
         segment = _Segment(self)
-        self.books[5], self.books[8], self.books[9] = -1.0, 0.0, 0.0
+        self.books[5], self.books[8] = -1.0, 0.0
         status = 0
         while self.time < duration * (1.0 - 1e-9) and status not in (OPEN, TURNED):
             steps = min(_CHUNK, ceil((duration - self.time) / self.step * (1.0 - 1e-9)))
@@ -618,7 +613,7 @@ class _Run:
 
 
 _SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
-"""A millimetre weighs like a radian; bodies of other sizes only change the round-off."""
+"""A millimetre of translation weighs like a radian over a metre: lengths of valves."""
 
 
 def _guide_arrays(guide: Guide | None, modes: int) -> tuple[NDArray[np.float64], ...]:

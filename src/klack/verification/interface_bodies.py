@@ -16,7 +16,7 @@ from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import BOOKS, march
+from klack.transient.interface_kernel import march
 from klack.transient.interface_model import (
     InterfaceBody,
     InterfaceContact,
@@ -283,7 +283,7 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
         np.zeros((n, n)),
         np.zeros(2, dtype=np.int64),
         np.zeros((0, 2)),
-        np.zeros(BOOKS),
+        np.zeros(9),
         np.zeros(n, dtype=bool),
         out[0],
         out[1],
