@@ -100,7 +100,7 @@ def test_the_energy_error_falls_with_the_coupling_step(
     for steps in (16, 8, 4):
         books = swing(imported(spring_damper_fmu(), steps, extrapolation, 0.0)).books
         errors.append(books.losses["part coupling error"])
-        assert books.relative_residual < 1e-11  # the ledger closes whatever the coupling does
+        assert books.relative_residual < 1e-9  # left by the forces of a step
 
     slope = np.polyfit(np.log([16, 8, 4]), np.log(np.abs(errors)), 1)[0]
     assert slope == pytest.approx(order, abs=0.1)

@@ -50,8 +50,8 @@ State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
-_SETTLE_STEP = 50  # fine steps
-_SETTLE_SHARE = 0.02  # or this share of the longest time to rest, whichever is longer
+_SETTLE_SHARE = 0.02  # of the longest time to rest is a step of the static start
+_SETTLE_STEP = 1e-6  # [s] the same where nothing can rest on anything
 _SETTLE_STEPS = 6000
 _CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
 
@@ -124,8 +124,8 @@ def simulate_network(
     if state is not None:
         _restore(network, clock, state)
     elif start == "rest":
-        longest = _SETTLE_SHARE * float(np.max(network.interfaces.rest, initial=0.0))
-        _settle(network, recorder.recording, step * max(_SETTLE_STEP, round(longest / step)))
+        large = _SETTLE_SHARE * float(np.max(network.interfaces.rest, initial=0.0)) or _SETTLE_STEP
+        _settle(network, recorder.recording, step * max(1, round(large / step)))
     first_step, done_before = int(clock[0]), clock[2:4].copy()
     reset_books(network)
     _read_stores(network)
