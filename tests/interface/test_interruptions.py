@@ -95,7 +95,10 @@ def test_a_crash_of_a_command_costs_nothing(words: list[str], points: int, tmp_p
 
 
 def start(*words: str, folder: Path) -> "subprocess.Popen[str]":
-    """Start klack as the first process of a group of its own."""
+    """Start klack as the first process of a group of its own, as a terminal does.
+
+    Of a shell that runs the tests in the background it would inherit a deaf ear for Ctrl-C.
+    """
     return subprocess.Popen(
         [sys.executable, "-m", "klack", *words],
         cwd=folder,
@@ -104,6 +107,7 @@ def start(*words: str, folder: Path) -> "subprocess.Popen[str]":
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
 
 
