@@ -66,7 +66,8 @@ def _of_interface(
     edges = np.diff(np.concatenate([[0], closed.astype(np.int8), [0]]))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     begin = record.time[starts]
-    stop = record.time[ends - 1] + record.step[ends - 1]
+    until = record.time[ends - 1] + record.step[ends - 1]
+    stop = until.copy()
     open_ended = ends == len(closed)
     if open_ended[-1]:
         stop[-1] = np.nan
@@ -79,7 +80,7 @@ def _of_interface(
         if begin[first] <= time[0] + record.step[starts[first]]:
             continue  # closed from the start
         t0, left = begin[first], stop[last]
-        rests = [i for i in range(first, last + 1) if _end(record, ends[i]) - begin[i] >= rest]
+        rests = [i for i in range(first, last + 1) if until[i] - begin[i] >= rest]
         if rests:  # the impact is over then
             last = rests[0]
             t1 = begin[last] + rest
@@ -161,11 +162,6 @@ def _fastest(begin: float, end: float, time: Vector, speed: Vector) -> float:
     """Highest speed in the records between two times; -infinity without any."""
     first, last = np.searchsorted(time, (begin, end))
     return float(np.max(speed[int(first) : int(last)], initial=-np.inf))
-
-
-def _end(record: InterfaceRecord, end: int) -> float:
-    """End of the step before this one [s]."""
-    return float(record.time[end - 1] + record.step[end - 1])
 
 
 def _film_end(record: InterfaceRecord, end: int, pause: float) -> int:
