@@ -80,10 +80,8 @@ class FlatSystem:
     damped_weight: NDArray[np.float64]
     damped_loss: NDArray[np.float64]
     watch_q: NDArray[np.float64]
-    watch_q_range: NDArray[np.int64]
     watch_q_force: NDArray[np.float64]
     watch_v: NDArray[np.float64]
-    watch_v_range: NDArray[np.int64]
     watch_v_force: NDArray[np.float64]
 
 
@@ -150,10 +148,8 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
         damped_weight=np.array([0.5 * w**2, np.full(w.size, 0.5)]) * damped_modes,
         damped_loss=np.array([loss.Q11, loss.Q12, loss.Q22, loss.L1, loss.L2, loss.S]),
         watch_q=watch_q,
-        watch_q_range=_ranges(watch_q),
         watch_q_force=(watch_q * B[0]) @ rows.T,
         watch_v=watch_v,
-        watch_v_range=_ranges(watch_v),
         watch_v_force=(watch_v * B[1]) @ rows.T,
     )
 
@@ -268,13 +264,3 @@ def _contact_rows(
             block = by_name[name]
             watch[2 * c + side, block.first : block.last] = block.basis.T @ system.shape(name, port)
     return watch[0::2] - watch[1::2], watch
-
-
-def _ranges(rows: NDArray[np.float64]) -> NDArray[np.int64]:
-    """First and one past the last non-zero column of each row, shape (k, 2)."""
-    out = np.zeros((rows.shape[0], 2), dtype=np.int64)
-    for k, row in enumerate(rows):
-        used = np.flatnonzero(row)
-        if used.size:
-            out[k] = used[0], used[-1] + 1
-    return out

@@ -18,7 +18,6 @@ __all__ = [
     "STATUS_FINE",
     "push_on",
     "run_steps",
-    "watch_all",
 ]
 
 Vector = NDArray[np.float64]  # one axis
@@ -66,9 +65,9 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 @njit(cache=True, fastmath=FAST)
-def _watch(rows: Matrix, k: int, first: int, last: int, state: Vector) -> float:
+def _watch(rows: Matrix, k: int, state: Vector) -> float:
     y = 0.0
-    for i in range(first, last):
+    for i in range(state.size):
         y += rows[k, i] * state[i]
     return y
 
@@ -85,9 +84,8 @@ def push_on(
 
 
 @njit(cache=True)
-def watch_all(
+def _watch_all(
     rows: Matrix,
-    ranges: NDArray[np.int64],
     force_rows: Matrix,
     state: Vector,
     F: Vector,
@@ -96,7 +94,7 @@ def watch_all(
 ) -> None:
     """Record displacements or velocities; the forces ``F`` of the last step are still pending."""
     for k in range(rows.shape[0]):
-        y = _watch(rows, k, ranges[k, 0], ranges[k, 1], state)
+        y = _watch(rows, k, state)
         for c in range(F.size):
             y += force_rows[k, c] * F[c]
         out[place, k] = y
@@ -163,10 +161,8 @@ def run_steps(
     damped_weight: Matrix,
     damped_loss: Matrix,
     watch_q: Matrix,
-    watch_q_range: NDArray[np.int64],
     watch_q_force: Matrix,
     watch_v: Matrix,
-    watch_v_range: NDArray[np.int64],
     watch_v_force: Matrix,
     out_force: Matrix,
     out_peak: Matrix,
@@ -200,8 +196,8 @@ def run_steps(
     damped_weight, damped_loss : array (2, m), (6, m)
         Energy weights of the damped modes (zero for the others) and their loss forms.
     watch_q, watch_v : array (k, m), (l, m)
-        What is recorded at the ends of records; ``watch_*_range`` (k, 2), (l, 2): modes that count;
-        ``watch_*_force`` (k, c), (l, c): effect of unit contact forces of the last step.
+        What is recorded at the ends of records; ``watch_*_force`` (k, c), (l, c): effect of unit
+        contact forces of the last step.
     out_force, out_peak, out_gap : array (n, c)
         Mean force, largest step force, mean gap of each record.
     out_q, out_v : array (n + 1, k), (n + 1, l)
@@ -362,8 +358,8 @@ def run_steps(
             q[push_index[k]] += pushed_q[k]
             v[push_index[k]] += pushed_v[k]
             pushed_q[k] = pushed_v[k] = 0.0
-        watch_all(watch_q, watch_q_range, watch_q_force, q, F, out_q, record + 1)
-        watch_all(watch_v, watch_v_range, watch_v_force, v, F, out_v, record + 1)
+        _watch_all(watch_q, watch_q_force, q, F, out_q, record + 1)
+        _watch_all(watch_v, watch_v_force, v, F, out_v, record + 1)
 
     if pending:
         _modal_force(rows, F, f)

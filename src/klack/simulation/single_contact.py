@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 
 from klack.contact.laws import LAW_LINEAR
 from klack.simulation.contact_step import law_potential, solve_linear, solve_step
-from klack.simulation.kernel import FAST, SEPARATED, STATUS_FINE, push_on, watch_all
+from klack.simulation.kernel import FAST, SEPARATED, STATUS_FINE, push_on
 
 __all__ = ["run_one_contact"]
 
 Vector = NDArray[np.float64]  # one axis
 Matrix = NDArray[np.float64]  # two axes
+Cube = NDArray[np.float64]  # three axes
 
 CHUNK = 64  # modes; the distances of the packed columns below are multiples of it
-_LANES = 8  # modes per vector register
+_LANES = 8  # modes that a pass over them takes at once
+_DOT_LANES = 16  # the same for a sum of products
 
 
 @njit(cache=True, fastmath=FAST)
@@ -66,6 +68,59 @@ def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matr
 
 
 @njit(cache=True)
+def _pack_losses(B: Matrix, W: Matrix, Q: Matrix, row: Vector) -> Matrix:
+    """What a unit force leaves pending, energy weights and loss forms, (chunks, 10 * 64)."""
+    chunks = (row.size + CHUNK - 1) // CHUNK
+    L = np.zeros((chunks, 10 * CHUNK))
+    for m in range(row.size):
+        c, i = m // CHUNK, m % CHUNK
+        for j in range(2):
+            L[c, i + j * CHUNK] = B[j, m] * row[m]
+            L[c, i + (2 + j) * CHUNK] = W[j, m]
+        for j in range(3):
+            L[c, i + (4 + j) * CHUNK] = Q[j, m]
+        for j in range(3, 5):
+            L[c, i + (4 + j) * CHUNK] = Q[j, m] * row[m]
+        L[c, i + 9 * CHUNK] = Q[5, m] * row[m] * row[m]
+    return L
+
+
+@njit(cache=True)
+def _pack_watched(rows: Matrix) -> tuple[Cube, Matrix]:
+    """Recorded rows in chunks, and how many modes of each count: whole vectors, from its start."""
+    chunks = (rows.shape[1] + CHUNK - 1) // CHUNK
+    packed = np.zeros((rows.shape[0], chunks, CHUNK))
+    counts = np.zeros((rows.shape[0], chunks), np.int64)
+    for k in range(rows.shape[0]):
+        for m in range(rows.shape[1]):
+            if rows[k, m] != 0.0:
+                c, i = m // CHUNK, m % CHUNK
+                packed[k, c, i] = rows[k, m]
+                counts[k, c] = i + 1 + (-i - 1) % _DOT_LANES
+    return packed, counts
+
+
+@njit(cache=True, fastmath=FAST)
+def _watch_chunk(W: Cube, S: Cube, k: int, c: int, part: int, count: int) -> float:
+    y = 0.0
+    for i in range(count):
+        y += W[k, c, i] * S[c, part, i]
+    return y
+
+
+@njit(cache=True)
+def _watch(
+    W: Cube, counts: Matrix, force_rows: Matrix, S: Cube, part: int, F: float, out: Matrix, at: int
+) -> None:
+    """Record displacements (``part`` 0 of the state) or velocities (1); ``F`` is still pending."""
+    for k in range(W.shape[0]):
+        y = force_rows[k, 0] * F
+        for c in range(W.shape[1]):
+            y += _watch_chunk(W, S, k, c, part, counts[k, c])
+        out[at, k] = y
+
+
+@njit(cache=True)
 def _unpack(S: Matrix, q: Vector, v: Vector) -> None:
     """Modal state as two plain arrays (no views: counting their references costs more)."""
     for c in range(S.shape[0]):
@@ -76,28 +131,48 @@ def _unpack(S: Matrix, q: Vector, v: Vector) -> None:
 
 
 @njit(cache=True, fastmath=FAST)
-def _damped_energy_one(q: Vector, v: Vector, B: Matrix, row: Vector, F: float, W: Matrix) -> float:
+def _copy(S: Matrix, before: Matrix) -> None:
+    for c in range(S.shape[0]):
+        for i in range(S.shape[1]):
+            before[c, i] = S[c, i]
+
+
+@njit(cache=True, fastmath=FAST)
+def _damped_energy_chunk(S: Matrix, L: Matrix, c: int, F: float) -> float:
+    energy = 0.0
+    for i in range(64):
+        q = S[c, i] + L[c, i] * F
+        v = S[c, i + 64] + L[c, i + 64] * F
+        energy += L[c, i + 128] * q * q + L[c, i + 192] * v * v
+    return energy
+
+
+@njit(cache=True)
+def _damped_energy(S: Matrix, L: Matrix, F: float) -> float:
     """Energy of the damped modes after the pending contact force ``F``."""
     total = 0.0
-    for i in range(q.size):
-        qi = q[i] + B[0, i] * (row[i] * F)
-        vi = v[i] + B[1, i] * (row[i] * F)
-        total += W[0, i] * qi * qi + W[1, i] * vi * vi
+    for c in range(S.shape[0]):
+        total += _damped_energy_chunk(S, L, c, F)
     return total
 
 
 @njit(cache=True, fastmath=FAST)
-def _damping_loss_one(
-    q: Vector, v: Vector, B: Matrix, row: Vector, F_before: float, F: float, Q: Matrix
-) -> float:
+def _damping_loss_chunk(S: Matrix, L: Matrix, c: int, F_before: float, F: float) -> float:
+    loss = 0.0
+    for i in range(64):
+        q = S[c, i] + L[c, i] * F_before
+        v = S[c, i + 64] + L[c, i + 64] * F_before
+        loss += q * (L[c, i + 256] * q + L[c, i + 320] * v + L[c, i + 448] * F)
+        loss += v * (L[c, i + 384] * v + L[c, i + 512] * F) + L[c, i + 576] * F * F
+    return loss
+
+
+@njit(cache=True)
+def _damping_loss(S: Matrix, L: Matrix, F_before: float, F: float) -> float:
     """Loss of a step with the force ``F`` that started after the pending force ``F_before``."""
     total = 0.0
-    for i in range(q.size):
-        qi = q[i] + B[0, i] * (row[i] * F_before)
-        vi = v[i] + B[1, i] * (row[i] * F_before)
-        f = row[i] * F
-        total += qi * (Q[0, i] * qi + Q[1, i] * vi + Q[3, i] * f)
-        total += vi * (Q[2, i] * vi + Q[4, i] * f) + Q[5, i] * f * f
+    for c in range(S.shape[0]):
+        total += _damping_loss_chunk(S, L, c, F_before, F)
     return total
 
 
@@ -123,10 +198,8 @@ def run_one_contact(
     damped_weight: Matrix,
     damped_loss: Matrix,
     watch_q: Matrix,
-    watch_q_range: NDArray[np.int64],
     watch_q_force: Matrix,
     watch_v: Matrix,
-    watch_v_range: NDArray[np.int64],
     watch_v_force: Matrix,
     out_force: Matrix,
     out_peak: Matrix,
@@ -140,6 +213,9 @@ def run_one_contact(
     row = rows[0].copy()
     S, K = _pack(q, v, A, P, row)
     chunks = S.shape[0]
+    watched_q, q_counts = _pack_watched(watch_q)
+    watched_v, v_counts = _pack_watched(watch_v)
+    parts = S.reshape(chunks, 2, CHUNK)
     S0, K0 = S[0], K[0]
     first_count = _LANES * ((min(modes, CHUNK) + _LANES - 1) // _LANES)
     kind, start, alpha0 = law_kind[0], law_start[0], alpha[0]
@@ -152,18 +228,18 @@ def run_one_contact(
     pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
     gap = gap_offset[0] + row @ q
     F, F_before, e, chi, lost, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    last_force = np.zeros(1)
-    q0, v0 = np.zeros(modes), np.zeros(modes)
     hint = 0
     approaching, in_flight = True, True
-    flight_energy = _damped_energy_one(q, v, B, row, 0.0, damped_weight) if damped else 0.0
+    L = _pack_losses(B, damped_weight, damped_loss, row)
+    S_before = S.copy()
+    flight_energy = _damped_energy(S, L, 0.0) if damped else 0.0
     contact_loss, release_loss, damping = 0.0, 0.0, 0.0
 
     for record in range(out_force.shape[0]):
         sum_gap, sum_force, peak = 0.0, 0.0, 0.0
         for _ in range(steps_per_record):
             if damped:
-                _unpack(S, q0, v0)
+                _copy(S, S_before)
             if F > 0.0:
                 free = offset + _forced(S0, K0, first_count, F)
                 for c in range(1, chunks):
@@ -193,12 +269,12 @@ def run_one_contact(
                 if F > 0.0:
                     if in_flight:
                         damping += flight_energy
-                        damping -= _damped_energy_one(q0, v0, B, row, before, damped_weight)
+                        damping -= _damped_energy(S_before, L, before)
                         in_flight = False
-                    damping += _damping_loss_one(q0, v0, B, row, before, F, damped_loss)
+                    damping += _damping_loss(S_before, L, before, F)
                 elif not in_flight:
                     # the step that has just gone was the first of the flight
-                    flight_energy = _damped_energy_one(q0, v0, B, row, before, damped_weight)
+                    flight_energy = _damped_energy(S_before, L, before)
                     in_flight = True
             after = free + yields * F
             sum_gap += 0.5 * (gap + after)
@@ -220,22 +296,20 @@ def run_one_contact(
         out_force[record, 0] = sum_force / steps_per_record
         out_peak[record, 0] = peak
         out_gap[record, 0] = sum_gap / steps_per_record
-        last_force[0] = F
         for k in range(pushes):
             c, i = push_index[k] // CHUNK, push_index[k] % CHUNK
             S[c, i] += pushed_q[k]
             S[c, i + CHUNK] += pushed_v[k]
             pushed_q[k] = pushed_v[k] = 0.0
-        _unpack(S, q, v)
-        watch_all(watch_q, watch_q_range, watch_q_force, q, last_force, out_q, record + 1)
-        watch_all(watch_v, watch_v_range, watch_v_force, v, last_force, out_v, record + 1)
+        _watch(watched_q, q_counts, watch_q_force, parts, 0, F, out_q, record + 1)
+        _watch(watched_v, v_counts, watch_v_force, parts, 1, F, out_v, record + 1)
 
     _unpack(S, q, v)
     for i in range(modes):
         q[i] += B[0, i] * row[i] * F
         v[i] += B[1, i] * row[i] * F
     if damped and in_flight:
-        damping += flight_energy - _damped_energy_one(q, v, B, row, 0.0, damped_weight)
+        damping += flight_energy - _damped_energy(S, L, F)
     books[0] = contact_loss
     books[1] = release_loss
     books[2] = damping
