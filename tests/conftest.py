@@ -9,8 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 os.environ["KLACK_CACHE"] = "off"  # every test computes; those of the cache take a folder of theirs
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # workers share the cores: threads of one would wait for those of the other, up to 15 times
+    # as long; plugins load NumPy before this file, everything else comes after it
+    threadpool_limits(limits=1)
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
 
 sys.path.append(str(Path(__file__).parent))  # worker processes look there as well
 from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy books)
