@@ -52,6 +52,12 @@ def _forced(S: Vector, K: Vector, count: int, F: float) -> float:
 
 
 @njit(cache=True)
+def _whole(modes: int) -> int:
+    """Modes that fill whole vector registers."""
+    return _LANES * ((modes + _LANES - 1) // _LANES)
+
+
+@njit(cache=True)
 def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matrix, Matrix]:
     """State (chunks, 2 * 64) and step matrices (chunks, 7 * 64), filled up with still modes."""
     chunks = (q.size + CHUNK - 1) // CHUNK
@@ -217,7 +223,10 @@ def run_one_contact(
     watched_v, v_counts = _pack_watched(watch_v)
     parts = S.reshape(chunks, 2, CHUNK)
     S0, K0 = S[0], K[0]
-    first_count = _LANES * ((min(modes, CHUNK) + _LANES - 1) // _LANES)
+    # modes of the first and of the last chunk: no numbers that the compiler knows, or it unrolls
+    # all 64, which takes twice as long
+    count = _whole(min(modes, CHUNK))
+    last_count = _whole(modes - (chunks - 1) * CHUNK)
     kind, start, alpha0 = law_kind[0], law_start[0], alpha[0]
     D, yields = series[0], G[0, 0]
     own = yields + 2.0 * D
@@ -241,13 +250,13 @@ def run_one_contact(
             if damped:
                 _copy(S, S_before)
             if F > 0.0:
-                free = offset + _forced(S0, K0, first_count, F)
+                free = offset + _forced(S0, K0, count, F)
                 for c in range(1, chunks):
-                    free += _forced(S[c], K[c], CHUNK, F)
+                    free += _forced(S[c], K[c], last_count if c == chunks - 1 else count, F)
             else:
-                free = offset + _free(S0, K0, first_count)
+                free = offset + _free(S0, K0, count)
                 for c in range(1, chunks):
-                    free += _free(S[c], K[c], CHUNK)
+                    free += _free(S[c], K[c], last_count if c == chunks - 1 else count)
             push_on(push_index, push, A, pushed_q, pushed_v)
             for k in range(pushes):
                 free += row[push_index[k]] * pushed_q[k]
