@@ -140,11 +140,20 @@ def find_touch(
 
 
 def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
-    """Stiffness and mass of a body of the case, assembled here or given, with its supports."""
+    """Stiffness and mass of a body of the case, assembled here or given, with its supports.
+
+    Warns
+    -----
+    AccuracyWarning
+        About materials that no solid has (:attr:`klack.materials.Material.question`).
+    """
     body = case.bodies[name]
     if body.matrices is not None:
         return assembled_from_matrices(case, name, mesh)
     materials = case.materials_of(name, mesh.solids)
+    for material in materials.values():
+        if material.question is not None:
+            warnings.warn(material.question, AccuracyWarning, stacklevel=2)
     return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
 
 
