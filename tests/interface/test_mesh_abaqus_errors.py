@@ -128,6 +128,13 @@ FAULTS = {
         TET + "*MATERIAL, NAME=m\n*ELASTIC\n*DENSITY\n1.\n",
         "x.inp:9: .ELASTIC: got no data line",
     ),
+    "letter left out": (
+        "*NODE\n*ELEMNT, TYPE=C3D4\n",
+        r"x.inp:2: got \*ELEMNT, expected \*ELEMENT",
+    ),
+    "letter too many": ("*NODES\n1, 0, 0, 0\n", r"x.inp:1: got \*NODES, expected \*NODE"),
+    "other letter": (TET + "*SURFASE, NAME=s\n", r"x.inp:8: got \*SURFASE, expected \*SURFACE"),
+    "letters swapped": (TET + "*MATERAIL, NAME=m\n", r"got \*MATERAIL, expected \*MATERIAL"),
     "long name of a file": (f"*INCLUDE, INPUT={'x' * 5000}\n", "xxx: got file name too long"),
     "endless line": ("*NODE " + 30_000 * "x", "x.inp:1: got a line of 30006 bytes"),
     "inverted": (
@@ -152,6 +159,18 @@ def test_fault_is_located(tmp_path, text, message):
 
     with pytest.raises(InputError, match=f"(?s){message}"):
         read_abaqus(tmp_path / "x.inp", 1.0)
+
+
+def test_other_keywords_are_no_slips(tmp_path):
+    rest = (
+        "*HEADING\nplate\n*ORIENTATION, NAME=o\n1,0,0,0,1,0\n"
+        "*MATERIAL, NAME=m\n*ELASTIC\n2e11, .3\n*PLASTIC\n3e8, 0\n*DENSITY\n7850\n*EXPANSION\n1e-5\n*DAMPING, ALPHA=1\n"
+        "*AMPLITUDE, NAME=a\n0,0,1,1\n*BOUNDARY\n1, 1\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\n"
+        "*STEP\n*STATIC\n*NODE PRINT\nU\n*EL PRINT\nS\n*NODE FILE\nU\n*END STEP\n"
+    )
+    (tmp_path / "x.inp").write_text(TET + rest)
+
+    assert read_abaqus(tmp_path / "x.inp", 1.0).element_count == 1
 
 
 def test_unit_must_be_a_length(tmp_path):

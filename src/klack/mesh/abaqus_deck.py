@@ -20,6 +20,11 @@ _IGNORED = {
     *("TIE", "EQUATION", "MPC", "COUPLING", "KINEMATIC", "DISTRIBUTING", "RIGID BODY"),
     *("EMBEDDED ELEMENT", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "MODEL CHANGE"),
 }
+_READ = (
+    *("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "SOLID SECTION", "SYSTEM", "INCLUDE"),
+    *("MATERIAL", "ELASTIC", "DENSITY", "PART", "INSTANCE", "ASSEMBLY", "HEADING"),
+)
+_ALIKE = {"PLASTIC"}  # other keywords that are one letter away from one of them
 _END_OF_MATERIAL = {"MATERIAL", "STEP", "PART", "ASSEMBLY", "SOLID SECTION", "NODE", "ELEMENT"}
 
 
@@ -95,6 +100,13 @@ class _Reader:
                 )
             case name if name in _IGNORED:
                 self.ignored.setdefault(name, keyword.place)
+            case name if name not in _ALIKE and (meant := _slip(name)) is not None:
+                raise InputError(
+                    keyword.place,
+                    got=f"*{name}",
+                    expected=f"*{meant}",
+                    hint="mend the keyword; what follows it would be passed over.",
+                )
             case _:
                 (self.root if self.scope is None else self.scope).take(keyword)
 
@@ -210,6 +222,21 @@ class _Reader:
                 AccuracyWarning,
                 stacklevel=4,
             )
+
+
+def _slip(name: str) -> str | None:
+    """Keyword that is read and differs in one letter: left out, added, another, or two swapped."""
+    for known in _READ:
+        shorter = min(len(name), len(known))
+        first = next((i for i in range(shorter) if name[i] != known[i]), shorter)
+        last = next((i for i in range(shorter) if name[-1 - i] != known[-1 - i]), shorter)
+        last = min(last, shorter - first)
+        typed, meant = name[first : len(name) - last], known[first : len(known) - last]
+        if (typed, meant) == ("", ""):
+            return None
+        if max(len(typed), len(meant)) == 1 or (len(typed) == 2 and typed == meant[::-1]):
+            return known
+    return None
 
 
 def _first_record(
