@@ -318,7 +318,7 @@ def _film_that_vanishes(a: ReducedBody, b: ReducedBody) -> Check:
         "a film that vanishes against no film, largest difference of the force [-]",
         expected=0.0,
         computed=worst,
-        tolerance=1e-8,
+        tolerance=5e-9,
         source="contact loop without films",
     )
 

@@ -116,7 +116,7 @@ def _oscillates() -> list[Check]:
             "mass on a spring, order of its error in the step [-]",
             2.0,
             log(errors[0] / errors[1]) / log(2.0),
-            5e-3,
+            1e-3,
             "discrete gradient: second order",
         ),
         _check(
@@ -162,7 +162,7 @@ def _pushed() -> list[Check]:
             "over the hill of a tabulated force, speed behind it [m/s]",
             sqrt(1.0 - held),
             _speed(escape)[-1],
-            1e-9,  # displacements settle to 1e-12 m, times 1.5e6 N/m of this hill: 1e-7 of 15 N
+            2e-10,
             "energy: area of a triangle",
         ),
     ]
@@ -217,7 +217,7 @@ def _balances() -> list[Check]:
             "all of them at one mass, energy residual over throughput [-]",
             0.0,
             books.relative_residual,
-            1e-11,
+            1e-12,
             "energy books: every element balances to round-off",
         )
     ]

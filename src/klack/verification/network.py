@@ -59,8 +59,8 @@ def checks() -> list[Check]:
     valve = whole_valve(damping=0.0, driver=peak_and_hold(end=0.6e-3))
     wet, dry = (_run(network, 1.6e-3, coarse=16) for network in (valve, valve.dry()))
     return [
-        _ledger("wet", wet, 1e-10),
-        _ledger("dry", dry, 2e-11),
+        _ledger("wet", wet, 1e-11),
+        _ledger("dry", dry, 5e-12),
         _sac(valve, wet),
         _momentum(dry),
         *_repeats(valve, wet),
@@ -235,7 +235,7 @@ def _rest() -> Check:
         "closed valve under spring and pressure, motion within 1 ms [m]",
         0.0,
         moved,
-        1e-11,
+        2e-12,
         "statics: the start is in equilibrium; its springs are pressed by 70 nm",
     )
 
