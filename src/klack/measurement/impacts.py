@@ -40,7 +40,8 @@ _SIGNIFICANT = 3.0  # standard errors of a rebound height that is seen
 _AGREES = 3.0  # standard errors within which nested stretches agree
 _UNDER_WAY = 0.15  # of the fastest speed before a touch: the flight to it has begun
 _OWN_NOISE = 60e-6  # [s] before a touch, from which the noise of an approach is taken
-_ROUNDS = 4  # of finding touch and release, each of which bounds the samples of the other
+_SHARE = 0.5  # of the guard, by which the samples of a flight may grow in one round
+_ROUNDS = 8  # of finding touch and release, each of which bounds the samples of the other
 _SHORTEST = 30e-6  # [s] stretch before a first touch
 _GROWTH = 1.25
 _FLOOR = 1e-6  # of the lift: no fit is better than this
@@ -232,7 +233,11 @@ def _fit_all(record: _Record, touches: tuple[Touch, ...]) -> list[_Ends | None]:
 
 
 def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
-    """Flight from a stop back to the same stop."""
+    """Flight from a stop back to the same stop.
+
+    Its samples reach to the release and touch that the fit to the former ones shows, a part of the
+    guard at a time: a fit to few samples knows neither well, and might take in the contact itself.
+    """
     t = record.time
     release, touch = float(t[before.index]), float(t[after.index])
     guard = min(record.smooth.half * (t[1] - t[0]) + record.settle, 0.2 * (touch - release))
@@ -240,7 +245,8 @@ def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
     for _ in range(_ROUNDS):
         if ends is None or ends.release is None or ends.touch is None:
             return ends
-        first, last = ends.release.time + record.settle, ends.touch.time
+        first = max(ends.release.time + record.settle, ends.flight.first - _SHARE * guard)
+        last = min(ends.touch.time, ends.flight.last + _SHARE * guard)
         middle = 0.5 * (release + touch)
         if not (release - guard < first < middle < last < touch + guard):
             return ends
@@ -248,7 +254,7 @@ def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
         if window is None or _same(window[0], ends.flight):
             return ends
         better = _whole(record, before.stop, first, last)
-        if better is None:
+        if better is None or better.release is None or better.touch is None:
             return ends
         ends = better
     return ends
