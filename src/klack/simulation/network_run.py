@@ -42,6 +42,7 @@ from klack.simulation.network_kernel import (
 from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import NetworkResult
+from klack.simulation.rest import resting_dissipation
 from klack.units import format_si
 
 __all__ = ["simulate_network"]
@@ -295,8 +296,12 @@ def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None
     interfaces.e[:] = interfaces.series * interfaces.force  # in equilibrium with the contacts
     closed = interfaces.gap + interfaces.e < 0.0
     interfaces.since[closed] = -np.inf
-    # approached by nothing: no loss until they open
-    interfaces.chi[:] = np.where(closed, _UNDAMPED, 0.0)
+    owner = {handle: row for row in network.rows.bodies for handle in row.ports}
+    for c, row in enumerate(network.rows.interfaces):
+        pair = (owner.get(row.upper), owner.get(row.lower))
+        chi = resting_dissipation(row, pair, -float(interfaces.gap[c] + interfaces.e[c]))
+        # 0 would be for "not touched yet"
+        interfaces.chi[c] = chi or (_UNDAMPED if closed[c] and interfaces.alpha[c] > 0.0 else 0.0)
 
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:

@@ -1,4 +1,4 @@
-"""How long two bodies have to lie on each other before their impact counts as over."""
+"""Two bodies that lie on each other: since when, and how much their contact damps."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from klack.contact.laws import ContactLaw
 from klack.network.rows import BodyRow, InterfaceRow
 
-__all__ = ["effective_mass", "longest_period", "rest_time"]
+__all__ = ["effective_mass", "longest_period", "rest_time", "resting_dissipation"]
 
 _PERIODS = 3.0
 _BOUNCES = 4.0
@@ -43,6 +43,36 @@ def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
         depth = _depth(row.law, 0.5 * mass * _SPEED**2)
         bounce = np.hypot(3.0 * depth / _SPEED, np.pi * np.sqrt(mass * row.series_compliance))
     return float(max(_PERIODS * longest_period(bodies), _BOUNCES * bounce))
+
+
+def resting_dissipation(
+    row: InterfaceRow, bodies: Sequence[BodyRow | None], indentation: float
+) -> float:
+    r"""Dissipation factor of a contact that nothing approached, held closed by a load [s/m].
+
+    Impact laws damp by :math:`\chi = \alpha / v` with the speed of approach :math:`v`.  A contact
+    that is closed from the start has none; it takes that of the impact that reaches as deep as the
+    load presses, :math:`m v^2 / 2 = V(d)`.  On a linear law small motions then have a damping ratio
+    of :math:`\alpha / 2`, whatever load, mass and stiffness.
+
+    Parameters
+    ----------
+    row : InterfaceRow
+    bodies : sequence of BodyRow or None
+        Upper and lower one; None is the ground.
+    indentation : float [m]
+        Of the law, by the load.
+
+    Returns
+    -------
+    float
+        0 without dissipation, while open, and where neither body can fly.
+    """
+    alpha = 0.0 if row.law is None else row.law.flat().dissipation
+    mass = effective_mass(bodies)
+    if row.law is None or alpha == 0.0 or indentation <= 0.0 or not np.isfinite(mass):
+        return 0.0
+    return float(alpha / np.sqrt(2.0 * row.law.potential(indentation) / mass))
 
 
 def longest_period(bodies: Sequence[BodyRow | None]) -> float:
