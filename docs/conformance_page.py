@@ -50,7 +50,7 @@ def page(run: Mapping[str, Any]) -> str:
     passed = sum(check["passed"] for check in checks)
     wide = sum(check["wide"] for check in checks)
     summary = f"{passed} of {len(checks)} checks passed" + (
-        f"; {wide} have a tolerance that is wide without a reason." if wide else "."
+        f"; without a reason given, a tolerance is wide in {wide}." if wide else "."
     )
     conditions = ", ".join(f"{name} {text}" for name, text in run["about"].items())
     head = _HEAD.format(summary=summary, conditions=conditions, largest=LARGEST_HEADROOM)

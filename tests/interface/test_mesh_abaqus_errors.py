@@ -164,8 +164,9 @@ def test_fault_is_located(tmp_path, text, message):
 def test_other_keywords_are_no_slips(tmp_path):
     rest = (
         "*HEADING\nplate\n*ORIENTATION, NAME=o\n1,0,0,0,1,0\n"
-        "*MATERIAL, NAME=m\n*ELASTIC\n2e11, .3\n*PLASTIC\n3e8, 0\n*DENSITY\n7850\n*EXPANSION\n1e-5\n*DAMPING, ALPHA=1\n"
-        "*AMPLITUDE, NAME=a\n0,0,1,1\n*BOUNDARY\n1, 1\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\n"
+        "*MATERIAL, NAME=m\n*ELASTIC\n2e11, .3\n*PLASTIC\n3e8, 0\n*DENSITY\n7850\n"
+        "*EXPANSION\n1e-5\n*DAMPING, ALPHA=1\n*AMPLITUDE, NAME=a\n0,0,1,1\n*BOUNDARY\n1, 1\n"
+        "*INITIAL CONDITIONS, TYPE=TEMPERATURE\n"
         "*STEP\n*STATIC\n*NODE PRINT\nU\n*EL PRINT\nS\n*NODE FILE\nU\n*END STEP\n"
     )
     (tmp_path / "x.inp").write_text(TET + rest)
