@@ -297,9 +297,9 @@ def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None
     closed = interfaces.gap + interfaces.e < 0.0
     interfaces.since[closed] = -np.inf
     owner = {handle: row for row in network.rows.bodies for handle in row.ports}
-    for c, row in enumerate(network.rows.interfaces):
-        pair = (owner.get(row.upper), owner.get(row.lower))
-        chi = resting_dissipation(row, pair, -float(interfaces.gap[c] + interfaces.e[c]))
+    for c, touching in enumerate(network.rows.interfaces):
+        pair = (owner.get(touching.upper), owner.get(touching.lower))
+        chi = resting_dissipation(touching, pair, -float(interfaces.gap[c] + interfaces.e[c]))
         # 0 would be for "not touched yet"
         interfaces.chi[c] = chi or (_UNDAMPED if closed[c] and interfaces.alpha[c] > 0.0 else 0.0)
 

@@ -235,7 +235,7 @@ def _rest() -> Check:
         "closed valve under spring and pressure, motion within 1 ms [m]",
         0.0,
         moved,
-        5e-13,
+        5e-14,
         "statics: the start is in equilibrium; its springs are pressed by 70 nm",
     )
 
