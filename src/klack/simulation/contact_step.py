@@ -193,6 +193,7 @@ def solve_step(
             excess = d1 - df + G * force
             step = excess / (1.0 + G * slope)
             last = curvature * step * step <= _FORCE_LEFT * force
+            last = last and _within(p, start, i, d0, d1 - step)  # another cubic beyond
         else:
             force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, d1, hint)
             excess = d1 - df + G * force

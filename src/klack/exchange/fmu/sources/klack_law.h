@@ -181,6 +181,7 @@ static double klack_solve_step(int kind, const double *p, double chi, double G, 
             step = excess / (1.0 + G * f.slope);
             last = (fabs(c[3]) + fabs(c[4]) * (d0 + 3.0 * d1 - 4.0 * c[0])) * step * step <=
                    KLACK_FORCE_LEFT * f.force;
+            last = last && klack_within(p, *hint, d0, d1 - step); /* another cubic beyond */
         } else {
             double deep = klack_largest(d0, d1);
             f = klack_damped_force(kind, p, chi, d0, d1, hint);
