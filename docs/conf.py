@@ -40,6 +40,7 @@ myst_dmath_double_inline = True  # $$...$$ in the middle of a paragraph
 napoleon_google_docstring = False
 napoleon_use_param = False  # types are words with shapes and units, not names to look up
 napoleon_use_rtype = False
+autodoc_default_options = {"exclude-members": "model_config, model_post_init"}  # of pydantic
 autodoc_typehints = "none"  # units and shapes stand in the text; types in the source beside it
 toc_object_entries = False  # thousands of names in every sidebar are no map
 maximum_signature_line_length = 88
