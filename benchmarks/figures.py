@@ -81,7 +81,8 @@ def _ratios(axes: Axes, numbers: Sequence[Number]) -> bool:
     axes.set_xscale("log")
     axes.set_xlim(min(0.3, min(values) / 2.0), 4.0 * max(values))
     for place, value in enumerate(values):
-        axes.text(value * 1.08, place, f"{value:.3g}", va="center", fontsize=8)
+        text = f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+        axes.text(value * 1.08, place, text, va="center", fontsize=8)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_xlabel("time of the other program over that of klack, at equal accuracy")
     axes.tick_params(axis="y", labelsize=8)
