@@ -27,6 +27,7 @@ _LINEAR, _HERTZ, _TABLE = LAW_LINEAR, LAW_HERTZ, LAW_TABLE
 _FORCE_LEFT = 1e-11  # accepted error of a force over the force
 _STEP_LEFT = 3e-7  # last Newton step over the indentation; what is left of the force is its square
 _NEWTON_LIMIT = 60
+_TOUCH = 1e-150  # [m] that a contact is closed by at least; the squares of less are no numbers
 
 
 @njit(cache=True, inline="always")
@@ -122,7 +123,7 @@ def mean_force(
     kind: int, p: Vector, start: int, d0: float, d1: float, hint: int
 ) -> tuple[float, float, int]:
     """Mean force between two indentations, its slope over ``d1``, and the table interval."""
-    if d0 <= 0.0 and d1 <= 0.0:
+    if d0 <= _TOUCH and d1 <= _TOUCH:
         return 0.0, 0.0, hint
     if kind == _LINEAR:
         k = p[start]
@@ -144,6 +145,8 @@ def mean_force(
 @njit(cache=True)
 def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     """Closed form of the elastic step for ``F = k d``: both closed, release, onset."""
+    if d0 <= _TOUCH and df <= _TOUCH:
+        return 0.0
     a = 1.0 + 0.5 * G * k
     if d0 >= 0.0:
         if df >= 0.5 * G * k * d0:
@@ -178,7 +181,7 @@ def solve_step(
 
     Returns the force, the table interval, and the part of the work ``F (d1 - d0)`` that is lost.
     """
-    if d0 <= 0.0 and df <= 0.0:
+    if d0 <= _TOUCH and df <= _TOUCH:
         return 0.0, hint, 0.0
     if kind == _LINEAR and chi_over_h == 0.0:
         return solve_linear(p[start], G, d0, df), hint, 0.0

@@ -13,6 +13,7 @@ enum { KLACK_NO_LAW = -1, KLACK_LINEAR = 0, KLACK_HERTZ = 1, KLACK_TABLE = 2 };
 
 #define KLACK_FORCE_LEFT 1e-11 /* accepted error of a force over the force */
 #define KLACK_STEP_LEFT 3e-7   /* last Newton step over the indentation */
+#define KLACK_TOUCH 1e-150     /* [m] that a contact is closed by at least; squares of less are 0 */
 
 typedef struct {
     double force, slope;
@@ -106,7 +107,7 @@ static klack_force klack_table_mean(const double *p, double d0, double d1, int *
 /* mean force between two indentations, and its slope over the second */
 static klack_force klack_mean_force(int kind, const double *p, double d0, double d1, int *hint) {
     klack_force f = {0.0, 0.0};
-    if (d0 <= 0.0 && d1 <= 0.0) return f;
+    if (d0 <= KLACK_TOUCH && d1 <= KLACK_TOUCH) return f;
     if (kind == KLACK_LINEAR) {
         double k = p[0], high = klack_largest(d0, d1);
         if (d0 >= 0.0 && d1 >= 0.0) {
@@ -135,6 +136,7 @@ static klack_force klack_mean_force(int kind, const double *p, double d0, double
 /* closed form of the elastic step for F = k d: both closed, release, onset */
 static double klack_solve_linear(double k, double G, double d0, double df) {
     double a = 1.0 + 0.5 * G * k, b = df + d0, c, root, d1;
+    if (d0 <= KLACK_TOUCH && df <= KLACK_TOUCH) return 0.0;
     if (d0 >= 0.0) {
         if (df >= 0.5 * G * k * d0) return 0.5 * k * (d0 + df) / a;
         c = d0 * (df - 0.5 * G * k * d0);
@@ -169,7 +171,7 @@ static double klack_solve_step(int kind, const double *p, double chi, double G, 
     double low = -INFINITY, high = df, d1 = df - G * guess;
     klack_force f = {0.0, 0.0};
     int turn;
-    if (d0 <= 0.0 && df <= 0.0) return 0.0;
+    if (d0 <= KLACK_TOUCH && df <= KLACK_TOUCH) return 0.0;
     if (kind == KLACK_LINEAR && chi == 0.0) return klack_solve_linear(p[0], G, d0, df);
     for (turn = 0; turn < 60; turn++) {
         double excess, step;
