@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from time import perf_counter
 from typing import Literal
 
@@ -189,6 +190,8 @@ def _advance(
     step: float,
     block: int,
     allow_coarse: bool,
+    *,
+    settle: bool = False,
 ) -> None:
     report = np.zeros(3)
     status = run_network(
@@ -199,7 +202,7 @@ def _advance(
         block,
         step,
         allow_coarse,
-        False,
+        settle,
         network.bodies,
         network.elements,
         network.branches,
@@ -239,35 +242,12 @@ def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None
     bodies, _ = compile_bodies(network.rows.bodies, (step, step))
     own = interface_compliance(bodies, network.interfaces.upper, network.interfaces.lower)
     interfaces = network.interfaces._replace(G=own)
-    report, ports = np.zeros(3), slice(Y0, Y0 + bodies.first.size - 1)
+    still = replace(network, bodies=bodies, interfaces=interfaces)
+    ports = slice(Y0, Y0 + bodies.first.size - 1)
     for look in range(_SETTLE_LOOKS + 1):
         before = bodies.at[ports].copy()
         clock = np.array([0, -1, 0, 0], dtype=np.int64)
-        status = run_network(
-            _SETTLE_STEPS,
-            1,
-            0,
-            clock,
-            1,
-            step,
-            False,
-            True,
-            bodies,
-            network.elements,
-            network.branches,
-            network.nodes,
-            network.lines,
-            network.line_state,
-            network.line_books,
-            interfaces,
-            recording,
-            _scratch(network, recording),
-            network.books,
-            network.book_kind,
-            report,
-        )
-        if status != STATUS_DONE:
-            raise _failure(network, status, report)
+        _advance(still, recording, clock, _SETTLE_STEPS, 1, 0, step, 1, False, settle=True)
         way = float(np.max(np.abs(bodies.at[ports] - before), initial=0.0))
         if way <= _SETTLED * float(np.max(np.abs(bodies.at[ports]), initial=0.0)):
             break
