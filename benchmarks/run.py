@@ -1,4 +1,4 @@
-"""Everything that klack promises about speed, measured: ``uv run python benchmarks/run.py``.
+"""Everything that klack promises about speed, measured: ``uv run --group dev python benchmarks/run.py``.
 
 Each part is a file of this folder and runs in a process of its own, so that its peak memory is its
 own.  Results of former runs are not used: the cache of results is off.

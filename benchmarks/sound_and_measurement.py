@@ -1,4 +1,4 @@
-"""Measured strokes and sound: ``uv run python benchmarks/sound_and_measurement.py``.
+"""Measured strokes and sound: ``uv run --group dev python benchmarks/sound_and_measurement.py``.
 
 - *restitution*: of noisy bouncing records (1 um, sensor of 50 kHz), three sets of 16 records each;
 - *calibrate*: five parameters from the ten shipped synthetic strokes, with their hidden values;

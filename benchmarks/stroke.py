@@ -1,6 +1,6 @@
 """A whole stroke: nanoseconds per step, wall time of 10 ms, step sizes, CVODE beside it.
 
-``uv run python benchmarks/stroke.py`` prints all tables; ``--json FILE`` also writes
+``uv run --group dev python benchmarks/stroke.py`` prints all tables; ``--json FILE`` also writes
 ``{name: {value, unit, goal}}``; ``--only speed``, ``steps``, ``cvode`` or ``books`` takes one part.
 
 The valve (:mod:`klack.verification.whole_valve`) has 20 + 40 + 20 modes, two end stops, each a

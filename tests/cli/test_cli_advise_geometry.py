@@ -12,6 +12,8 @@ import pytest
 from klack.case.reader import load_case
 from klack.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 PLUNGER = Path(__file__).parents[2] / "docs/tutorials/files/plunger.inp"
 
 HEAD = """\

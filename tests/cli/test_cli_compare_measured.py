@@ -112,6 +112,7 @@ def test_dry_impacts_have_the_restitution_of_the_case(result, tmp_path):
         assert impact["restitution_measured"] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_an_offset_is_a_residual_until_the_sensor_has_it(result, tmp_path):
     away = 3e-6
     path = record(result, tmp_path / "strokes.csv", offset=away)

@@ -83,6 +83,7 @@ def trapezoid(steps, A, P, c, softness, gap, push, q, v):
     return forces, energies
 
 
+@pytest.mark.slow
 def test_without_payment_the_energy_would_wander():
     """The same step written down again, without the payment of what touching points gain."""
     model, step = free_rod(10, stiffness=1e9), 40e-9
@@ -110,6 +111,7 @@ def test_without_payment_the_energy_would_wander():
     )
 
 
+@pytest.mark.slow
 def test_a_ball_bounces_a_hundred_times():
     """Sphere on a floor under twenty times its weight, both elastic and undamped."""
     ball, floor, space = sphere_over_cylinder(
@@ -132,6 +134,7 @@ def test_a_ball_bounces_a_hundred_times():
     assert height == pytest.approx(0.3**2 / (2 * 20 * 9.81), rel=2e-2)  # the floor rings a little
 
 
+@pytest.mark.slow
 def test_two_crowned_ends_between_two_plates():
     """Tilted block of finite elements, 40 um of play, twenty impacts."""
     bodies, contacts = block_between_plates(40e-6)
@@ -182,6 +185,7 @@ def momenta(items, v):
     return linear, angular
 
 
+@pytest.mark.slow
 def test_two_free_blocks_keep_linear_and_angular_momentum():
     """Crowned, off axis, tilted, sliding and spinning: conserved to round-off."""
     a, b, space = free_blocks()
@@ -208,6 +212,7 @@ def test_two_free_blocks_keep_linear_and_angular_momentum():
     assert np.abs(turned).max() > 0.5 * np.abs(own).max()  # there was something to exchange
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "speed"),
     [

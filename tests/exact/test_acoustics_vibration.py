@@ -54,7 +54,8 @@ def test_a_force_that_has_always_acted_moves_nothing() -> None:
     assert run.stored == pytest.approx(np.full(501, run.energy_before), rel=1e-12)
     assert abs(run.injected_energy) < 1e-12 * run.energy_before
     assert run.blocked_force.values == pytest.approx(np.full(500, 80.0), rel=1e-9)
-    assert run.vibration_energy < 1e-20 * run.energy_before
+    # the terms of the loss, each up to the stored energy, cancel in each of the 500 intervals
+    assert abs(run.vibration_energy) < 500 * np.finfo(float).eps * run.energy_before
 
 
 @pytest.mark.parametrize("below", ["mount", "plate", "both"])

@@ -29,6 +29,7 @@ def modal_motion(omega, q, v, force, t):
     return np.where(omega[:, None] > 0, swing, q + v * t + 0.5 * f * t**2)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(
     seed=st.integers(0, 100_000),

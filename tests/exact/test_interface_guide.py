@@ -39,6 +39,7 @@ def move(model, guide, velocity, duration, **more):
     )
 
 
+@pytest.mark.slow
 def test_inside_of_the_clearance_nothing_happens(needle):
     guide = lateral_guide(needle, clearance=CLEARANCE, stiffness=STIFFNESS, friction=0.5)
 

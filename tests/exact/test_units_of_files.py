@@ -141,6 +141,7 @@ def step_in_unit(text: str, unit: str) -> str:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["m", "inch"])
 def test_a_drawing_in_another_unit_is_the_same_body(unit, tmp_path):
     """The same mesh, node by node: points to 1e-15 leave netgen its decisions.

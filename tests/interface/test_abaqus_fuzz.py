@@ -134,6 +134,7 @@ FLOODS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("raw", FLOODS.values(), ids=FLOODS.keys())
 def test_floods_take_no_memory(tmp_path, raw):
     (tmp_path / "x.inp").write_bytes(raw)

@@ -38,6 +38,7 @@ def run() -> ModuleType:
     return import_module("run")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", PARTS)
 def test_part(part, run):
     if part == "calculix" and shutil.which("ccx") is None:
@@ -81,6 +82,7 @@ def test_all_parts_are_tested(run):
     assert all((BENCHMARKS / f"{part}.py").exists() for part in tested)
 
 
+@pytest.mark.slow
 def test_run_leaves_numbers_figures_and_a_page(run, tmp_path, capsys):
     out = tmp_path / "out"
 

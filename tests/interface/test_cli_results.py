@@ -89,6 +89,7 @@ def test_levels_come_from_the_case_if_none_are_asked_for(asked):
     assert asked.levels == ("reduced", "full")
 
 
+@pytest.mark.slow
 def test_demo_runs_the_shipped_valve(asked, quick_report, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)

@@ -126,6 +126,7 @@ def test_without_compiler_the_text_says_what_to_install(monkeypatch, tmp_path):
         build_fmu(MODELS["dry"], tmp_path / "it.fmu", fmi=1)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("x86_64-w64-mingw32-gcc") is None, reason="no mingw")
 @pytest.mark.parametrize(("fmi", "folder"), [(2, "win64"), (3, "x86_64-windows")])
 def test_windows_library_beside_the_linux_one(fmi, folder, tmp_path):

@@ -46,6 +46,7 @@ def names(folder: Path) -> list[str]:
 # --------------------------------------------------------------------------- every single operation
 
 
+@pytest.mark.slow
 def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path: Path):
     found = crashes("small", str(tmp_path / "small"))
 
@@ -357,6 +358,7 @@ def test_a_folder_takes_the_place_of_a_file_and_of_a_link(tmp_path: Path):
     assert names(tmp_path / "elsewhere") == []
 
 
+@pytest.mark.slow
 def test_rival_writers_and_a_reader(tmp_path: Path):
     """What is read is one result, whichever; a reader that is always too late says so."""
     program = [sys.executable, str(DATA / "rival_writers.py"), str(tmp_path), f"{3 * LONGER}"]

@@ -60,6 +60,7 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_a_folder_that_may_only_be_read(result: Path, tmp_path: Path):
     """Every command that writes says so before it computes."""
     closed = tmp_path / "closed"
@@ -165,6 +166,7 @@ def test_a_report_without_room_keeps_the_result(tmp_path: Path, monkeypatch, cap
     assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["result.zarr"]
 
 
+@pytest.mark.slow
 def test_no_home_and_no_folder_for_temporary_files(result: Path, tmp_path: Path):
     """The report needs temporary files; the result is kept without them."""
     nowhere = str(tmp_path / "nowhere")
@@ -206,6 +208,7 @@ def shell(text: str, folder: Path, **env: str) -> "subprocess.CompletedProcess[s
     )
 
 
+@pytest.mark.slow
 def test_streams_that_are_closed_or_full(result: Path, tmp_path: Path):
     closed = shell(f"klack export '{result}' --to csv --out a >&- 2>&- <&-", tmp_path)
     assert closed.returncode == 0
@@ -217,6 +220,7 @@ def test_streams_that_are_closed_or_full(result: Path, tmp_path: Path):
     assert "Exception ignored" not in full.stderr
 
 
+@pytest.mark.slow
 def test_terminals_without_umlauts_and_odd_names(result: Path, tmp_path: Path):
     shutil.copytree(result, tmp_path / "-ä ö ü")
     plain = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0", "COLUMNS": "20"}

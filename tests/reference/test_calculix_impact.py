@@ -30,9 +30,12 @@ from klack.verification.lattice import lattice_mesh
 from klack.workflow.problem import build_problem
 from klack.workflow.progress import silent
 
-pytestmark = pytest.mark.skipif(
-    find_calculix() is None, reason="CalculiX is not installed (apt-get install calculix-ccx)"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        find_calculix() is None, reason="CalculiX is not installed (apt-get install calculix-ccx)"
+    ),
+]
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 STORED = Path(__file__).parents[1] / "data" / "calculix_bars.dat"

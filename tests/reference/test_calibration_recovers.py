@@ -13,6 +13,8 @@ from klack.measurement.fit_window import FitWindow
 from klack.measurement.stroke_set import MeasuredStroke
 from klack.workflow.calibration import _repeatable, run_calibration
 
+pytestmark = pytest.mark.slow
+
 
 def calibrate(strokes, text=TEXT, **options):
     return run_calibration(tree_of(text), strokes, workers=1, **options)

@@ -26,4 +26,4 @@ def test_python_example_of_the_readme():
 def test_readme_has_exactly_two_commands_for_setting_up():
     section = README.read_text().split("## Two commands")[1].split("\n## ")[0]
     blocks = re.findall(r"```\n(.*?)\n```", section, re.DOTALL)
-    assert blocks == ["pip install uv && uv run klack demo", "uv run pytest"]
+    assert blocks == ["pip install uv && uv run klack demo", "uv run --group dev pytest"]

@@ -22,7 +22,10 @@ from klack.workflow.progress import silent
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
+]
 
 HOST = Path(__file__).parents[1] / "data" / "fmu_host.c"
 WINDOWS_COMPILER = "x86_64-w64-mingw32-gcc"
@@ -237,6 +240,7 @@ def test_bare_c_program_gives_the_native_peak(impact, tmp_path):
     assert velocity == pytest.approx(impact.native.velocity[-1, 0], rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which(WINDOWS_COMPILER) is None, reason="no mingw")
 @pytest.mark.skipif(shutil.which("wine") is None, reason="no wine")
 def test_windows_binary_gives_the_native_peak(impact, tmp_path, monkeypatch):

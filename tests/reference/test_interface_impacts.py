@@ -20,6 +20,8 @@ from klack.verification.impacts import STEEL, bulk_wave_speed
 from klack.verification.interface_bodies import free_rod, modal_model, reduce_bodies
 from klack.verification.interface_impacts import blocked_bar_model, hertz_impact, two_spheres
 
+pytestmark = pytest.mark.slow
+
 SPEED = 0.5
 
 

@@ -31,6 +31,7 @@ def compared(request, model):
     return wet, reference, [model.by_klack(rows, step=float(step))[0] for step in STEPS]
 
 
+@pytest.mark.slow
 def test_reference_does_not_depend_on_its_tolerance(model):
     loose, tight = (model.by_cvode(wet=True, rtol=rtol) for rtol in (1e-10, 1e-11))
 

@@ -35,6 +35,8 @@ import pytest
 
 from klack.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).parents[2] / "docs" / "tutorials"
 
 RELATIVE, LAST_DIGITS = 0.01, 2.0

@@ -88,6 +88,7 @@ def test_levels_are_named_by_what_they_are_and_the_best_is_the_reference():
     assert labels["reduced-attachment"] == "reduced, 20 + 40 modes, attachment modes, 1000 N/um"
 
 
+@pytest.mark.slow
 def test_two_rods_follow_wave_theory():
     """St Venant: plateau rho c A v / 2 until 2 L / c of the short rod; restitution 0.5."""
     study = study_of("two-rods", "reduced", "full")
@@ -128,6 +129,7 @@ def test_reduced_models_of_other_programs_follow_wave_theory_and_the_exact_rods(
     assert difference < 1e-4 * own.force.max()  # five decimals, 100 periods of the highest mode
 
 
+@pytest.mark.slow
 def test_sphere_on_rod_is_near_zener():
     """Zener's curve for a thin rod: the 8 mm rod under a 4 mm sphere is not quite thin."""
     study = study_of("sphere-on-rod", "reduced", "full")
@@ -159,6 +161,7 @@ def zener_restitution(inelasticity: float) -> float:
     return -rate
 
 
+@pytest.mark.slow
 def test_needle_of_another_program_runs():
     """Momentum: J = m (v_before + v_after), and the mass is that of the drawing."""
     study = study_of("needle-from-inp", "reduced")
@@ -171,6 +174,7 @@ def test_needle_of_another_program_runs():
     assert 0.5 < result.measures.restitution < 1.0
 
 
+@pytest.mark.slow
 def test_solid_demo_valve_reduced():
     """The demo: enough degrees of freedom, an energy ledger that closes, a plausible rebound."""
     study = study_of("demo-valve", "reduced")
@@ -185,6 +189,7 @@ def test_solid_demo_valve_reduced():
     assert 0.8 < result.measures.restitution < 1.0
 
 
+@pytest.mark.slow
 def test_shots_of_the_guided_valve():
     """On a coarse mesh.  Truth: momentum, and a throw against the spring that closes."""
     path = shipped_cases()["demo-shots"]
