@@ -240,7 +240,6 @@ def test_bare_c_program_gives_the_native_peak(impact, tmp_path):
     assert velocity == pytest.approx(impact.native.velocity[-1, 0], rel=1e-10)
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which(WINDOWS_COMPILER) is None, reason="no mingw")
 @pytest.mark.skipif(shutil.which("wine") is None, reason="no wine")
 def test_windows_binary_gives_the_native_peak(impact, tmp_path, monkeypatch):
