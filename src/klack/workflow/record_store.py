@@ -21,7 +21,8 @@ import numpy as np
 import zarr
 
 from klack.errors import InputError
-from klack.whole_file import in_exchange, standing, whole_file
+from klack.uninterrupted import uninterrupted
+from klack.whole_file import completed, in_exchange, whole_file
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 
@@ -64,7 +65,7 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     Path
         Of the store.
     """
-    with whole_file(folder / RESULT_NAME) as new:
+    with whole_file(folder / RESULT_NAME) as new, uninterrupted():  # zarr writes in threads
         root = zarr.open_group(new, mode="w", zarr_format=3)
         root.attrs.put({"format": form.name, "format_version": form.version})
         _write(root, "study", record, form.units)
@@ -159,7 +160,7 @@ def _find(folder: Path) -> tuple[Path, tuple[int, int]]:
     if folder.name == RESULT_NAME:
         folder = folder.absolute().parent
     for _ in range(_TRIES):
-        for path in (standing(folder, RESULT_NAME), folder / RESULT_NAME, folder):
+        for path in (completed(folder) / RESULT_NAME, folder):
             try:
                 if (path / "zarr.json").is_file():
                     state = path.stat()
