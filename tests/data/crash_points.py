@@ -1,8 +1,8 @@
 """Crash a process at every operation on files that it does, one after another.
 
 ``python crash_points.py small FOLDER EVERY`` or ``python crash_points.py WORDS FOLDER COUNT``; a
-program of its own, since it forks.  A child works in FOLDER and is gone, without a word and unflushed,
-just before its n-th operation (opening for writing, mkdir, rename, link, unlink, rmdir, truncate).
+program of its own, since it forks.  A child works in FOLDER and is gone, without a word and
+unflushed, just before its n-th operation (opening for writing, mkdir, rename, link, unlink, ...).
 For the small work n runs over all operations; for a command of klack, given as a JSON list of
 words, over COUNT of them: half of these spread over the run, half at its very end.  Prints one JSON
 object: how many operations there are, and what is found after each crash.

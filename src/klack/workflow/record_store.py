@@ -6,6 +6,8 @@ a Zarr reader would silently take for zeros, and one of each group finds damaged
 """
 
 import json
+import os
+import stat
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -21,6 +23,7 @@ import numpy as np
 import zarr
 
 from klack.errors import InputError
+from klack.own_file import kind_of
 from klack.uninterrupted import uninterrupted
 from klack.whole_file import completed, in_exchange, whole_file
 
@@ -145,11 +148,24 @@ def stored_format(folder: Path) -> str:
 
 
 def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
+    _require_plain_files(path)
     try:
         root = zarr.open_group(path, mode="r", zarr_format=3)
         return root, dict(root.attrs)
     except Exception as error:  # zarr raises its own, json's and the file system's kinds
         raise _damaged(path, f"a store that does not open ({error})") from error
+
+
+def _require_plain_files(path: Path) -> None:
+    """Refuse links, which lead out of the store, and pipes, which wait for ever."""
+    for place, folders, files in os.walk(path):
+        for name in (*folders, *files):
+            try:
+                state = Path(place, name).lstat()
+            except FileNotFoundError:  # replaced at this moment
+                continue
+            if stat.S_IFMT(state.st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
+                raise _damaged(path, f"{kind_of(state)} in it, {str(Path(place, name))!r}")
 
 
 def _find(folder: Path) -> tuple[Path, tuple[int, int]]:
