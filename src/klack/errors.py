@@ -6,6 +6,7 @@ __all__ = [
     "ConvergenceError",
     "InputError",
     "KlackError",
+    "LeftAloneWarning",
     "MissingExtraError",
     "require_nonnegative",
     "require_positive",
@@ -53,6 +54,10 @@ class AccuracyWarning(UserWarning):
 
 class CacheWarning(UserWarning):
     """Results are not kept for later runs; those of this run are not affected."""
+
+
+class LeftAloneWarning(UserWarning):
+    """Something looks like a file of klack and is not; it is neither read, moved nor removed."""
 
 
 class MissingExtraError(KlackError, ImportError):

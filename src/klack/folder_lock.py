@@ -1,72 +1,63 @@
-"""Locks on files and folders that the system gives back when a process ends, however it ends.
+"""Locks that no other user can hold, and that the system gives back however a process ends.
+
+Whoever may read a file can lock it.  So nothing is locked but files and folders that klack has made
+for its user alone: of a folder of results, a hidden file in it that goes when the lock is given
+back.  Users do not keep each other out.
 
 No process number is stored: one may come again, and a folder may be shared by containers that
-count their processes apart.  The lock is that of ``flock``, on the file or folder itself, so that
-no file of its own is left behind.  It only keeps klack from klack.
+count their processes apart.
 """
 
 import errno
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 
-__all__ = ["FolderLock", "locked", "try_lock"]
+from klack.errors import InputError
+from klack.held_folder import HeldFolder
+from klack.own_file import caller
+
+__all__ = ["LOCK_NAME", "locked", "own_lock_name", "try_lock"]
+
+LOCK_NAME = ".klack-lock"
+"""What the names of lock files begin with."""
 
 _PATIENCE = 30.0  # s; what is done under a lock takes milliseconds
 _PAUSE = 0.01  # s
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class FolderLock:
-    """A lock that this process has until it closes it or ends.
+def try_lock(handle: int | None) -> bool | None:
+    """Lock an open file or folder until it is closed.
 
-    Parameters
-    ----------
-    handle : int or None
-        Of the open file; None where folders cannot be opened.
-    certain : bool
-        False on file systems and systems that know no such locks: then nobody is kept out, and
-        nothing is known of other processes.
-    """
-
-    handle: int | None
-    certain: bool
-
-    def close(self) -> None:
-        """Give the lock back."""
-        if self.handle is not None:
-            os.close(self.handle)
-
-
-def try_lock(path: Path) -> FolderLock | None:
-    """Lock a file or folder that exists; None while another process has it.
-
-    Raises
-    ------
-    OSError
-        If there is no such file or folder, or it may not be opened.
+    Returns
+    -------
+    bool or None
+        True if this process has the lock, False if another one has it; None on systems and file
+        systems that know no such locks: then nobody is kept out, and nothing is known of others.
     """
     try:
         import fcntl
     except ImportError:  # not on Windows
-        return FolderLock(handle=None, certain=False)
-    handle = os.open(path, os.O_RDONLY)
+        return None
+    if handle is None:
+        return None
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        os.close(handle)
-        return None
+        return False
     except OSError:  # some network file systems
-        return FolderLock(handle=handle, certain=False)
-    return FolderLock(handle=handle, certain=True)
+        return None
+    return True
 
 
 @contextmanager
-def locked(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
-    """Do something while no other process has the lock on ``path``; wait for it.
+def locked(folder: HeldFolder, patience: float = _PATIENCE) -> Iterator[None]:
+    """Do something while no other process of this user does so in this folder; wait for it.
+
+    Where a lock cannot be had, since there is none or something of somebody else has its name,
+    nobody is kept out.
 
     Raises
     ------
@@ -74,11 +65,47 @@ def locked(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
         If another process does not give it back within ``patience`` [s].
     """
     end = time.monotonic() + patience
-    while (lock := try_lock(path)) is None:
+    while (lock := _lock_file(folder, own_lock_name())) is None:
         if time.monotonic() > end:
-            raise OSError(errno.EBUSY, "another process writes to it and does not end", str(path))
+            raise OSError(
+                errno.EBUSY, "another process writes to it and does not end", str(folder.path)
+            )
         time.sleep(_PAUSE)
     try:
         yield
     finally:
-        lock.close()
+        if lock.handle is not None:
+            with suppress(OSError):
+                folder.remove(own_lock_name())
+            os.close(lock.handle)
+
+
+def own_lock_name() -> str:
+    """Name of the lock file of the caller in any folder."""
+    return f"{LOCK_NAME}-{caller()}"
+
+
+@dataclass(frozen=True, slots=True)
+class _LockFile:
+    """A locked file; no handle where no lock is to be had."""
+
+    handle: int | None
+
+
+def _lock_file(folder: HeldFolder, name: str) -> _LockFile | None:
+    """Make and lock the file; None while another process has it."""
+    try:
+        handle = folder.open_own_file(name, os.O_RDWR | os.O_CREAT)
+    except (OSError, InputError):  # a folder that may only be read, or something planted
+        return _LockFile(None)
+    taken = try_lock(handle)
+    if taken:
+        state = folder.state(name)
+        if state is not None and os.path.samestat(state, os.fstat(handle)):
+            return _LockFile(handle)
+    os.close(handle)  # locked by another, or removed by the one that had the lock
+    if taken is None:
+        with suppress(OSError):
+            folder.remove(name)
+        return _LockFile(None)
+    return None

@@ -1,34 +1,35 @@
 """Files and folders of files that are either complete or as they were before.
 
-New files are written into a hidden folder ``.klack-...`` beside their place, the *stage*:
+New files are written into a hidden folder beside their place (:mod:`klack.stage`):
 
-1. ``new/`` is filled, and the disk is told to keep it (fsync), since a power cut may otherwise
+1. they are filled in, and the disk is told to keep them (fsync), since a power cut may otherwise
    leave the new name with an empty file behind it;
-2. one rename turns ``new/`` into ``ready/``: from here on the new files count;
-3. what is replaced moves to ``old/``, what is new to its place, and the stage goes.
+2. one rename makes them *ready*: from here on they count;
+3. what is replaced moves out of the way, what is new to its place, and the stage goes.
 
-A process that is killed before step 2 changes nothing.  Killed after it, its stage is read in the
-place of the files themselves (:func:`standing`), and the next that writes into the folder brings
-step 3 to its end.  Stages of dead processes are removed then; those of living ones are locked.
+A process that is killed before step 2 changes nothing.  Killed after it, the next klack of the same
+user that reads or writes the folder brings step 3 to its end first (:func:`completed`), unless
+somebody has replaced the files since.  What stands in the folder is the one truth for all readers:
+nothing is ever read from a stage.
 """
 
-import errno
 import os
-import shutil
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkdtemp
 
-from klack.errors import InputError
-from klack.folder_lock import FolderLock, locked, try_lock
+from klack.errors import InputError, LeftAloneWarning
+from klack.folder_lock import LOCK_NAME, locked
+from klack.held_folder import HeldFolder, Mark, synchronise
+from klack.stage import PREFIX, Stage, dead_stage, is_stage_content, name_outdated
+from klack.uninterrupted import uninterrupted
 
-__all__ = ["in_exchange", "outdated", "standing", "whole_file", "whole_files"]
+__all__ = ["completed", "in_exchange", "mark_of", "outdated", "whole_file", "whole_files"]
 
 Refusal = Callable[[Path, OSError], InputError]
 
-_STAGE = ".klack-"
-_NEW, _READY, _OLD, _GONE = "new", "ready", "old", "gone"
+_MOST_NAMED = 3
 
 
 @contextmanager
@@ -52,18 +53,24 @@ def whole_file(path: Path, refuse: Refusal | None = None) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_files(folder: Path, refuse: Refusal | None = None) -> Iterator[Path]:
+def whole_files(
+    folder: Path, refuse: Refusal | None = None, beside: Mapping[str, Mark] | None = None
+) -> Iterator[Path]:
     """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
 
     Files and folders of the same names are replaced, everything else in ``folder`` stays, but for
     names given to :func:`outdated`.  Folders that were made for it go again where nothing came into
     them.  Of two processes that write the same names, the one that ends last stays, as a whole.
+    Ctrl-C is held back while files move and stages are made and removed.
 
     Parameters
     ----------
     folder : Path
     refuse : callable, optional
         Turns the error of the system into that of the caller.
+    beside : mapping of str to mark, optional
+        Files that must still be there (:func:`mark_of`) when the new ones move; nothing moves
+        where another process has replaced one of them.
 
     Raises
     ------
@@ -71,175 +78,125 @@ def whole_files(folder: Path, refuse: Refusal | None = None) -> Iterator[Path]:
         If the place cannot be written to.
     """
     made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
-    stage: Path | None = None
-    lock: FolderLock | None = None
+    held: HeldFolder | None = None
+    stage: Stage | None = None
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with locked(folder):
-            _clear(folder)
-            stage = Path(mkdtemp(prefix=_STAGE, dir=folder))
-            lock = try_lock(stage)
-            (stage / _NEW).mkdir()
-        yield stage / _NEW
-        if not _inside_a_stage(folder):
-            _keep(stage)
-        with locked(folder):
-            _clear(folder)
-            (stage / _NEW).rename(stage / _READY)
-            if not _inside_a_stage(folder):
-                _synchronise(stage)
-            _move(stage, folder)
-        if not _inside_a_stage(folder):
-            _synchronise(folder)
+        with uninterrupted():
+            folder.mkdir(parents=True, exist_ok=True)
+            held = HeldFolder(folder)
+            _complete(held)
+            stage = Stage(held)
+        yield stage.content
+        if not is_stage_content(folder):  # the outer stage looks after the disk
+            _keep(stage.content)
+        with uninterrupted():
+            _complete(held)
+            with locked(held):
+                stage.put(beside or {})
     except OSError as error:
-        if _inside_a_stage(folder):  # the outer stage knows the name that the user gave
+        if is_stage_content(folder):  # the outer stage knows the name that the user gave
             raise
         raise (refuse or _refuse)(folder, error) from error
     finally:
-        if stage is not None and not (stage / _READY).is_dir():
-            shutil.rmtree(stage, ignore_errors=True)
-        if lock is not None:
-            lock.close()
-        for path in made:  # innermost first; stays if the results are inside
-            try:
-                path.rmdir()
-            except OSError:
-                break
+        with uninterrupted():
+            if stage is not None:
+                stage.remove()
+                stage.close()
+            if held is not None:
+                held.close()
+            for path in made:  # innermost first; stays if the results are inside
+                try:
+                    path.rmdir()
+                except OSError:
+                    break
 
 
 def outdated(stage: Path, names: Iterable[str]) -> None:
     """Let files of these names go from the folder when the contents of the stage come into it."""
-    gone = stage.parent / _GONE
-    gone.mkdir(exist_ok=True)
-    for name in names:
+    gone = tuple(names)
+    for name in gone:
         (stage / name).unlink(missing_ok=True)
-        (gone / name).touch()
+    name_outdated(stage, gone)
 
 
-def standing(folder: Path, name: str) -> Path:
-    """Where a file or folder of a name stands, also if its writer was killed while it moved it."""
+def completed(folder: Path) -> Path:
+    """The folder, once files that a killed klack of this user had ready are in their place."""
     try:
-        stages = sorted(folder.glob(f"{_STAGE}*/{_READY}/{name}"))
+        with HeldFolder(folder) as held, uninterrupted():
+            _complete(held)
+    except OSError:  # it is not there, or may only be read: what stands there counts
+        pass
+    return folder
+
+
+def mark_of(path: Path) -> Mark | None:
+    """What tells a file or folder from others that have or had its name; None if there is none."""
+    try:
+        state = path.lstat()
     except OSError:
-        stages = []
-    return stages[0] if stages else folder / name
+        return None
+    return state.st_ino, state.st_mtime_ns
 
 
 def in_exchange(folder: Path) -> bool:
     """Tell whether somebody writes into a folder at this moment, or was killed while he did."""
     try:
-        return any(True for _ in folder.glob(f"{_STAGE}*"))
+        return any(True for _ in folder.glob(f"{PREFIX}*"))
     except OSError:
         return True
 
 
-# --------------------------------------------------------------------------- moving
+def _complete(folder: HeldFolder) -> None:
+    """Bring what killed processes of this user left to its end; name what looks like it."""
+    if not _stage_names(folder):
+        return
+    with locked(folder):
+        found = {name: _brought_to_end(folder, name) for name in _stage_names(folder)}
+    left = [f"{name!r} ({reason})" for name, reason in found.items() if reason]
+    if left:
+        more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
+        warnings.warn(
+            f"{str(folder.path)!r} holds what no klack of yours has made there; it is left alone: "
+            f"{', '.join(left[:_MOST_NAMED])}{more}. Remove it if you know it.",
+            LeftAloneWarning,
+            stacklevel=4,
+        )
 
 
-def _move(stage: Path, folder: Path) -> None:
-    """Bring what is ready to its place; all of it, or nothing where the system refuses one part.
+def _stage_names(folder: HeldFolder) -> list[str]:
+    return [
+        name
+        for name in folder.names()
+        if name.startswith(PREFIX) and not name.startswith(LOCK_NAME)
+    ]
 
-    It may have begun before, and goes on then.
-    """
-    ready, old = stage / _READY, stage / _OLD
-    old.mkdir(exist_ok=True)
-    done: list[str] = []
+
+def _brought_to_end(folder: HeldFolder, name: str) -> str | None:
+    """Finish and remove a stage whose process is dead; why it is left alone, if it is none."""
     try:
-        for item in sorted(ready.iterdir()):
-            done.append(item.name)
-            _exchange(item, folder / item.name, old / item.name)
-        gone = stage / _GONE
-        for name in sorted(path.name for path in gone.iterdir()) if gone.is_dir() else ():
-            (folder / name).unlink(missing_ok=True)
-    except BaseException:  # also Ctrl-C
-        for name in reversed(done):
-            _take_back(ready / name, folder / name, old / name)
-        ready.rename(stage / _NEW)
-        raise
-    ready.rmdir()
-
-
-def _exchange(new: Path, target: Path, old: Path) -> None:
-    """Move a file or folder to its place, and what was there to ``old``."""
-    if os.path.lexists(target):
-        if not _is_folder(target) and not _is_folder(new):
-            _second_name(target, old)
-        else:
-            target.rename(old)
-    os.replace(new, target)
-
-
-def _second_name(target: Path, old: Path) -> None:
-    """Keep a file under ``old`` as well: its name is never without a file."""
-    old.unlink(missing_ok=True)
-    try:
-        os.link(target, old, follow_symlinks=False)
-    except (OSError, NotImplementedError):  # no such links on this file system, or of this user
-        target.rename(old)
-
-
-def _take_back(new: Path, target: Path, old: Path) -> None:
-    if not os.path.lexists(new) and os.path.lexists(target):
-        target.rename(new)
-    if os.path.lexists(old):
-        if os.path.lexists(target) and os.path.samestat(old.lstat(), target.lstat()):
-            old.unlink()  # the new one did not come: both names are of the old file
-        else:
-            os.replace(old, target)
-
-
-def _is_folder(path: Path) -> bool:
-    return path.is_dir() and not path.is_symlink()
-
-
-def _clear(folder: Path) -> None:
-    """Bring what killed processes left to its end; the folder is locked."""
-    for stage in sorted(folder.glob(f"{_STAGE}*")):
-        if not _is_folder(stage):
-            continue
-        try:
-            lock = try_lock(stage)
-        except OSError:  # of another user
-            continue
-        if lock is None:  # its process lives
-            continue
-        try:
-            if lock.certain:
-                if (stage / _READY).is_dir():
-                    _move(stage, folder)
-                shutil.rmtree(stage, ignore_errors=True)
-        finally:
-            lock.close()
-
-
-# --------------------------------------------------------------------------- the disk
-
-
-def _inside_a_stage(folder: Path) -> bool:
-    """Tell whether the outer stage looks after the disk."""
-    return folder.name == _NEW and folder.parent.name.startswith(_STAGE)
+        found = dead_stage(folder, name)
+        if not isinstance(found, Stage):
+            return found
+        with found:
+            found.finish()
+            found.remove()
+    except FileNotFoundError:  # removed by its own process at this moment
+        return None
+    except OSError as error:
+        return error.strerror or str(error)
+    return None
 
 
 def _keep(folder: Path) -> None:
     """Have everything below a folder on the disk."""
     for place, _, files in os.walk(folder, topdown=False):
-        for name in files:
-            _synchronise(Path(place, name))
-        _synchronise(Path(place))
-
-
-def _synchronise(path: Path) -> None:
-    try:
-        handle = os.open(path, os.O_RDONLY)
-    except (IsADirectoryError, PermissionError):  # Windows opens no folders
-        return
-    try:
-        os.fsync(handle)
-    except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):  # not on this file system
-            raise
-    finally:
-        os.close(handle)
+        for path in (*(Path(place, name) for name in files), Path(place)):
+            with suppress(IsADirectoryError, PermissionError):  # Windows opens no folders
+                handle = os.open(path, os.O_RDONLY)
+                try:
+                    synchronise(handle)
+                finally:
+                    os.close(handle)
 
 
 def _refuse(path: Path, error: OSError) -> InputError:

@@ -212,7 +212,7 @@ def test_several_levels_in_one_option(words, monkeypatch):
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
-        (KeyboardInterrupt(), 130, "klack impact: stopped; nothing was written."),
+        (KeyboardInterrupt(), 130, "klack impact: stopped; nothing half written is left."),
         (ConvergenceError("the contact did not settle in 50 rounds"), 1, "50 rounds"),
         (InputError("mesh", got="a", expected="b", hint="c"), 2, "mesh: got a, expected b."),
         (MemoryError(), 2, "memory"),

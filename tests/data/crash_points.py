@@ -1,8 +1,8 @@
 """Crash a process at every operation on files that it does, one after another.
 
-``python crash_points.py small FOLDER`` or ``python crash_points.py WORDS FOLDER COUNT``; a program
-of its own, since it forks.  A child works in FOLDER and is gone, without a word and unflushed,
-just before its n-th operation (opening for writing, mkdir, rename, link, unlink, rmdir, truncate).
+``python crash_points.py small FOLDER EVERY`` or ``python crash_points.py WORDS FOLDER COUNT``; a
+program of its own, since it forks.  A child works in FOLDER and is gone, without a word and
+unflushed, just before its n-th operation (opening for writing, mkdir, rename, link, unlink, ...).
 For the small work n runs over all operations; for a command of klack, given as a JSON list of
 words, over COUNT of them: half of these spread over the run, half at its very end.  Prints one JSON
 object: how many operations there are, and what is found after each crash.
@@ -19,6 +19,7 @@ from pathlib import Path
 CRASHED = 99
 OPERATIONS = {
     *("os.mkdir", "os.rename", "os.link", "os.symlink", "os.remove", "os.rmdir", "os.truncate"),
+    "klack.swap_names",
 }
 os.fsync = lambda handle: None  # type: ignore[assignment]  # matters to power cuts, not to crashes
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
@@ -81,11 +82,14 @@ def put(folder: Path, word: str) -> None:
 
 def seen(folder: Path) -> list[str]:
     """Words that a reader finds."""
-    from klack.whole_file import standing
+    from klack.whole_file import completed
 
-    places = [standing(folder, "store") / "a", standing(folder, "store") / "b"]
-    places.append(standing(folder, "page"))
-    return sorted({place.read_text() for place in places})
+    return in_place(completed(folder), "store/a", "store/b", "page")
+
+
+def in_place(folder: Path, *names: str) -> list[str]:
+    """Words that stand there, also for those who may not finish what another user began."""
+    return sorted({(folder / name).read_text() for name in names})
 
 
 def fresh(folder: Path) -> None:
@@ -99,32 +103,34 @@ def litter(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def small(folder: Path) -> dict:
-    """Crash at every point, and at every point of the next run after each of these crashes."""
+def small(folder: Path, every: int) -> dict:
+    """Crash at every point, and after some of these crashes at every point of the next run."""
     fresh(folder)
     total = forked(lambda: put(folder, "new"), None)[1]
     rows = []
     for n in range(total):
         fresh(folder)
         code = forked(lambda: put(folder, "new"), n)[0]
+        store, page = in_place(folder, "store/a", "store/b"), in_place(folder, "page")
         found = seen(folder)
-        kept = Path(f"{folder}-kept")
-        shutil.rmtree(kept, ignore_errors=True)
-        shutil.copytree(folder, kept, symlinks=True)
         put(folder, "newer")
         row = {"at": n, "code": code, "found": found, "next": seen(folder), "left": litter(folder)}
-        row["twice"] = twice(folder, kept)
+        row |= {"store": store, "page": page}
+        row["twice"] = [] if n % every else twice(folder, n)
         rows.append(row)
     return {"operations": total, "rows": rows}
 
 
-def twice(folder: Path, kept: Path) -> list[str]:
-    """Words found after a second crash anywhere in the run that follows a first one."""
+def twice(folder: Path, first: int) -> list[str]:
+    """Words found after a second crash anywhere in the run that follows one with a first crash.
+
+    The first crash is done again each time: stages of a copied folder are not those of klack.
+    """
     found: set[str] = set()
     n, code = 0, CRASHED
     while code == CRASHED:
-        shutil.rmtree(folder)
-        shutil.copytree(kept, folder, symlinks=True)
+        fresh(folder)
+        forked(lambda: put(folder, "new"), first)
         code = forked(lambda: put(folder, "newer"), n)[0]
         words = seen(folder)
         found.add("+".join(words))
@@ -227,7 +233,7 @@ def main(arguments: list[str]) -> None:
     folder = Path(arguments[1])
     folder.mkdir(parents=True, exist_ok=True)
     if arguments[0] == "small":
-        found = small(folder)
+        found = small(folder, int(arguments[2]))
     else:
         words = json.loads(arguments[0])
         warm()

@@ -11,14 +11,15 @@ the rest                the arrays, one after the other
 ======================  ==========================================================
 
 No Python objects are stored, so reading runs no code.  Sizes are compared with the length of the
-file before memory is taken.  The checksum finds damage by chance, not a forger who may write to the
-folder.
+file before memory is taken.  The checksum finds damage by chance, not a forger: of a
+folder that others may write to, only files of the caller and of the administrator are read.
 """
 
 import hashlib
 import json
 import math
 import os
+import stat
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from klack.own_file import SAFELY, caller
 
 __all__ = ["DamagedEntry", "Entry", "read_entry", "write_entry"]
 
@@ -83,11 +86,12 @@ def read_entry(path: Path, key: str) -> Entry:
     Raises
     ------
     DamagedEntry
-        If the file is cut off, changed, of another program or of another key.
+        If the file is cut off, changed, of another program or of another key, a link or a pipe, or
+        if another user has written it or may do so: its numbers would count as klack's own.
     OSError
         If it cannot be read.
     """
-    with path.open("rb") as file:
+    with os.fdopen(_open_trusted(path), "rb") as file:
         size = os.fstat(file.fileno()).st_size
         prefix = file.read(_PREFIX)
         if len(prefix) < _PREFIX or not prefix.startswith(_MAGIC):
@@ -104,6 +108,17 @@ def read_entry(path: Path, key: str) -> Entry:
         if digest.digest() != prefix[len(_MAGIC) : -8]:
             raise DamagedEntry("its checksum is wrong")
     return entry
+
+
+def _open_trusted(path: Path) -> int:
+    """Handle of a file that the caller or the administrator has written, and nobody else can."""
+    handle = os.open(path, os.O_RDONLY | SAFELY)
+    state = os.fstat(handle)
+    trusted = caller() is None or state.st_uid in (caller(), 0)
+    if stat.S_ISREG(state.st_mode) and trusted and not state.st_mode & 0o022:
+        return handle
+    os.close(handle)
+    raise DamagedEntry("not a file of the caller alone")
 
 
 def _fill(file: BufferedReader, header: Any, key: str, left: int, digest: Any) -> Entry:

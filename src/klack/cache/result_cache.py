@@ -70,7 +70,7 @@ class ResultCache:
                 self.served[kind] += 1
         if entry is not None:
             with suppress(OSError):
-                os.utime(path)  # used just now
+                os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)  # used
         return entry
 
     def store(self, key: str, entry: Entry) -> None:
@@ -131,7 +131,8 @@ class ResultCache:
             return
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with suppress(OSError):  # tells backups to leave it out
-            (self.folder / "CACHEDIR.TAG").write_text(_TAG, encoding="ascii")
+            with (self.folder / "CACHEDIR.TAG").open("x", encoding="ascii") as file:
+                file.write(_TAG)
 
     def _files(self) -> Iterator[tuple[Path, int, float]]:
         """Files of ours, with size [byte] and time of the last use [s]."""

@@ -19,7 +19,6 @@ from klack.cli.options import (
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
-from klack.cli.stopping import stop_code
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
@@ -93,8 +92,8 @@ def calibrate(
         text = calibrated_text(tree, study, folder)
         (stage / CALIBRATED_NAME).write_text(text, encoding="utf-8")
 
-    try:
-        with show_progress(quiet) as progress:
+    with show_progress(quiet) as progress:
+        try:
             measured = load_stroke_set(
                 measurement,
                 checked.measurement,
@@ -111,12 +110,14 @@ def calibrate(
                 progress=progress,
                 threads=threads,
             )
-            failure = write_result(study, folder, save, report=report, progress=progress)
-    except KeyboardInterrupt as stop:
-        kept = f"{TRIAL_LOG.count(folder)} computed strokes are kept in {folder / TRIAL_LOG.file}"
-        print(f"klack calibrate: stopped; {kept}, the same command goes on.", file=sys.stderr)
-        return stop_code(stop)
-    TRIAL_LOG.remove(folder)
+        except KeyboardInterrupt as stop:
+            count = TRIAL_LOG.count(folder)
+            kept = f"{count} computed strokes are kept in {folder / TRIAL_LOG.file}"
+            stop.add_note(f"{kept}, the same command goes on.")
+            raise
+        failure = write_result(
+            study, folder, save, report=report, progress=progress, unfinished=TRIAL_LOG
+        )
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")

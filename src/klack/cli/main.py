@@ -44,7 +44,13 @@ from klack.cli import (
 from klack.cli.printable import printable
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import close_quietly, in_words, prepare_compiling, prepare_streams
-from klack.errors import AccuracyWarning, CacheWarning, ConvergenceError, KlackError
+from klack.errors import (
+    AccuracyWarning,
+    CacheWarning,
+    ConvergenceError,
+    KlackError,
+    LeftAloneWarning,
+)
 
 __all__ = ["app", "main"]
 
@@ -99,7 +105,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         text = "the memory of this machine is used up.\nTry: larger elements, or fewer modes."
         return _complain(f"{name}: {text}", EXIT_BAD_INPUT)
     except KeyboardInterrupt as stop:
-        return _complain(f"{name}: stopped; nothing was written.", stop_code(stop))
+        kept = " ".join(getattr(stop, "__notes__", ())) or "nothing half written is left."
+        return _complain(f"{name}: stopped; {kept}", stop_code(stop))
     except BrokenPipeError:
         # the reader of our output went away (klack schema | head); python would complain at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -114,7 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str], name: str) -> int:
     def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-        if issubclass(category, (AccuracyWarning, CacheWarning)):
+        if issubclass(category, (AccuracyWarning, CacheWarning, LeftAloneWarning)):
             print(printable(f"{name}: note: {message}"), file=sys.stderr)
         else:
             usual(message, category, *place, **more)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from klack.errors import InputError
+from klack.held_folder import Mark
+from klack.own_file import caller, kind_of
 from klack.whole_file import whole_file, whole_files
 
 __all__ = [
@@ -35,11 +38,30 @@ def require_file_target(option: str, path: Path | None) -> None:
         return
     if path.is_dir():
         raise _refuse(option, path, "a folder", "the name of a file")
+    if (planted := _planted(path)) is not None:
+        raise _refuse(option, path, planted, "a file, or a place for one")
     if not path.absolute().parent.is_dir():
         raise _refuse(option, path, "a file in a folder that does not exist", "an existing folder")
     target = path if path.exists() else path.absolute().parent
     if not os.access(target, os.W_OK):
         raise _refuse(option, path, "a place that may not be written to", "a writable file")
+
+
+def _planted(path: Path) -> str | None:
+    """What another user has put there for klack to write through; None if there is no such thing.
+
+    A link that is merely replaced by the new file does no harm.
+    """
+    try:
+        state = path.lstat()
+        through = path.exists() and not path.is_file()
+    except OSError:
+        return None
+    if not through or not (stat.S_ISLNK(state.st_mode) or stat.S_ISFIFO(state.st_mode)):
+        return None
+    if caller() in (None, state.st_uid) or state.st_uid == 0:
+        return None
+    return f"{kind_of(state)} of another user (number {state.st_uid})"
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
@@ -48,16 +70,27 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     if str(path) == "-":
         sys.stdout.write(text)
         return
-    if path.exists() and not path.is_file():  # /dev/stdout, a named pipe
-        path.write_text(text, encoding="utf-8")
-        return
 
     def refuse(place: Path, error: OSError) -> InputError:
         reason = error.strerror or str(error)
         return _refuse("--json", place, f"an error: {reason}", "a writable file")
 
+    if path.exists() and not path.is_file():  # /dev/stdout, a named pipe
+        try:
+            _write_to_stream(path, text)
+        except OSError as error:
+            raise refuse(path, error) from error
+        return
     with whole_file(path, refuse) as new:
         new.write_text(text, encoding="utf-8")
+
+
+def _write_to_stream(path: Path, text: str) -> None:
+    """Write to a device or a named pipe, of which somebody must read already."""
+    handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+    os.set_blocking(handle, True)
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
 
 
 def require_folder(folder: Path) -> None:
@@ -78,17 +111,18 @@ def listing(names: Iterable[str]) -> str:
 
 
 @contextmanager
-def staged_folder(folder: Path) -> Iterator[Path]:
+def staged_folder(folder: Path, beside: Mapping[str, Mark] | None = None) -> Iterator[Path]:
     """Give a hidden folder whose contents move to ``folder`` when all of them are complete.
 
     What stands in ``folder`` under the same names is replaced, everything else there stays.
+    Nothing moves where one of the files in ``beside`` was replaced meanwhile.
     """
 
     def refuse(path: Path, error: OSError) -> InputError:
         reason = error.strerror or str(error)
         return _refuse("--out", path, f"an error: {reason}", "a folder to write to")
 
-    with whole_files(folder, refuse) as stage:
+    with whole_files(folder, refuse, beside) as stage:
         yield stage
 
 

@@ -24,13 +24,14 @@ def report(
     quiet: Quiet = False,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
-    from klack.cli.reports import REPORTS, write_reports
+    from klack.cli.reports import REPORTS, beside_result, write_reports
     from klack.cli.stored import load_stored
 
     folder = out if out is not None else result
+    beside = beside_result(folder) if folder.absolute() == result.absolute() else {}
     study = load_stored(result)
     require_folder(folder)
-    with staged_folder(folder) as stage:
+    with staged_folder(folder, beside) as stage:
         write_reports(study, stage)
     if not quiet:
         print(f"Report in {folder}: {', '.join(REPORTS)}")

@@ -11,7 +11,6 @@ from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_t
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
-from klack.cli.stopping import stop_code
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
@@ -78,8 +77,8 @@ def shots(
     from klack.workflow.shots_store import save_shots
     from klack.workflow.shots_summary import shots_to_json
 
-    try:
-        with show_progress(quiet) as progress:
+    with show_progress(quiet) as progress:
+        try:
             study = run_shots(
                 checked,
                 count=count,
@@ -89,12 +88,13 @@ def shots(
                 progress=progress,
                 threads=threads,
             )
-            failure = write_result(study, folder, save_shots, report=report, progress=progress)
-    except KeyboardInterrupt as stop:
-        kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
-        print(f"klack shots: stopped; {kept}, the same command goes on.", file=sys.stderr)
-        return stop_code(stop)
-    SHOT_LOG.remove(folder)
+        except KeyboardInterrupt as stop:
+            kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
+            stop.add_note(f"{kept}, the same command goes on.")
+            raise
+        failure = write_result(
+            study, folder, save_shots, report=report, progress=progress, unfinished=SHOT_LOG
+        )
     if not quiet:
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")

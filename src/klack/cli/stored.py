@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from klack.whole_file import standing
+from klack.whole_file import completed
 
 if TYPE_CHECKING:
     from klack.report.study_content import Study
@@ -13,7 +13,7 @@ __all__ = ["is_result", "load_stored"]
 
 def is_result(path: Path) -> bool:
     """Tell a folder with a result, or a store itself, from a case."""
-    return standing(path, "result.zarr").is_dir() or (path / "zarr.json").is_file()
+    return (completed(path) / "result.zarr").is_dir() or (path / "zarr.json").is_file()
 
 
 def load_stored(result: Path) -> "Study":

@@ -6,6 +6,8 @@ a Zarr reader would silently take for zeros, and one of each group finds damaged
 """
 
 import json
+import os
+import stat
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -21,7 +23,9 @@ import numpy as np
 import zarr
 
 from klack.errors import InputError
-from klack.whole_file import in_exchange, standing, whole_file
+from klack.own_file import kind_of
+from klack.uninterrupted import uninterrupted
+from klack.whole_file import completed, in_exchange, whole_file
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 
@@ -64,7 +68,7 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     Path
         Of the store.
     """
-    with whole_file(folder / RESULT_NAME) as new:
+    with whole_file(folder / RESULT_NAME) as new, uninterrupted():  # zarr writes in threads
         root = zarr.open_group(new, mode="w", zarr_format=3)
         root.attrs.put({"format": form.name, "format_version": form.version})
         _write(root, "study", record, form.units)
@@ -144,11 +148,24 @@ def stored_format(folder: Path) -> str:
 
 
 def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
+    _require_plain_files(path)
     try:
         root = zarr.open_group(path, mode="r", zarr_format=3)
         return root, dict(root.attrs)
     except Exception as error:  # zarr raises its own, json's and the file system's kinds
         raise _damaged(path, f"a store that does not open ({error})") from error
+
+
+def _require_plain_files(path: Path) -> None:
+    """Refuse links, which lead out of the store, and pipes, which wait for ever."""
+    for place, folders, files in os.walk(path):
+        for name in (*folders, *files):
+            try:
+                state = Path(place, name).lstat()
+            except FileNotFoundError:  # replaced at this moment
+                continue
+            if stat.S_IFMT(state.st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
+                raise _damaged(path, f"{kind_of(state)} in it, {str(Path(place, name))!r}")
 
 
 def _find(folder: Path) -> tuple[Path, tuple[int, int]]:
@@ -159,7 +176,7 @@ def _find(folder: Path) -> tuple[Path, tuple[int, int]]:
     if folder.name == RESULT_NAME:
         folder = folder.absolute().parent
     for _ in range(_TRIES):
-        for path in (standing(folder, RESULT_NAME), folder / RESULT_NAME, folder):
+        for path in (completed(folder) / RESULT_NAME, folder):
             try:
                 if (path / "zarr.json").is_file():
                     state = path.stat()

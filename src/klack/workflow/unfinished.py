@@ -8,8 +8,10 @@ a crash, and all behind it, is cut off and computed again.
 import json
 import os
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
+from io import FileIO
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -17,7 +19,8 @@ import klack
 from klack.case.bodies import CaseBody
 from klack.closing import Closing
 from klack.errors import InputError
-from klack.folder_lock import FolderLock, try_lock
+from klack.folder_lock import try_lock
+from klack.own_file import open_own_file
 
 __all__ = ["LogForm", "UnfinishedLog", "fingerprint"]
 
@@ -51,20 +54,27 @@ class LogForm(Generic[Key, Part]):
 
     def count(self, folder: Path) -> int:
         """How many finished parts the file in a folder holds."""
-        path = folder / self.file
-        return max(path.read_bytes().count(b"\n") - 1, 0) if path.is_file() else 0
+        try:
+            handle = open_own_file(folder / self.file, os.O_RDONLY)
+        except (OSError, InputError):
+            return 0
+        with os.fdopen(handle, "rb") as file:
+            return max(sum(line.endswith(b"\n") for line in file) - 1, 0)
 
     def remove(self, folder: Path) -> None:
         """Remove the file: the work is complete and stored elsewhere."""
         path = folder / self.file
         try:
-            lock = try_lock(path)
-            if lock is None:  # another process goes on with the same work
-                return
-            path.unlink(missing_ok=True)
-            lock.close()
-        except OSError:  # it is not there, or stays: the same command finds everything in it
+            handle = open_own_file(path, os.O_RDONLY)
+        except (OSError, InputError):  # it is not there, or none of klack's
             return
+        try:
+            if try_lock(handle) is not False:  # else another process goes on with the same work
+                path.unlink(missing_ok=True)
+        except OSError:  # it stays: the same command finds everything in it
+            return
+        finally:
+            os.close(handle)
 
 
 class UnfinishedLog(Closing, Generic[Key, Part]):
@@ -85,19 +95,18 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
         self.form = form
         self.done: dict[Key, Part] = {}
         self.path = folder / form.file if folder is not None else None
-        self._lock: FolderLock | None = None
+        self._file: FileIO | None = None
         if self.path is None:
             return
         header = (json.dumps({"format": form.format, "fingerprint": mark}) + "\n").encode()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = self._own(self.path)
-            with self.path.open("rb") as file:
-                known = file.read(len(header)) == header
-            if known:
-                self._take_over(self.path, self.path.read_bytes().split(b"\n"))
+            self._file = file = self._own(self.path)
+            if file.read(len(header)) == header:
+                self._take_over(file)
             else:
-                self.path.write_bytes(header)
+                file.truncate(0)
+                _append(file, header)
         except OSError as error:
             self.close()
             raise self._refuse(self.path, error) from error
@@ -107,9 +116,9 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
 
     def close(self) -> None:
         """Let other processes have the file."""
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def add(self, key: Key, part: Part) -> None:
         """Keep a finished part.
@@ -120,22 +129,25 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             If it cannot be written; what was written before is kept.
         """
         self.done[key] = part
-        if self.path is None:
+        if self.path is None or self._file is None:
             return
         try:
-            with self.path.open("ab") as file:
-                file.write(self.form.line(key, part).encode() + b"\n")
-                file.flush()
-                os.fsync(file.fileno())
+            _append(self._file, self.form.line(key, part).encode() + b"\n")
         except OSError as error:
             raise self._refuse(self.path, error) from error
 
-    def _own(self, path: Path) -> FolderLock:
-        """Lock the file, which is made if it is not there."""
+    def _own(self, path: Path) -> FileIO:
+        """Open and lock the file, which is made if it is not there; writing goes to its end.
+
+        Everything is done through this one handle: what stands under the name later is not ours.
+        """
         while True:
-            path.open("ab").close()
-            lock = try_lock(path)
-            if lock is None:
+            try:
+                handle = _opened(path)
+            except FileExistsError:  # and it went at this moment
+                continue
+            if try_lock(handle) is False:
+                os.close(handle)
                 raise InputError(
                     str(path),
                     got="a file that another klack writes to",
@@ -143,23 +155,22 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
                     hint="wait for it, or give this one another folder with --out.",
                 )
             try:
-                if lock.handle is None or path.stat().st_ino == os.fstat(lock.handle).st_ino:
-                    return lock
+                if os.path.samestat(path.lstat(), os.fstat(handle)):
+                    return FileIO(handle, "r+")
             except FileNotFoundError:  # removed by the one that had the lock
                 pass
-            lock.close()
+            os.close(handle)
 
-    def _take_over(self, path: Path, lines: list[bytes]) -> None:
+    def _take_over(self, file: FileIO) -> None:
         """Read what an earlier run left, up to the first damaged line, and cut off the rest."""
-        whole = len(lines[0]) + 1
-        for line in lines[1:-1]:  # what follows the last end of line was cut off
+        whole = file.tell()
+        for line in file.read().split(b"\n")[:-1]:  # what follows the last end of line was cut off
             found = self.form.read(line)
             if found is None:
                 break
             self.done[found[0]] = found[1]
             whole += len(line) + 1
-        with path.open("r+b") as file:
-            file.truncate(whole)
+        file.truncate(whole)
 
     def _refuse(self, path: Path, error: OSError) -> InputError:
         return InputError(
@@ -169,6 +180,30 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             hint="check the folder given to --out and the space that is left; the same command "
             "goes on from what is there.",
         )
+
+
+def _append(file: FileIO, data: bytes) -> None:
+    """Write all of it, and have it on the disk."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[file.write(rest) :]
+    os.fsync(file.fileno())
+
+
+def _opened(path: Path) -> int:
+    """Handle of the file, for the caller alone: who can read a file can lock it."""
+    flags = os.O_RDWR | os.O_APPEND
+    try:
+        return open_own_file(path, flags | os.O_CREAT | os.O_EXCL)
+    except FileExistsError as there:
+        try:
+            handle = open_own_file(path, flags)
+        except FileNotFoundError:
+            raise there from None
+    if hasattr(os, "fchmod"):
+        with suppress(OSError):  # some file systems know no modes
+            os.fchmod(handle, 0o600)
+    return handle
 
 
 def fingerprint(bodies: Iterable[CaseBody], parts: Iterable[bytes]) -> str:

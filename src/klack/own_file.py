@@ -1,0 +1,103 @@
+"""Files that klack opens again: regular files of the caller, never a link, a pipe or a planted one.
+
+In a folder that others may write to, a name that klack expects may be a symbolic link to a file of
+the caller, a named pipe that waits for ever, or a second name (hard link) of something else.
+"""
+
+import os
+import stat
+from pathlib import Path
+
+from klack.errors import InputError
+
+__all__ = ["SAFELY", "caller", "kind_of", "open_own_file", "require_own_file"]
+
+SAFELY = (
+    getattr(os, "O_NOFOLLOW", 0)
+    | getattr(os, "O_NONBLOCK", 0)
+    | getattr(os, "O_CLOEXEC", 0)
+    | getattr(os, "O_BINARY", 0)
+)
+"""Flags that follow no link and wait for no pipe."""
+_PRIVATE = 0o600
+
+
+def caller() -> int | None:
+    """Number of the user whose rights this process has; None where the system has no such."""
+    return os.geteuid() if hasattr(os, "geteuid") else None
+
+
+def open_own_file(path: Path | str, flags: int, *, folder: int | None = None) -> int:
+    """Open a regular file of the caller, or make it, readable by the caller alone.
+
+    Parameters
+    ----------
+    path : Path or str
+        Its last part is not followed if it is a link.
+    flags : int
+        Of ``os.open``; with ``os.O_CREAT`` it is made if it is not there.  What is made here
+        (``os.O_EXCL``) is of the caller, also where the file system shows another user.
+    folder : int, optional
+        Open folder that a relative path starts at.
+
+    Returns
+    -------
+    int
+        Handle.
+
+    Raises
+    ------
+    InputError
+        For a link, a pipe, a folder, a device, a file of another user or one with a second name.
+    OSError
+        If it is not there or may not be opened.
+    """
+    try:
+        handle = os.open(path, flags | SAFELY, _PRIVATE, dir_fd=folder)
+    except OSError:
+        try:
+            state = os.stat(path, dir_fd=folder, follow_symlinks=False)
+        except OSError:
+            state = None
+        if state is not None:
+            require_own_file(path, state)
+        raise
+    try:
+        if not flags & os.O_EXCL:
+            require_own_file(path, os.fstat(handle))
+    except BaseException:
+        os.close(handle)
+        raise
+    return handle
+
+
+def require_own_file(path: Path | str, state: os.stat_result) -> None:
+    """Raise :class:`InputError` unless the state is that of a regular file of the caller."""
+    got = None
+    if not stat.S_ISREG(state.st_mode):
+        got = kind_of(state)
+    elif caller() not in (None, state.st_uid):
+        got = f"a file of another user (number {state.st_uid})"
+    elif state.st_nlink > 1:
+        got = f"a file that has {state.st_nlink} names (hard links)"
+    if got is not None:
+        raise InputError(
+            os.fspath(path),
+            got=got,
+            expected="a regular file of your own, or none",
+            hint="somebody else may have put it there: look at it, then remove it, or give another "
+            "folder.",
+        )
+
+
+def kind_of(state: os.stat_result) -> str:
+    """What stands at a name, in words."""
+    kinds = {
+        stat.S_IFLNK: "a symbolic link",
+        stat.S_IFIFO: "a named pipe",
+        stat.S_IFSOCK: "a socket",
+        stat.S_IFDIR: "a folder",
+        stat.S_IFCHR: "a device",
+        stat.S_IFBLK: "a device",
+    }
+    return kinds.get(stat.S_IFMT(state.st_mode), "a file")
