@@ -7,6 +7,7 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 from threadpoolctl import threadpool_limits
@@ -83,7 +84,10 @@ def functions(version: int) -> list[str]:
 
 @pytest.fixture(scope="session")
 def spring_damper_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Build an FMU with F = -k x - c v; it fails when a step is forgotten or done twice."""
+    """Build an FMU with F = -k x - c v; it fails when a step is forgotten or done twice.
+
+    ``fault="abort()"`` does that after 4 us, ``at_load="abort()"`` while it is loaded.
+    """
     fmpy = pytest.importorskip("fmpy")
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
@@ -91,11 +95,12 @@ def spring_damper_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[...,
     headers = Path(fmpy.__file__).parent / "c-code"
     source = SOURCE.read_text()
 
-    def build(version: int = 2, *, length: str = "m", variable: bool = True) -> Path:
-        path = folder / f"spring_{version}_{length}_{variable}.fmu"
+    def build(version: int = 2, *, length: str = "m", variable: bool = True, **does: str) -> Path:
+        wrong = "".join(f"_{crc32(f'{key}{value}'.encode()):x}" for key, value in does.items())
+        path = folder / f"spring_{version}_{length}_{variable}{wrong}.fmu"
         if path.exists():
             return path
-        library = folder / f"spring_damper_{version}.so"
+        library = folder / f"spring_damper_{version}{wrong}.so"
         if not library.exists():
             missing = folder / f"missing_{version}.c"
             missing.write_text(
@@ -106,6 +111,7 @@ def spring_damper_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[...,
                 )
             )
             command = ["gcc", "-shared", "-fPIC", "-O1", f"-DFMI={version}", f"-I{headers}"]
+            command += [f"-D{key.upper()}={value}" for key, value in does.items()]
             files = [str(SOURCE), str(missing), "-o", str(library)]
             subprocess.run([*command, *files, "-lm"], check=True)
         place = fmpy.platform if version == 2 else fmpy.platform_tuple

@@ -1,8 +1,11 @@
 /* Spring and damper as a co-simulation FMU, F = -k x - c v, with an inner clock.
-   Compile with -DFMI=2 or -DFMI=3.  Variables: 0 time, 1 x, 2 v, 3 F, 4 k, 5 c, 6 steps. */
+   Compile with -DFMI=2 or -DFMI=3; -DFAULT=statement does something wrong after 4 us, -DAT_LOAD=
+   statement while the library is loaded.  Variables: 0 time, 1 x, 2 v, 3 F, 4 k, 5 c, 6 steps. */
 
 #include <stdlib.h>
 #include <math.h>
+#include <signal.h>
+#include <unistd.h>
 
 #if FMI == 2
 #include "fmi2Functions.h"
@@ -19,6 +22,10 @@ enum { OK = fmi3OK, FAILED = fmi3Error };
 typedef struct {
     double value[7];
 } Model;
+
+#ifdef AT_LOAD
+__attribute__((constructor)) static void at_load(void) { AT_LOAD; }
+#endif
 
 static void *create(void) {
     Model *m = calloc(1, sizeof(Model));
@@ -50,6 +57,9 @@ static Status step(Instance c, double t, double h) {
     if (fabs(m->value[0] - t) > 1e-12 || !(h > 0.0) || !isfinite(m->value[1])) return FAILED;
     m->value[0] = t + h;
     m->value[6] += 1.0;
+#ifdef FAULT
+    if (t > 4e-6) { FAULT; }
+#endif
     return OK;
 }
 

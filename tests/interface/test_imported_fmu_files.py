@@ -133,7 +133,7 @@ def test_an_fmu_that_gives_up_stops_the_run(spring_damper_fmu: Build):
     assert status == -1
     (error,) = row.step.errors
     assert isinstance(error, ConvergenceError)
-    assert "failed in its step at" in str(error)
+    assert "the FMU failed (fmi2DoStep gave the status 3, error), in its step from" in str(error)
 
 
 def test_a_run_cannot_go_on_from_a_stored_state(spring_damper_fmu: Build):

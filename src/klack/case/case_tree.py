@@ -1,6 +1,6 @@
 """A case as it was written, with single values exchanged and the whole checked again."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,8 @@ from typing import Any
 from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.valve import ValveCase
 from klack.input.problem import Key
+from klack.network.component import Component
+from klack.network.own_component import component_word
 
 __all__ = ["CaseTree", "exchanged", "read_case_tree"]
 
@@ -22,12 +24,15 @@ class CaseTree:
     text : str
     data : mapping
     lines : Lines
+    components : tuple of type
+        Of the user's own, that the case may name.
     """
 
     path: Path
     text: str
     data: Any
     lines: Lines
+    components: tuple[type[Component], ...] = ()
 
     def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
         """Check the case with other values at some keys that it has.
@@ -40,14 +45,15 @@ class CaseTree:
         data = self.data
         for key, value in (values or {}).items():
             data = exchanged(data, key, value)
-        return validated(ValveCase, self.text, self.path, data, self.lines)
+        own = {component_word(kind): kind for kind in self.components}
+        return validated(ValveCase, self.text, self.path, data, self.lines, own)
 
 
-def read_case_tree(path: Path) -> CaseTree:
-    """Read the file of a case."""
+def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+    """Read the file of a case; ``components`` are those of the user's own that it may name."""
     text = text_of(path)
     data, lines = parse(text, path)
-    return CaseTree(path=path, text=text, data=data, lines=lines)
+    return CaseTree(path=path, text=text, data=data, lines=lines, components=tuple(components))
 
 
 def exchanged(data: Any, key: Key, value: object) -> Any:

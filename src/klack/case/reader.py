@@ -4,7 +4,7 @@ The case of a whole valve, with a section ``network``, is read by :mod:`klack.ca
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -93,9 +93,21 @@ def read_case(text: str, path: Path) -> Case:
     return validated(Case, text, path, data, lines)
 
 
-def validated(kind: type[_Kind], text: str, path: Path, data: Any, lines: "Lines") -> _Kind:
-    """Check parsed data against a kind of case."""
-    context = {"path": path, "folder": path.parent, "source": text}
+def validated(
+    kind: type[_Kind],
+    text: str,
+    path: Path,
+    data: Any,
+    lines: "Lines",
+    components: Mapping[str, type] | None = None,
+) -> _Kind:
+    """Check parsed data against a kind of case; own components by their words."""
+    context = {
+        "path": path,
+        "folder": path.parent,
+        "source": text,
+        "components": components or {},
+    }
     try:
         return kind.model_validate(data, context=context)
     except ValidationError as error:

@@ -16,6 +16,7 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Count, Name, Section
 from klack.network.declaration import NetworkSection
+from klack.network.own_component import source_digests
 from klack.units import Force, Length, Speed, Time, format_si
 
 __all__ = [
@@ -153,6 +154,14 @@ class ValveCase(CaseFile):
         check_noise(self)
         free_parameters(self)
         return self
+
+    @property
+    def own_components(self) -> Mapping[str, str]:
+        """Components that are not part of klack, with a digest of their code.
+
+        See :func:`klack.network.own_component.source_digests`.
+        """
+        return source_digests(self.network.components.values())
 
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:
         """Check that this case can run the variants; return them without repetition."""

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import CaseArgument, Json, Quiet, Threads, require_threads
+from klack.cli.options import (
+    CaseArgument,
+    Components,
+    Json,
+    Quiet,
+    Threads,
+    imported,
+    require_threads,
+)
 from klack.cli.output import require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.tables import print_table
@@ -63,6 +71,7 @@ def advise(
     confirm: Annotated[
         bool, Parameter(help="Run the advised case and lay it over the finest run.")
     ] = True,
+    component: Components = None,
     json: Json = None,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -81,8 +90,8 @@ def advise(
     from klack.case.shipped import find_case
     from klack.case.valve_reader import read_any_case
 
-    tree = read_case_tree(find_case(case))
-    checked = read_any_case(tree.text, tree.path)
+    tree = read_case_tree(find_case(case), imported(component))
+    checked = read_any_case(tree.text, tree.path, tree.components)
 
     from klack import __version__
     from klack.advice.advised_case import advice_yaml, advised_text, changed_values

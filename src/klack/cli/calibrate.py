@@ -9,10 +9,12 @@ from cyclopts import Parameter
 from klack.cli.notes import print_notes
 from klack.cli.options import (
     CaseArgument,
+    Components,
     Json,
     Out,
     Quiet,
     Threads,
+    imported,
     require_files,
     require_threads,
 )
@@ -53,6 +55,7 @@ def calibrate(
     measurement: _Files,
     strokes: _Strokes = None,
     workers: _Workers = None,
+    component: Components = None,
     report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
     out: Out = None,
     json: Json = None,
@@ -75,7 +78,7 @@ def calibrate(
     from klack.case.shipped import find_case
     from klack.workflow.calibration import calibration_of, run_calibration
 
-    tree = read_case_tree(find_case(case))
+    tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     fitted = calibration_of(checked).channels
     folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.cli.notes import print_notes
-from klack.cli.options import Json, Quiet
+from klack.cli.options import Components, Json, Quiet, imported
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
@@ -17,6 +17,7 @@ from klack.errors import InputError
 
 if TYPE_CHECKING:
     from klack.case.measurement import CaseMeasurement
+    from klack.case.valve_reader import OwnComponents
     from klack.workflow.compare import Comparison
     from klack.workflow.measured_shots_study import MeasuredShotsStudy
     from klack.workflow.measured_study import MeasuredStrokeStudy
@@ -76,6 +77,7 @@ def compare(
             "measurement]",
         ),
     ] = None,
+    component: Components = None,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
@@ -100,7 +102,8 @@ def compare(
         _with_calculix(result, calculix, level, folder, json, quiet)
         return 0
     folder = out if out is not None else result / _MEASURED
-    _with_measurement(result, measurement or [], case, folder, report, json, quiet)
+    own = imported(component)
+    _with_measurement(result, measurement or [], case, own, folder, report, json, quiet)
     return 0
 
 
@@ -111,6 +114,7 @@ def _with_measurement(
     result: Path,
     given: Sequence[str],
     case: Path | None,
+    own: "OwnComponents",
     folder: Path,
     report: bool,
     json: Path | None,
@@ -130,15 +134,16 @@ def _with_measurement(
         )
     require_folder(folder)
     if kind == STROKE_FORMAT.name:
-        _strokes(result, given, case, folder, report, json, quiet)
+        _strokes(result, given, case, own, folder, report, json, quiet)
     else:
-        _drops(result, given, case, folder, report, json, quiet)
+        _drops(result, given, case, own, folder, report, json, quiet)
 
 
 def _strokes(
     result: Path,
     given: Sequence[str],
     case: Path | None,
+    own: "OwnComponents",
     folder: Path,
     report: bool,
     json: Path | None,
@@ -151,7 +156,7 @@ def _strokes(
 
     study = load_stroke(result)
     files = _files(given, study.reference.name)
-    section, text = _section(study.case_text, result, case)
+    section, text = _section(study.case_text, result, case, own)
     with show_progress(quiet) as progress:
         compared = compare_strokes(study, files, section, case_text=text, progress=progress)
         failure = write_result(
@@ -173,6 +178,7 @@ def _drops(
     result: Path,
     given: Sequence[str],
     case: Path | None,
+    own: "OwnComponents",
     folder: Path,
     report: bool,
     json: Path | None,
@@ -185,7 +191,7 @@ def _drops(
 
     study = load_shots(result)
     paths = [path for paths in _files(given, "dry").values() for path in paths]
-    section, text = _section(study.case_text, result, case)
+    section, text = _section(study.case_text, result, case, own)
     with show_progress(quiet) as progress:
         compared = compare_shots(study, paths, section, case_text=text, progress=progress)
         failure = write_result(
@@ -224,15 +230,15 @@ def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
 
 
 def _section(
-    text: str, result: Path, case: Path | None
+    text: str, result: Path, case: Path | None, own: "OwnComponents"
 ) -> "tuple[CaseMeasurement | None, str | None]":
     """Section ``measurement`` of the result, or of another case with its text."""
     from klack.case.shipped import find_case
     from klack.case.valve_reader import load_any_case, read_any_case
 
     if case is None:
-        return read_any_case(text, result / "case.yaml").measurement, None
-    other = load_any_case(find_case(case))
+        return read_any_case(text, result / "case.yaml", own).measurement, None
+    other = load_any_case(find_case(case), own)
     return other.measurement, other.source
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.options import Out, Quiet, Threads, require_threads
+from klack.cli.options import Components, Out, Quiet, Threads, imported, require_threads
 from klack.cli.output import require_folder
 from klack.cli.stored import is_result
 from klack.errors import InputError
@@ -114,6 +114,7 @@ def export(
     penalty: _Penalty = None,
     run: _Run = False,
     time_limit: _TimeLimit = None,
+    component: Components = None,
     out: Out = None,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -143,7 +144,7 @@ def export(
     from klack.case.shipped import find_case
     from klack.case.valve_reader import load_any_case
 
-    case = load_any_case(find_case(source))
+    case = load_any_case(find_case(source), imported(component))
     folder = out if out is not None else Path("klack-results") / case.name
     require_folder(folder)
     if to == "calculix":

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.options import Components, imported
 from klack.cli.tables import print_table
 
 __all__ = ["inspect"]
@@ -29,6 +30,7 @@ def inspect(
     matrix: Annotated[
         str | None, Parameter(name="--matrix", help="Name of a matrix in a file of several.")
     ] = None,
+    component: Components = None,
 ) -> int:
     """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
@@ -43,7 +45,8 @@ def inspect(
     if is_case or (not file.exists() and str(file) in shipped_cases()):
         from klack.case.valve_reader import load_any_case
 
-        for name, rows in inspect_case(load_any_case(find_case(file))):
+        case = load_any_case(find_case(file), imported(component))
+        for name, rows in inspect_case(case):
             print_table(name, _COLUMNS, rows, left=3)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")

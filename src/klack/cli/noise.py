@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.cli.notes import print_notes
-from klack.cli.options import Json, Out, Quiet, Threads, require_threads
+from klack.cli.options import (
+    Components,
+    Json,
+    Out,
+    Quiet,
+    Threads,
+    imported,
+    require_threads,
+)
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import Progress, show_progress
 from klack.cli.reports import REPORTS, write_result
@@ -16,6 +24,7 @@ from klack.cli.stored import is_result
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
+    from klack.case.valve_reader import OwnComponents
     from klack.workflow.noise_source import NoiseSource
     from klack.workflow.noise_study import NoiseStudy
 
@@ -50,6 +59,7 @@ def noise(
     /,
     *,
     variant: _Names = None,
+    component: Components = None,
     report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
     out: Out = None,
     json: Json = None,
@@ -62,6 +72,7 @@ def noise(
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
     _require_known(paths)
+    own = imported(component)
     folder = out if out is not None else Path("klack-results") / _folder_name(paths)
     require_folder(folder)
 
@@ -75,7 +86,9 @@ def noise(
         write_sounds(study, stage)
 
     with show_progress(quiet) as progress:
-        sources = [source for path in paths for source in _sources(path, names, progress, threads)]
+        sources = [
+            source for path in paths for source in _sources(path, names, own, progress, threads)
+        ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
         failure = write_result(study, folder, save, report=report, progress=progress)
     if not quiet:
@@ -110,7 +123,11 @@ def _short(path: Path) -> str:
 
 
 def _sources(
-    path: Path, names: Sequence[str], progress: Progress, threads: int | None
+    path: Path,
+    names: Sequence[str],
+    own: "OwnComponents",
+    progress: Progress,
+    threads: int | None,
 ) -> tuple["NoiseSource", ...]:
     """Forces and bodies of a stored result, or of a case that is run now."""
     from klack.workflow.noise_source import load_sources, run_sources
@@ -122,7 +139,7 @@ def _sources(
     from klack.case.shipped import find_case
     from klack.case.valve_reader import load_any_case
 
-    case = load_any_case(find_case(path))
+    case = load_any_case(find_case(path), own)
     return run_sources(case, names, progress=progress, threads=threads)
 
 

@@ -2,19 +2,24 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from klack.errors import InputError, require_positive
 
+if TYPE_CHECKING:
+    from klack.network.component import Component
+
 __all__ = [
     "CaseArgument",
+    "Components",
     "Json",
     "Levels",
     "Out",
     "Quiet",
     "Threads",
+    "imported",
     "require_files",
     "require_threads",
 ]
@@ -40,6 +45,15 @@ Quiet = Annotated[
 Threads = Annotated[
     int | None, Parameter(name="--threads", help="Processor cores to use. [default: all]")
 ]
+Components = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--component",
+        negative="",
+        help="Class of your own that the case may name as a type, package.module:Class; its "
+        "module is run. Several times for several classes.",
+    ),
+]
 Levels = Annotated[
     list[str] | None,
     Parameter(
@@ -50,6 +64,16 @@ Levels = Annotated[
         "interface, full; several (a,b,c) are compared. [default: as in the case]",
     ),
 ]
+
+
+def imported(words: Sequence[str] | None) -> "tuple[type[Component], ...]":
+    """Import the classes that the user named by ``--component``."""
+    if not words:
+        return ()
+
+    from klack.network.own_component import import_component
+
+    return tuple(import_component(word) for word in words)
 
 
 def require_threads(threads: int | None) -> None:

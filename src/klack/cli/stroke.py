@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.cli.notes import print_notes
-from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
+from klack.cli.options import (
+    CaseArgument,
+    Components,
+    Json,
+    Out,
+    Quiet,
+    Threads,
+    imported,
+    require_threads,
+)
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
 from klack.cli.reports import REPORTS, write_result
@@ -15,6 +24,7 @@ from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase
+    from klack.network.component import Component
     from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 
 __all__ = ["stroke"]
@@ -55,6 +65,7 @@ def stroke(
     duration: _Duration = None,
     step: _Step = None,
     continued: _Continue = None,
+    component: Components = None,
     report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
     out: Out = None,
     json: Json = None,
@@ -66,7 +77,7 @@ def stroke(
 
     require_json_target(json)
     require_threads(threads)
-    checked = _checked_case(find_case(case), duration, step)
+    checked = _checked_case(find_case(case), duration, step, imported(component))
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
@@ -95,11 +106,16 @@ def stroke(
     return 0
 
 
-def _checked_case(path: Path, duration: str | None, step: str | None) -> "ValveCase":
+def _checked_case(
+    path: Path,
+    duration: str | None,
+    step: str | None,
+    components: "tuple[type[Component], ...]",
+) -> "ValveCase":
     """Read the case; duration and step of the command line take the place of its own."""
     from klack.case.valve_reader import load_valve_case
 
-    case = load_valve_case(path)
+    case = load_valve_case(path, components)
     changes = {
         key: _time(f"--{key}", text)
         for key, text in (("duration", duration), ("step", step))

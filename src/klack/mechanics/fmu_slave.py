@@ -1,20 +1,23 @@
-"""A running co-simulation FMU with displacement and velocity in and one force out.
+"""A running co-simulation FMU with displacement and velocity in and one force out."""
 
-The differences of FMI 2.0 and 3.0 stay in here.
-"""
-
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
-from weakref import finalize
 
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError
+from klack.mechanics.fmu_child import ADVANCE, FORCE, RUN
 from klack.mechanics.fmu_file import FmuDescription, unpack_fmu
+from klack.mechanics.fmu_process import FmuFailed, FmuProcess
+from klack.units import format_si
 
-__all__ = ["FmuSlave", "FmuWiring"]
+__all__ = ["TIME_LIMIT", "FmuSlave", "FmuWiring"]
+
+TIME_LIMIT = 30.0
+"""Time for one call of an FMU [s]; a step takes microseconds, an initialisation some seconds."""
+
+_LARGEST = 1e9  # [N], the weight of 100 000 t: no force in a valve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,37 +41,66 @@ class FmuWiring:
 
 
 class FmuSlave:
-    """One instance of an FMU; :meth:`begin` first, which may be repeated for a new run.
+    """One FMU in a process of its own; :meth:`begin` first, which may be repeated for a new run.
+
+    All that the FMU does wrong becomes a :class:`~klack.errors.ConvergenceError` with its name and
+    the simulated time: a status of failure, a crash, an end of its process, no answer within the
+    time limit, and a force that is no number or above 1e9 N.
 
     Parameters
     ----------
     fmu : FmuDescription
     wiring : FmuWiring
+    time_limit : float [s]
+        For one call.
     """
 
-    def __init__(self, fmu: FmuDescription, wiring: FmuWiring) -> None:
-        self.fmu, self.wiring = fmu, wiring
-        self.messages: deque[str] = deque(maxlen=10)
-        self._folder = TemporaryDirectory(prefix="klack-fmu-")
+    def __init__(
+        self, fmu: FmuDescription, wiring: FmuWiring, time_limit: float = TIME_LIMIT
+    ) -> None:
+        self.fmu, self.wiring, self.time_limit = fmu, wiring, time_limit
+        self._folder = TemporaryDirectory(prefix="klack-fmu-", ignore_cleanup_errors=True)
         self._library = unpack_fmu(fmu, Path(self._folder.name))
-        self._slave: Any = None
-        self._close: finalize | None = None
+        self._process: FmuProcess | None = None
+        motion = (wiring.displacement, wiring.velocity)
+        self._per_metre, self._per_speed = (1.0 / item[1] if item else 0.0 for item in motion)
+        self._unit = wiring.force[1]
 
     def begin(self) -> None:
-        """Make a new instance and enter its initialisation, in which forces can be asked for."""
+        """Make a new instance and enter its initialisation, in which forces can be asked for.
+
+        Raises
+        ------
+        ConvergenceError
+            If it cannot be loaded, or fails.
+        """
         self.close()
-        self._slave = self._guarded("a new instance", self._instance)
-        self._close = finalize(self, _free, self._slave, self._folder)
-        self._guarded("its parameters", self._set_parameters)
-        self._guarded("its initialisation", self._initialise)
+        motion = (self.wiring.displacement, self.wiring.velocity)
+        variables = self.fmu.variables
+        given = {
+            "version": self.fmu.version,
+            "library": str(self._library),
+            "resources": str(Path(self._folder.name) / "resources"),
+            "token": self.fmu.token,
+            "parameters": [
+                (variables[name].reference, variables[name].kind, value)
+                for name, value in self.wiring.parameters.items()
+            ],
+            "inputs": [variables[item[0]].reference if item else None for item in motion],
+            "force": variables[self.wiring.force[0]].reference,
+        }
+        try:
+            self._process = FmuProcess(given, self.time_limit)
+        except FmuFailed as error:
+            raise self._failed("in its initialisation", f"{error}") from None
 
     def force(self, displacement: float, velocity: float) -> float:
-        """Force [N] at displacement [m] and velocity [m/s]; in initialisation, or after a step."""
-        return float(self._guarded("its output", lambda: self._exchange(displacement, velocity)))
+        """Force [N] at displacement [m] and velocity [m/s], in the initialisation."""
+        return self._asked(FORCE, 0.0, 0.0, displacement, velocity)
 
     def run(self) -> None:
         """End the initialisation."""
-        self._guarded("the end of its initialisation", lambda: self._slave.exitInitializationMode())
+        self._asked(RUN, 0.0, 0.0, 0.0, 0.0)
 
     def advance(self, time: float, step: float, displacement: float, velocity: float) -> float:
         """Go on from ``time`` by ``step`` [s]; inputs hold from the start of the step.
@@ -78,121 +110,38 @@ class FmuSlave:
         float
             Force [N] at the end of the step.
         """
-
-        def go() -> float:
-            self._set(displacement, velocity)
-            done = self._slave.doStep(time, step)
-            if self.fmu.version == 3 and (done[1] or done[2]):
-                raise RuntimeError("it stopped before the end of the step")
-            return self._get()
-
-        return float(self._guarded(f"its step at {time:.6g} s", go))
+        return self._asked(ADVANCE, time, step, displacement, velocity)
 
     def close(self) -> None:
-        """Free the instance; the next :meth:`begin` makes a new one."""
-        if self._close is not None:
-            self._close.detach()
-            _free(self._slave, None)
-            self._close = None
+        """End its process; the next :meth:`begin` makes a new one."""
+        if self._process is not None:
+            self._process.close()
+            self._process = None
 
-    # --------------------------------------------------------------------- FMI 2.0 and 3.0
-
-    def _instance(self) -> Any:
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
-
-        given = {
-            "guid": self.fmu.token,
-            "modelIdentifier": self.fmu.identifier,
-            "unzipDirectory": self._folder.name,
-            "instanceName": "klack",
-            "libraryPath": str(self._library),
-        }
-        if self.fmu.version == 2:
-            slave = FMU2Slave(**given)
-            slave.instantiate(callbacks=_callbacks(self.messages))
-        else:
-            slave = FMU3Slave(**given)
-            said = self.messages  # not self: the slave must not keep its owner alive
-            slave.instantiate(logMessage=lambda _, __, ___, text: said.append(_decoded(text)))
-        return slave
-
-    def _set_parameters(self) -> None:
-        for name, value in self.wiring.parameters.items():
-            variable = self.fmu.variables[name]
-            words = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}
-            if self.fmu.version == 2:
-                words = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}
-            number: Any = value if variable.kind == "real" else int(value)
-            getattr(self._slave, f"set{words[variable.kind]}")([variable.reference], [number])
-
-    def _initialise(self) -> None:
-        if self.fmu.version == 2:
-            self._slave.setupExperiment(startTime=0.0)
-            self._slave.enterInitializationMode()
-        else:
-            self._slave.enterInitializationMode(startTime=0.0)
-
-    def _exchange(self, displacement: float, velocity: float) -> float:
-        self._set(displacement, velocity)
-        return self._get()
-
-    def _set(self, displacement: float, velocity: float) -> None:
-        for joined, value in (
-            (self.wiring.displacement, displacement),
-            (self.wiring.velocity, velocity),
-        ):
-            if joined is not None:
-                reference = self.fmu.variables[joined[0]].reference
-                write = self._slave.setReal if self.fmu.version == 2 else self._slave.setFloat64
-                write([reference], [value / joined[1]])
-
-    def _get(self) -> float:
-        name, unit = self.wiring.force
-        read = self._slave.getReal if self.fmu.version == 2 else self._slave.getFloat64
-        return float(read([self.fmu.variables[name].reference])[0]) * unit
-
-    def _guarded(self, what: str, action: Callable[[], Any]) -> Any:
-        """Turn whatever fmpy raises into words, with the last thing that the FMU said."""
+    def _asked(
+        self, what: int, time: float, step: float, displacement: float, velocity: float
+    ) -> float:
+        assert self._process is not None
+        motion = displacement * self._per_metre, velocity * self._per_speed
         try:
-            return action()
-        except InputError:
-            raise
-        except Exception as error:  # fmpy raises plain exceptions, one kind for every status
-            said = f" It says: {self.messages[-1]}" if self.messages else ""
-            raise ConvergenceError(
-                f"{self.fmu.path.name}: the FMU failed in {what} ({error}).{said}\n"
-                "Try: a shorter coupling_step, other parameters, and 'fmpy simulate' alone."
-            ) from error
+            force = self._process.call(what, time, step, *motion) * self._unit
+        except FmuFailed as error:
+            raise self._failed(_when(what, time, step), f"{error}") from None
+        if not abs(force) <= _LARGEST:
+            got = f"a force of {force:.4g} N" if isfinite(force) else f"{force} as its force"
+            self.close()
+            raise self._failed(_when(what, time, step), f"answered with {got}")
+        return force
+
+    def _failed(self, when: str, what: str) -> ConvergenceError:
+        return ConvergenceError(
+            f"{self.fmu.path.name}: the FMU {what}, {when}.\n"
+            f"Try: 'fmpy simulate {self.fmu.path.name}' alone, other parameters, a shorter "
+            f"coupling_step; a time_limit above {self.time_limit:g} s if it computes that long."
+        )
 
 
-def _free(slave: Any, folder: TemporaryDirectory[str] | None) -> None:
-    slave.freeInstance()
-    if folder is not None:
-        folder.cleanup()
-
-
-def _callbacks(messages: deque[str]) -> Any:
-    """Callbacks of FMI 2.0 that keep what the FMU says instead of printing it."""
-    from fmpy import calloc, free
-    from fmpy.fmi2 import (
-        fmi2CallbackAllocateMemoryTYPE,
-        fmi2CallbackFreeMemoryTYPE,
-        fmi2CallbackFunctions,
-        fmi2CallbackLoggerTYPE,
-        fmi2StepFinishedTYPE,
-    )
-
-    def keep(_: Any, __: Any, ___: Any, ____: Any, text: Any) -> None:
-        messages.append(_decoded(text))
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(keep)
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    callbacks.stepFinished = fmi2StepFinishedTYPE()
-    return callbacks
-
-
-def _decoded(text: Any) -> str:
-    return text.decode(errors="replace") if isinstance(text, bytes) else str(text)
+def _when(what: int, time: float, step: float) -> str:
+    if what == ADVANCE:
+        return f"in its step from {format_si(time, 's', 8)} to {format_si(time + step, 's', 8)}"
+    return "in its initialisation, at 0 s"

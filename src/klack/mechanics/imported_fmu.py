@@ -11,7 +11,7 @@ from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Number
 from klack.mechanics.fmu_coupling import STATES, FmuCoupling
 from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu
-from klack.mechanics.fmu_slave import FmuSlave, FmuWiring
+from klack.mechanics.fmu_slave import TIME_LIMIT, FmuSlave, FmuWiring
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Channel, Rows
@@ -37,8 +37,11 @@ class ImportedFmu(Component):
     Limits: a force that depends on the motion stiffly makes the explicit coupling unstable; for a
     stiffness k against a mass m keep the coupling step well below :math:`\sqrt{m/k}`.  Before the
     start the FMU is asked for its force at rest in its initialisation, which only forces without
-    memory answer rightly.  A run cannot go on from a stored state.  The binary inside is native
-    code with the rights of the user.
+    memory answer rightly.  A run cannot go on from a stored state.
+
+    The binary inside is native code with the rights of the user.  It runs in a process of its own:
+    a crash, an exit, a call longer than ``time_limit``, and a force that is no number or above
+    1e9 N stop the run with a message; see :class:`klack.mechanics.fmu_slave.FmuSlave`.
 
     Source: Functional Mock-up Interface 2.0.4 and 3.0.1; S. Sadjina et al., Engineering with
     Computers 33 (2017) 607.
@@ -67,6 +70,11 @@ class ImportedFmu(Component):
     )
     extrapolation: Literal["linear", "hold"] = Field(
         default="linear", description="Force between two exchanges: linear, or hold the last one."
+    )
+    time_limit: Time = Field(
+        default=TIME_LIMIT,
+        gt=0,
+        description="Longest time that one call of the FMU may take on the clock.",
     )
 
     @model_validator(mode="after")
@@ -150,7 +158,7 @@ class ImportedFmu(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one element with an instance of the FMU of its own."""
-        slave = FmuSlave(self._description(), self._wiring())
+        slave = FmuSlave(self._description(), self._wiring(), self.time_limit)
         coupling = FmuCoupling(slave, self.coupling_step, self.extrapolation)
         rows.element(
             python_step(coupling, parameters=0, states=STATES, inputs=6, outputs=4 + STATES),

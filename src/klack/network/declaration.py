@@ -32,7 +32,8 @@ def read_component(value: Any, context: Any = None) -> Component:
     ----------
     value : mapping or Component
     context : mapping, optional
-        Of pydantic; with one, as in a case file, every number needs its unit.
+        Of pydantic; with one, as in a case file, every number needs its unit.  Its
+        ``"components"`` are the classes of the user's own that may be used, by their words.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def read_component(value: Any, context: Any = None) -> Component:
             expected=f"type: one of {one_of(type_words())}",
             hint="write e.g. {type: spring, stiffness: 5 N/mm, preload: 20 N}.",
         )
-    found = component_class(value["type"])
+    found = component_class(value["type"], (context or {}).get("components", {}))
     return found.model_validate(
         {key: item for key, item in value.items() if key != "type"}, context=context
     )

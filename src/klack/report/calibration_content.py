@@ -5,7 +5,7 @@ from math import isfinite
 from klack.report.calibration_figures import profile_chart, stroke_chart, window_chart
 from klack.report.content import Content, Section, Table, date_text, stage_table
 from klack.report.correlation_figure import correlation_figure
-from klack.report.wording import count, listed, quantity
+from klack.report.wording import count, listed, own_code, quantity
 from klack.workflow.calibration_study import (
     CalibratedParameter,
     CalibrationStudy,
@@ -50,7 +50,7 @@ def calibration_content(study: CalibrationStudy) -> Content:
         definitions=_DEFINITIONS,
         limits=_LIMITS,
         case_text=study.case_text,
-        versions=", ".join([f"klack {study.version}", *libraries]),
+        versions=", ".join([f"klack {study.version}", *libraries, *own_code(study.own_components)]),
     )
 
 

@@ -20,7 +20,7 @@ from klack.report.noise_figures import (
 )
 from klack.report.noise_surface import surface_figure
 from klack.report.noise_wording import decibels, force_level, noise_answer
-from klack.report.wording import listed, quantity, share, signed
+from klack.report.wording import listed, own_code, quantity, share, signed
 from klack.workflow.noise_body import ASSUMED_DAMPING
 from klack.workflow.noise_sounds import common_full_scale, study_sounds
 from klack.workflow.noise_study import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
@@ -34,6 +34,7 @@ _NONE = "–"
 def noise_content(study: NoiseStudy) -> Content:
     """Put a study into words, tables and figures."""
     libraries = [f"{name} {version}" for name, version in study.versions.items()]
+    own = {word: code for design in study.designs for word, code in design.own_components.items()}
     sections = [
         _listen(study),
         Section(title="Force of the stops", charts=_forces(study)),
@@ -68,7 +69,7 @@ def noise_content(study: NoiseStudy) -> Content:
         case_text="\n\n".join(
             dict.fromkeys(design.case_text.rstrip() + "\n" for design in study.designs)
         ),
-        versions=", ".join([f"klack {study.version}", *libraries]),
+        versions=", ".join([f"klack {study.version}", *libraries, *own_code(own)]),
     )
 
 

@@ -26,7 +26,7 @@ from klack.report.stroke_figures import (
     variants_chart,
 )
 from klack.report.stroke_wording import largest, stroke_answer
-from klack.report.wording import count, quantity
+from klack.report.wording import count, own_code, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
 from klack.workflow.stroke_study import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.workflow.stroke_summary import first_impact, real_time_factor
@@ -74,7 +74,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         definitions=_DEFINITIONS,
         limits=_limits(study),
         case_text=study.case_text,
-        versions=", ".join([f"klack {study.version}", *libraries]),
+        versions=", ".join([f"klack {study.version}", *libraries, *own_code(study.own_components)]),
     )
 
 

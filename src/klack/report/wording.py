@@ -1,5 +1,6 @@
 """Numbers as engineers write them, and the answer of a study in one paragraph."""
 
+from collections.abc import Mapping
 from math import floor, isfinite, log10
 
 from klack.contact.restitution import Deviation
@@ -9,6 +10,7 @@ __all__ = [
     "answer",
     "count",
     "listed",
+    "own_code",
     "quantity",
     "sentence",
     "share",
@@ -41,6 +43,15 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 
 def _space(unit: str) -> str:
     return _FIXED + unit.replace(" ", _FIXED) if unit else ""
+
+
+def own_code(components: Mapping[str, str]) -> list[str]:
+    """Name components that are not part of klack, with the first digits of their SHA-256.
+
+    >>> own_code({"eddy_brake:EddyBrake": "0f3c5a7be912"})
+    ['own component eddy_brake:EddyBrake (0f3c5a7be912)']
+    """
+    return [f"own component {word} ({digest})" for word, digest in components.items()]
 
 
 def signed(value: float, decimals: int, unit: str = "") -> str:

@@ -161,6 +161,7 @@ def run_calibration(
         case_text=case.source,
         version=__version__,
         versions={name: version(name) for name in LIBRARIES},
+        own_components=case.own_components,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         wall_time=perf_counter() - begin,
         profile_time=clock.spent(("profiles",)),

@@ -39,6 +39,8 @@ def calibration_mark(case: ValveCase, strokes: StrokeSet) -> str:
 def _deciding(case: ValveCase, strokes: StrokeSet) -> Iterator[bytes]:
     for word in (klack.__version__, np.__version__, case.source):
         yield word.encode()
+    for name, digest in case.own_components.items():
+        yield f"{name} {digest}".encode()
     yield strokes.time.tobytes()
     for stroke in strokes.strokes:
         for role, values in stroke.values.items():

@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +149,8 @@ class CalibrationStudy:
         Of the case as it was before.
     version : str
         Of klack; ``versions`` holds those of the libraries.
+    own_components : mapping of str to str
+        See :class:`klack.workflow.stroke_study.StrokeStudy`.
     created : str
         ISO 8601.
     wall_time, profile_time : float [s]
@@ -218,3 +220,4 @@ class CalibrationStudy:
     workers: int
     converged: bool
     warnings: tuple[str, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)

@@ -41,6 +41,7 @@ def calibration_to_json(study: CalibrationStudy) -> dict[str, Any]:
     return {
         "case": study.case,
         "klack": study.version,
+        "own_components": dict(study.own_components),
         "variant": study.variant,
         "strokes": len(study.strokes),
         "parameters": parameters,

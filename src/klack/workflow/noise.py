@@ -116,6 +116,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         sound=sound,
         settings=_settings(source),
         notes=(*source.notes, *_design_notes(source, bodies, sound)),
+        own_components=source.own_components,
     )
 
 

@@ -1,7 +1,7 @@
 """Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +80,8 @@ class NoiseSource:
         Whether the case has a section ``noise``.
     materials : mapping of str to CaseMaterial
     notes : tuple of str
+    own_components : mapping of str to str
+        See :class:`klack.workflow.stroke_study.StrokeStudy`.
     """
 
     kind: str
@@ -96,6 +98,7 @@ class NoiseSource:
     materials: Mapping[str, CaseMaterial]
     net: TimeSeries | None = None
     notes: tuple[str, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)
 
 
 # --------------------------------------------------------------------------- from disk, from cases
@@ -229,6 +232,7 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
                 notes=_notes(variant, last),
+                own_components=study.own_components,
             )
         )
     return tuple(found)

@@ -238,6 +238,8 @@ class NoiseDesign:
         None without bodies.
     settings : NoiseSettings
     notes : tuple of str
+    own_components : mapping of str to str
+        See :class:`klack.workflow.stroke_study.StrokeStudy`.
     """
 
     name: str
@@ -255,6 +257,7 @@ class NoiseDesign:
     sound: ClickSound | None
     settings: NoiseSettings
     notes: tuple[str, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def band_middle(self) -> Floats:

@@ -130,6 +130,7 @@ def _design(design: NoiseDesign) -> dict[str, Any]:
     return {
         "kind": design.kind,
         "run": design.run,
+        "own_components": dict(design.own_components),
         "third_octave": _bands(bands, design.band_energy),
         "injected_energy_J": _finite(design.injected_energy),
         "radiated_energy_J": _finite(design.radiated_energy),

@@ -101,6 +101,7 @@ def run_stroke(
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
+        own_components=case.own_components,
         warnings=(*notes, *resting),
     )
 

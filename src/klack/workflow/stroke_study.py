@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,6 +229,9 @@ class StrokeStudy:
     lines : tuple of LineSummary
     structures : tuple of Structure
         Held bodies as sources of sound, their stops by the names of the end stops.
+    own_components : mapping of str to str
+        Component classes that are not part of klack, by ``package.module:Class``, with the first
+        digits of the SHA-256 of their code.
     warnings : tuple of str
     """
 
@@ -253,6 +256,7 @@ class StrokeStudy:
     fluid: FluidSummary | None = None
     lines: tuple[LineSummary, ...] = ()
     structures: tuple[Structure, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property

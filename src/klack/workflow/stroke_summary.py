@@ -49,7 +49,8 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``case``, ``variant`` (the reference) and its numbers: ``events``, ``opening_time_s``,
+        ``case``, ``own_components`` (with the first digits of the SHA-256 of their code),
+        ``variant`` (the reference) and its numbers: ``events``, ``opening_time_s``,
         ``closing_time_s``, ``energy_residual`` (share of the throughput), ``steps``,
         ``wall_time_s`` (of the time loop), ...; ``variants``: the same of every variant by its
         name.  Numbers that do not exist (nan) are None.
@@ -59,6 +60,7 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
     return {
         "case": study.case,
         "klack": study.version,
+        "own_components": dict(study.own_components),
         "variant": reference,
         **variants[reference],
         "variants": variants,
