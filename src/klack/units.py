@@ -9,7 +9,7 @@ taken from short tables instead of by dimension, so that one cannot pass for the
 import re
 from dataclasses import dataclass, field
 from functools import cache, lru_cache, partial
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
@@ -85,6 +85,10 @@ class Kind:
         Complete list of accepted units, for kinds that their dimension does not tell apart.
     bare : bool
         True if a number without a unit is meant.
+    smallest, largest : float
+        Bounds of the size of a value that is not zero, in ``unit``: wider than anything a valve,
+        a building or a laboratory has, and so narrow that areas, volumes, energies and their
+        quotients stay far from the ends of double precision.
     """
 
     name: str
@@ -93,14 +97,28 @@ class Kind:
     common: tuple[str, ...]
     factors: dict[str, float] = field(default_factory=dict)
     bare: bool = False
+    smallest: float = 1e-15
+    largest: float = 1e12
+
+    def holds(self, value: float) -> bool:
+        """Whether a value in :attr:`unit` is zero, or of a size that this kind can have."""
+        return value == 0 or self.smallest <= abs(value) <= self.largest
 
 
-LENGTH = Kind("a length", "m", "80 um", ("m", "cm", "mm", "um", "nm", "inch"))
-SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"))
-TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"))
+LENGTH = Kind(
+    "a length", "m", "80 um", ("m", "cm", "mm", "um", "nm", "inch"), smallest=1e-12, largest=1e6
+)
+SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"), largest=1e6)
+TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"), smallest=1e-18, largest=1e9)
 FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
-STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"))
-PRESSURE = Kind("a pressure", "Pa", "210 GPa", ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"))
+STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"), largest=1e18)
+PRESSURE = Kind(
+    "a pressure",
+    "Pa",
+    "210 GPa",
+    ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"),
+    smallest=1e-12,
+)
 DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3", ("kg/m^3", "g/cm^3", "kg/dm^3"))
 ANGLE = Kind(
     "an angle",
@@ -108,13 +126,10 @@ ANGLE = Kind(
     "40 deg",
     ("deg", "rad"),
     {"deg": pi / 180, "degree": pi / 180, "°": pi / 180, **_with_prefixes("rad")},
+    largest=1e6,
 )
 FREQUENCY = Kind(
-    "a frequency",
-    "Hz",
-    "900 kHz",
-    ("Hz", "kHz", "MHz"),
-    _with_prefixes("Hz"),
+    "a frequency", "Hz", "900 kHz", ("Hz", "kHz", "MHz"), _with_prefixes("Hz"), largest=1e15
 )
 RATE = Kind(
     "a rate",
@@ -122,6 +137,7 @@ RATE = Kind(
     "50 1/s",
     ("1/s", "1/ms"),
     {"1/s": 1.0, "s^-1": 1.0, "1/ms": 1e3, "1/us": 1e6},
+    largest=1e15,
 )
 ROTATION = Kind(
     "a speed of rotation",
@@ -130,30 +146,28 @@ ROTATION = Kind(
     ("rpm", "1/min", "1/s"),
     {"rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min^-1": 1.0 / 60.0, "1/s": 1.0},
 )
-AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"))
-VOLUME = Kind("a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"))
-MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"))
+AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"), smallest=1e-24)
+VOLUME = Kind(
+    "a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"), smallest=1e-36, largest=1e18
+)
+MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"), smallest=1e-21)
 ACCELERATION = Kind("an acceleration", "m/s^2", "9.81 m/s^2", ("m/s^2",))
 DAMPING = Kind("a damping coefficient", "N*s/m", "0.5 N*s/m", ("N*s/m", "N*s/mm"))
-COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"))
-VOLUME_FLOW = Kind("a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"))
+COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"), smallest=1e-21)
+VOLUME_FLOW = Kind(
+    "a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"), smallest=1e-24
+)
 DYNAMIC_VISCOSITY = Kind("a dynamic viscosity", "Pa*s", "0.4 mPa*s", ("Pa*s", "mPa*s"))
 KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/s", "mm^2/s"))
 VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
 CURRENT = Kind("a current", "A", "2.5 A", ("A", "mA"))
 RESISTANCE = Kind("a resistance", "ohm", "1.2 ohm", ("ohm", "mohm"))
-CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"))
+CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"), smallest=1e-24)
 FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
 FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
-PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"))
-FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"))
-TEMPERATURE = Kind(
-    "a temperature",
-    "K",
-    "20 degC",
-    ("degC", "K"),
-    {"K": 1.0},
-)
+PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"), smallest=1e-21)
+FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"), smallest=1e-21)
+TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, largest=1e6)
 RATIO = Kind(
     "a number without unit",
     "-",
@@ -161,6 +175,8 @@ RATIO = Kind(
     ("%",),
     {"%": 0.01, "percent": 0.01, "ppm": 1e-6},
     bare=True,
+    smallest=1e-30,
+    largest=1e15,
 )
 
 KINDS = (
@@ -221,10 +237,10 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _refuse(where, value, kind, f"write a number and its unit, e.g. {kind.example}.")
-    if not isinstance(value, str):
-        number, unit = float(value), ""
-    else:
+    if isinstance(value, str):
         number, unit = _split(value, kind, where)
+    else:
+        number, unit = _number(value), ""
     if not isfinite(number):
         raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
     if not unit:
@@ -232,12 +248,28 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
             raise _refuse(
                 where, value, kind, f'add a unit, e.g. "{kind.example}".', " without unit"
             )
-        return number
-    result = number * _factor(value, unit, kind, where)
-    if not isfinite(result):
-        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+        return _in_range(number, value, kind, where)
+    result = _in_range(number * _factor(value, unit, kind, where), value, kind, where)
     # a decimal input stays decimal: 80 * 1e-6 must read 8e-05, not 7.999999999999999e-05
     return result if kind.factors else float(f"{result:.15g}")
+
+
+def _number(value: float) -> float:
+    """Floating-point number of a plain one; a whole one of 400 digits is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
+
+
+def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
+    """Give the value back, or say between which sizes its kind lies."""
+    if kind.holds(result):
+        return result
+    unit = "" if kind.unit == "-" else f" {kind.unit}"
+    error = _refuse(where, value, kind, "check the power of ten and the unit.")
+    sizes = f"of a size between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
+    raise InputError(where, got=error.got, expected=f"{kind.name} {sizes}", hint=error.hint)
 
 
 def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
@@ -358,7 +390,7 @@ def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
 def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
     """In a file every number needs its unit; numbers given in Python (no context) are SI."""
     if info.context is None and isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
+        return _number(value)
     return parse_quantity(value, kind)
 
 
@@ -375,7 +407,7 @@ def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> flo
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
-            return round(float(match[1]) + 273.15, 6)
+            return _in_range(round(float(match[1]) + 273.15, 6), value, kind, "temperature")
     return _read(value, info, kind=kind)
 
 

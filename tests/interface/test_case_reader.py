@@ -262,7 +262,11 @@ def test_further_mistakes_are_counted():
         ("a: 1\n---\nb: 2\n", "no YAML"),
         ("a: \x00", "no YAML"),
         ("[" * 500, "nested"),
-        ("a: &a [*a]\n", "unknown key"),
+        ("a: &a [*a]\n", "plain tree"),
+        ("a: &a {<<: *a}\n", "plain tree"),
+        ("a: &a {b: {<<: [*a]}}\n", "plain tree"),
+        ("a: " + "[" * 5000, "more than 40 levels"),
+        ("{a: " * 5000, "more than 40 levels"),
     ],
 )
 def test_what_is_no_case_is_refused(text, word):
@@ -275,7 +279,7 @@ def test_aliases_may_not_explode():
     for before, name in zip("abcdefgh", "bcdefghi", strict=True):
         lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 10)}]")
 
-    assert "without end" in str(complaint("\n".join(lines)))
+    assert "more than 200000 values" in str(complaint("\n".join(lines)))
 
 
 def test_aliases_and_anchors_are_fine():
