@@ -37,8 +37,10 @@ __all__ = [
     "Length",
     "LengthUnit",
     "Mass",
+    "Modulus",
     "Permeance",
     "Pressure",
+    "QuantityError",
     "Rate",
     "Ratio",
     "Resistance",
@@ -112,13 +114,9 @@ SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"), largest=1e6)
 TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"), smallest=1e-18, largest=1e9)
 FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
 STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"), largest=1e18)
-PRESSURE = Kind(
-    "a pressure",
-    "Pa",
-    "210 GPa",
-    ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"),
-    smallest=1e-12,
-)
+_PRESSURES = ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi")
+PRESSURE = Kind("a pressure", "Pa", "5 bar", _PRESSURES, smallest=1e-12)
+MODULUS = Kind("a modulus", "Pa", "210 GPa", _PRESSURES, smallest=1e-12)
 DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3", ("kg/m^3", "g/cm^3", "kg/dm^3"))
 ANGLE = Kind(
     "an angle",
@@ -186,6 +184,7 @@ KINDS = (
     FORCE,
     STIFFNESS,
     PRESSURE,
+    MODULUS,
     DENSITY,
     ANGLE,
     FREQUENCY,
@@ -213,6 +212,33 @@ KINDS = (
 )
 
 
+class QuantityError(InputError):
+    """Something that is no quantity of its kind.
+
+    Parameters
+    ----------
+    where : str
+    value : object
+        What came.
+    kind : Kind
+    hint : str
+        May hold the example of the kind, which whoever knows the key can exchange.
+    came : str
+        More about what came.
+    expected : str, optional
+    """
+
+    def __init__(
+        self, where: str, value: object, kind: Kind, hint: str, came: str = "", expected: str = ""
+    ) -> None:
+        self.kind = kind
+        shown = f"'{value}'" if isinstance(value, str) else str(value)
+        if len(shown) > _LONGEST + 20:
+            shown = shown[:_LONGEST] + "...'"
+        with_unit = kind.name if kind.bare else f"{kind.name} with its unit"
+        super().__init__(where, got=f"{shown}{came}", expected=expected or with_unit, hint=hint)
+
+
 def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     """Turn ``"80 um"`` into SI; a bare 0 passes, any other bare number needs a unit.
 
@@ -236,16 +262,18 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     7850.0
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise _refuse(where, value, kind, f"write a number and its unit, e.g. {kind.example}.")
+        raise QuantityError(
+            where, value, kind, f"write a number and its unit, e.g. {kind.example}."
+        )
     if isinstance(value, str):
         number, unit = _split(value, kind, where)
     else:
         number, unit = _number(value), ""
     if not isfinite(number):
-        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+        raise QuantityError(where, value, kind, f"write a finite number, e.g. {kind.example}.")
     if not unit:
         if number != 0 and not kind.bare:
-            raise _refuse(
+            raise QuantityError(
                 where, value, kind, f'add a unit, e.g. "{kind.example}".', " without unit"
             )
         return _in_range(number, value, kind, where)
@@ -267,9 +295,10 @@ def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
     if kind.holds(result):
         return result
     unit = "" if kind.unit == "-" else f" {kind.unit}"
-    error = _refuse(where, value, kind, "check the power of ten and the unit.")
-    sizes = f"of a size between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
-    raise InputError(where, got=error.got, expected=f"{kind.name} {sizes}", hint=error.hint)
+    sizes = f" of a size between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
+    raise QuantityError(
+        where, value, kind, "check the power of ten and the unit.", expected=f"{kind.name}{sizes}"
+    )
 
 
 def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
@@ -281,7 +310,7 @@ def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
             hint = f'use a point as decimal sign: "{squeezed.replace(",", ".", 1)}".'
         elif re.search(r"[A-Za-z][23]$", squeezed):
             hint = f"write a power with ^: {squeezed[:-1]}^{squeezed[-1]}."
-        raise _refuse(where, text, kind, hint)
+        raise QuantityError(where, text, kind, hint)
     return float(match["number"]), match["unit"] or ""
 
 
@@ -292,17 +321,19 @@ def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
         plain = unit.replace(" ", "").replace("**", "^")
         if plain in known:
             return known[plain]
-        raise _refuse(where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit))
+        raise QuantityError(
+            where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit)
+        )
     import pint
 
     try:
         return _in_si(unit, kind.unit)
     except pint.DimensionalityError:
         hint = f"use one of: {', '.join(kind.common)}."
-        raise _refuse(where, value, kind, hint, _came(unit)) from None
+        raise QuantityError(where, value, kind, hint, _came(unit)) from None
     except Exception:  # pint evaluates the text and lets errors of tokenize and others through
         hint = f"use one of: {', '.join(kind.common)} (upper and lower case matter)."
-        raise _refuse(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
+        raise QuantityError(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
 
 
 @lru_cache(maxsize=1000)
@@ -334,14 +365,6 @@ def _registry() -> Any:
     import pint
 
     return pint.UnitRegistry()
-
-
-def _refuse(where: str, value: object, kind: Kind, hint: str, came: str = "") -> InputError:
-    shown = f"'{value}'" if isinstance(value, str) else str(value)
-    if len(shown) > _LONGEST + 20:
-        shown = shown[:_LONGEST] + "...'"
-    with_unit = kind.name if kind.bare else f"{kind.name} with its unit"
-    return InputError(where, got=f"{shown}{came}", expected=with_unit, hint=hint)
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:
@@ -425,6 +448,7 @@ Time = Annotated[float, *_typed(TIME)]
 Force = Annotated[float, *_typed(FORCE)]
 Stiffness = Annotated[float, *_typed(STIFFNESS)]
 Pressure = Annotated[float, *_typed(PRESSURE)]
+Modulus = Annotated[float, *_typed(MODULUS)]
 Density = Annotated[float, *_typed(DENSITY)]
 Angle = Annotated[float, *_typed(ANGLE)]
 Frequency = Annotated[float, *_typed(FREQUENCY)]

@@ -257,14 +257,18 @@ class Geometry(Section):
 class ContactRefinement(Section):
     """Small elements around the ring or point of first touch."""
 
-    size: Length = Field(gt=0, description="Edge length there; half the contact width or less.")
-    extent: Length = Field(gt=0, description="Distance from the first touch up to which it holds.")
+    size: Length = Field(
+        examples=["5 um"], gt=0, description="Edge length there; half the contact width or less."
+    )
+    extent: Length = Field(
+        examples=["50 um"], gt=0, description="Distance from the first touch up to which it holds."
+    )
 
 
 class MeshSettings(Section):
     """How fine klack meshes a profile or a STEP file."""
 
-    size: Length = Field(gt=0, description="Largest edge length anywhere.")
+    size: Length = Field(examples=["1 mm"], gt=0, description="Largest edge length anywhere.")
     grading: Number = Field(
         default=0.3,
         gt=0,

@@ -17,10 +17,12 @@ from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from klack.case.bodies import CaseFile
+from klack.case.field_example import fitting_example
 from klack.case.schema import Case
 from klack.case.yaml_limits import UnboundedTree, bounded_yaml
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text, nearest
+from klack.units import QuantityError
 
 __all__ = [
     "Lines",
@@ -97,7 +99,7 @@ def validated(kind: type[_Kind], text: str, path: Path, data: Any, lines: "Lines
     try:
         return kind.model_validate(data, context=context)
     except ValidationError as error:
-        raise _first_error(error, data, lines, path) from None
+        raise _first_error(kind, error, data, lines, path) from None
 
 
 def case_schema() -> dict[str, Any]:
@@ -261,11 +263,13 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     )
 
 
-def _first_error(error: ValidationError, data: Any, lines: Lines, path: Path) -> InputError:
+def _first_error(
+    case: type[CaseFile], error: ValidationError, data: Any, lines: Lines, path: Path
+) -> InputError:
     """Turn the first of pydantic's complaints into ours; say how many more there are."""
     details = error.errors(include_url=False)
     first, more = details[0], len(details) - 1
-    problem = _problem(first, data)
+    problem = _problem(first, data, case)
     key = _existing(data, first["loc"]) + problem.key
     line = lines.find(key, on_key=problem.on_key)
     name = key_text(key)
@@ -290,13 +294,17 @@ def _existing(data: Any, location: Sequence[str | int]) -> Key:
     return tuple(key)
 
 
-def _problem(details: ErrorDetails, data: Any) -> CaseProblem:
+def _problem(details: ErrorDetails, data: Any, case: type[CaseFile]) -> CaseProblem:
     """Our words for one complaint."""
     own = details.get("ctx", {}).get("error")
     if isinstance(own, CaseProblem):
         return own
     if isinstance(own, InputError):
-        return CaseProblem((), got=own.got, expected=own.expected, hint=own.hint)
+        hint = own.hint
+        if isinstance(own, QuantityError):
+            example = fitting_example(case, data, _existing(data, details["loc"]), own.kind)
+            hint = hint.replace(own.kind.example, example)
+        return CaseProblem((), got=own.got, expected=own.expected, hint=hint)
     value = _value_at(data, _existing(data, details["loc"]))
     kind, context = details["type"], details.get("ctx", {})
     key: Key = ()
