@@ -9,7 +9,7 @@ taken from short tables instead of by dimension, so that one cannot pass for the
 import re
 from dataclasses import dataclass, field
 from functools import cache, lru_cache, partial
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
@@ -37,8 +37,10 @@ __all__ = [
     "Length",
     "LengthUnit",
     "Mass",
+    "Modulus",
     "Permeance",
     "Pressure",
+    "QuantityError",
     "Rate",
     "Ratio",
     "Resistance",
@@ -85,6 +87,10 @@ class Kind:
         Complete list of accepted units, for kinds that their dimension does not tell apart.
     bare : bool
         True if a number without a unit is meant.
+    smallest, largest : float
+        Bounds of the size of a value that is not zero, in ``unit``: wider than anything a valve,
+        a building or a laboratory has, and so narrow that areas, volumes, energies and their
+        quotients stay far from the ends of double precision.
     """
 
     name: str
@@ -93,14 +99,24 @@ class Kind:
     common: tuple[str, ...]
     factors: dict[str, float] = field(default_factory=dict)
     bare: bool = False
+    smallest: float = 1e-15
+    largest: float = 1e12
+
+    def holds(self, value: float) -> bool:
+        """Whether a value in :attr:`unit` is zero, or of a size that this kind can have."""
+        return value == 0 or self.smallest <= abs(value) <= self.largest
 
 
-LENGTH = Kind("a length", "m", "80 um", ("m", "cm", "mm", "um", "nm", "inch"))
-SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"))
-TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"))
+LENGTH = Kind(
+    "a length", "m", "80 um", ("m", "cm", "mm", "um", "nm", "inch"), smallest=1e-12, largest=1e6
+)
+SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"), largest=1e6)
+TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"), smallest=1e-18, largest=1e9)
 FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
-STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"))
-PRESSURE = Kind("a pressure", "Pa", "210 GPa", ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi"))
+STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"), largest=1e18)
+_PRESSURES = ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi")
+PRESSURE = Kind("a pressure", "Pa", "5 bar", _PRESSURES, smallest=1e-12)
+MODULUS = Kind("a modulus", "Pa", "210 GPa", _PRESSURES, smallest=1e-12)
 DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3", ("kg/m^3", "g/cm^3", "kg/dm^3"))
 ANGLE = Kind(
     "an angle",
@@ -108,13 +124,10 @@ ANGLE = Kind(
     "40 deg",
     ("deg", "rad"),
     {"deg": pi / 180, "degree": pi / 180, "°": pi / 180, **_with_prefixes("rad")},
+    largest=1e6,
 )
 FREQUENCY = Kind(
-    "a frequency",
-    "Hz",
-    "900 kHz",
-    ("Hz", "kHz", "MHz"),
-    _with_prefixes("Hz"),
+    "a frequency", "Hz", "900 kHz", ("Hz", "kHz", "MHz"), _with_prefixes("Hz"), largest=1e15
 )
 RATE = Kind(
     "a rate",
@@ -122,6 +135,7 @@ RATE = Kind(
     "50 1/s",
     ("1/s", "1/ms"),
     {"1/s": 1.0, "s^-1": 1.0, "1/ms": 1e3, "1/us": 1e6},
+    largest=1e15,
 )
 ROTATION = Kind(
     "a speed of rotation",
@@ -130,30 +144,28 @@ ROTATION = Kind(
     ("rpm", "1/min", "1/s"),
     {"rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min^-1": 1.0 / 60.0, "1/s": 1.0},
 )
-AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"))
-VOLUME = Kind("a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"))
-MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"))
+AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"), smallest=1e-24)
+VOLUME = Kind(
+    "a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"), smallest=1e-36, largest=1e18
+)
+MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"), smallest=1e-21)
 ACCELERATION = Kind("an acceleration", "m/s^2", "9.81 m/s^2", ("m/s^2",))
 DAMPING = Kind("a damping coefficient", "N*s/m", "0.5 N*s/m", ("N*s/m", "N*s/mm"))
-COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"))
-VOLUME_FLOW = Kind("a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"))
+COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"), smallest=1e-21)
+VOLUME_FLOW = Kind(
+    "a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"), smallest=1e-24
+)
 DYNAMIC_VISCOSITY = Kind("a dynamic viscosity", "Pa*s", "0.4 mPa*s", ("Pa*s", "mPa*s"))
 KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/s", "mm^2/s"))
 VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
 CURRENT = Kind("a current", "A", "2.5 A", ("A", "mA"))
 RESISTANCE = Kind("a resistance", "ohm", "1.2 ohm", ("ohm", "mohm"))
-CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"))
+CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"), smallest=1e-24)
 FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
 FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
-PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"))
-FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"))
-TEMPERATURE = Kind(
-    "a temperature",
-    "K",
-    "20 degC",
-    ("degC", "K"),
-    {"K": 1.0},
-)
+PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"), smallest=1e-21)
+FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"), smallest=1e-21)
+TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, largest=1e6)
 RATIO = Kind(
     "a number without unit",
     "-",
@@ -161,6 +173,8 @@ RATIO = Kind(
     ("%",),
     {"%": 0.01, "percent": 0.01, "ppm": 1e-6},
     bare=True,
+    smallest=1e-30,
+    largest=1e15,
 )
 
 KINDS = (
@@ -170,6 +184,7 @@ KINDS = (
     FORCE,
     STIFFNESS,
     PRESSURE,
+    MODULUS,
     DENSITY,
     ANGLE,
     FREQUENCY,
@@ -197,6 +212,33 @@ KINDS = (
 )
 
 
+class QuantityError(InputError):
+    """Something that is no quantity of its kind.
+
+    Parameters
+    ----------
+    where : str
+    value : object
+        What came.
+    kind : Kind
+    hint : str
+        May hold the example of the kind, which whoever knows the key can exchange.
+    came : str
+        More about what came.
+    expected : str, optional
+    """
+
+    def __init__(
+        self, where: str, value: object, kind: Kind, hint: str, came: str = "", expected: str = ""
+    ) -> None:
+        self.kind = kind
+        shown = f"'{value}'" if isinstance(value, str) else str(value)
+        if len(shown) > _LONGEST + 20:
+            shown = shown[:_LONGEST] + "...'"
+        with_unit = kind.name if kind.bare else f"{kind.name} with its unit"
+        super().__init__(where, got=f"{shown}{came}", expected=expected or with_unit, hint=hint)
+
+
 def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     """Turn ``"80 um"`` into SI; a bare 0 passes, any other bare number needs a unit.
 
@@ -220,24 +262,43 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     7850.0
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise _refuse(where, value, kind, f"write a number and its unit, e.g. {kind.example}.")
-    if not isinstance(value, str):
-        number, unit = float(value), ""
-    else:
+        raise QuantityError(
+            where, value, kind, f"write a number and its unit, e.g. {kind.example}."
+        )
+    if isinstance(value, str):
         number, unit = _split(value, kind, where)
+    else:
+        number, unit = _number(value), ""
     if not isfinite(number):
-        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+        raise QuantityError(where, value, kind, f"write a finite number, e.g. {kind.example}.")
     if not unit:
         if number != 0 and not kind.bare:
-            raise _refuse(
+            raise QuantityError(
                 where, value, kind, f'add a unit, e.g. "{kind.example}".', " without unit"
             )
-        return number
-    result = number * _factor(value, unit, kind, where)
-    if not isfinite(result):
-        raise _refuse(where, value, kind, f"write a finite number, e.g. {kind.example}.")
+        return _in_range(number, value, kind, where)
+    result = _in_range(number * _factor(value, unit, kind, where), value, kind, where)
     # a decimal input stays decimal: 80 * 1e-6 must read 8e-05, not 7.999999999999999e-05
     return result if kind.factors else float(f"{result:.15g}")
+
+
+def _number(value: float) -> float:
+    """Floating-point number of a plain one; a whole one of 400 digits is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
+
+
+def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
+    """Give the value back, or say between which sizes its kind lies."""
+    if kind.holds(result):
+        return result
+    unit = "" if kind.unit == "-" else f" {kind.unit}"
+    sizes = f" of a size between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
+    raise QuantityError(
+        where, value, kind, "check the power of ten and the unit.", expected=f"{kind.name}{sizes}"
+    )
 
 
 def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
@@ -249,7 +310,7 @@ def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
             hint = f'use a point as decimal sign: "{squeezed.replace(",", ".", 1)}".'
         elif re.search(r"[A-Za-z][23]$", squeezed):
             hint = f"write a power with ^: {squeezed[:-1]}^{squeezed[-1]}."
-        raise _refuse(where, text, kind, hint)
+        raise QuantityError(where, text, kind, hint)
     return float(match["number"]), match["unit"] or ""
 
 
@@ -260,17 +321,19 @@ def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
         plain = unit.replace(" ", "").replace("**", "^")
         if plain in known:
             return known[plain]
-        raise _refuse(where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit))
+        raise QuantityError(
+            where, value, kind, f"use one of: {', '.join(kind.common)}.", _came(unit)
+        )
     import pint
 
     try:
         return _in_si(unit, kind.unit)
     except pint.DimensionalityError:
         hint = f"use one of: {', '.join(kind.common)}."
-        raise _refuse(where, value, kind, hint, _came(unit)) from None
+        raise QuantityError(where, value, kind, hint, _came(unit)) from None
     except Exception:  # pint evaluates the text and lets errors of tokenize and others through
         hint = f"use one of: {', '.join(kind.common)} (upper and lower case matter)."
-        raise _refuse(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
+        raise QuantityError(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
 
 
 @lru_cache(maxsize=1000)
@@ -302,14 +365,6 @@ def _registry() -> Any:
     import pint
 
     return pint.UnitRegistry()
-
-
-def _refuse(where: str, value: object, kind: Kind, hint: str, came: str = "") -> InputError:
-    shown = f"'{value}'" if isinstance(value, str) else str(value)
-    if len(shown) > _LONGEST + 20:
-        shown = shown[:_LONGEST] + "...'"
-    with_unit = kind.name if kind.bare else f"{kind.name} with its unit"
-    return InputError(where, got=f"{shown}{came}", expected=with_unit, hint=hint)
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:
@@ -358,7 +413,7 @@ def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
 def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
     """In a file every number needs its unit; numbers given in Python (no context) are SI."""
     if info.context is None and isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
+        return _number(value)
     return parse_quantity(value, kind)
 
 
@@ -375,7 +430,7 @@ def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> flo
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
-            return round(float(match[1]) + 273.15, 6)
+            return _in_range(round(float(match[1]) + 273.15, 6), value, kind, "temperature")
     return _read(value, info, kind=kind)
 
 
@@ -393,6 +448,7 @@ Time = Annotated[float, *_typed(TIME)]
 Force = Annotated[float, *_typed(FORCE)]
 Stiffness = Annotated[float, *_typed(STIFFNESS)]
 Pressure = Annotated[float, *_typed(PRESSURE)]
+Modulus = Annotated[float, *_typed(MODULUS)]
 Density = Annotated[float, *_typed(DENSITY)]
 Angle = Annotated[float, *_typed(ANGLE)]
 Frequency = Annotated[float, *_typed(FREQUENCY)]

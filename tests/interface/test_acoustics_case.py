@@ -42,3 +42,25 @@ def test_shipped_cases_are_read(name: str) -> None:
     case = read_any_case(path.read_text(encoding="utf-8"), path)
 
     assert case.name == name
+
+
+def test_a_forgotten_support_is_asked_for() -> None:
+    """Without 'fixed' the sound of the housing is no question about its surfaces."""
+    held = "    fixed:\n      - surface: rim\n"
+    impact = find_case("demo-valve-axisymmetric").read_text(encoding="utf-8")
+    assert held in impact
+    with pytest.raises(InputError, match=r"bodies.housing: got no key 'fixed'.*"):
+        read_any_case(impact.replace(held, ""), Path("case.yaml"))
+
+
+def test_a_forgotten_support_of_a_valve_is_asked_for() -> None:
+    stroke = find_case("demo-stroke").read_text(encoding="utf-8")
+    start = stroke.index("    fixed:")
+    end = stroke.index("\n    ", stroke.index("surface:", start))
+    loose = stroke[:start] + stroke[end + 1 :]
+    with pytest.raises(InputError, match=r"hold the others \(fixed: "):
+        read_any_case(loose, Path("case.yaml"))
+    named = loose.replace("\nrun:\n", "\nrun:\n  lift: needle.tip\n")
+    assert named != loose
+    with pytest.raises(InputError, match=r"bodies.housing: got no key 'fixed'.*"):
+        read_any_case(named, Path("case.yaml"))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from klack.case import Case, CaseProblem, find_case, load_case, read_case, shipped_cases
-from klack.case.valve_reader import load_any_case
+from klack.case.valve_reader import load_any_case, read_any_case
 from klack.errors import InputError
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
@@ -262,7 +262,11 @@ def test_further_mistakes_are_counted():
         ("a: 1\n---\nb: 2\n", "no YAML"),
         ("a: \x00", "no YAML"),
         ("[" * 500, "nested"),
-        ("a: &a [*a]\n", "unknown key"),
+        ("a: &a [*a]\n", "plain tree"),
+        ("a: &a {<<: *a}\n", "plain tree"),
+        ("a: &a {b: {<<: [*a]}}\n", "plain tree"),
+        ("a: " + "[" * 5000, "more than 40 levels"),
+        ("{a: " * 5000, "more than 40 levels"),
     ],
 )
 def test_what_is_no_case_is_refused(text, word):
@@ -275,7 +279,7 @@ def test_aliases_may_not_explode():
     for before, name in zip("abcdefgh", "bcdefghi", strict=True):
         lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 10)}]")
 
-    assert "without end" in str(complaint("\n".join(lines)))
+    assert "more than 200000 values" in str(complaint("\n".join(lines)))
 
 
 def test_aliases_and_anchors_are_fine():
@@ -387,3 +391,28 @@ def test_problem_writes_its_key_like_people_do():
     problem = CaseProblem(("edges", 2, "arc"), got="a", expected="b", hint="c")
 
     assert problem.where == "edges[2].arc"
+
+
+def test_the_unit_that_is_proposed_fits_the_key():
+    """A supply has no 210 GPa: example of the field, its default, or a value that it mentions."""
+    how_to = Path(__file__).parents[2] / "docs" / "how-to"
+    valve = (how_to / "small_valve.yaml").read_text(encoding="utf-8")
+    for old, new, proposed in (
+        ("{temperature: 20 degC}", "{pressure: 1}", "101.3 kPa"),
+        ("volume: 200 mm^3", "volume: 200 mm^3, pressure: 5", "5 bar"),
+        ("fluid: n-heptane", "fluid: {name: x, bulk_modulus: 1e9}", "1.5 GPa"),
+        ("stiffness: 1e9 N/m", "stiffness: 1e9", "1e9 N/m"),
+        ("roughness: 0.3 um", "cut_off: 0.3", "0.3 um"),
+    ):
+        assert old in valve
+        with pytest.raises(InputError) as caught:
+            read_any_case(valve.replace(old, new, 1), Path("valve.yaml"))
+        assert f'"{proposed}"' in caught.value.hint
+
+
+@pytest.mark.parametrize("point", ["[1.2, 1e308]", "[1.2, 1e14]", "[1e-300, 2.4]"])
+def test_points_of_an_outline_have_a_sensible_size(point):
+    text = str(complaint(changed("[1.2, 2.4]", point)))
+
+    assert "edges[0].arc" in text
+    assert any(words in text for words in ("1e+15", "1e-12 to 1e+06 m"))

@@ -245,3 +245,21 @@ def test_reference_page_has_every_component_with_its_ports():
         row = next(line for line in PAGE.splitlines() if f"`{found.type}`" in line and "|" in line)
         for port in found.ports:
             assert port in row
+
+
+@pytest.mark.parametrize(
+    ("film", "key"),
+    [
+        ("roughness: 0.3 um", "network.ambient.pressure"),
+        ("pressure: 2 Pa", "network.components.opening.film.pressure"),
+        ("cavitation_pressure: 3 Pa", "network.components.opening.film.cavitation_pressure"),
+    ],
+)
+def test_surroundings_that_boil_are_named_by_the_key_that_is_given(film, key):
+    text = (Path(__file__).parents[2] / "docs/how-to/small_valve.yaml").read_text(encoding="utf-8")
+    text = text.replace("temperature: 20 degC", "temperature: 20 degC, pressure: 1 Pa")
+    case = read_valve_case(text.replace("roughness: 0.3 um", film), Path("valve.yaml"))
+
+    with pytest.raises(InputError) as caught:
+        case.network.network().rows()
+    assert caught.value.where == key

@@ -19,7 +19,7 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Count, Name, Section, Text
 from klack.materials import Material
-from klack.units import Density, Frequency, Pressure, Rate, Ratio, Time
+from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time
 
 __all__ = [
     "BodyDamping",
@@ -64,7 +64,7 @@ BodySurface = Annotated[
 class CaseMaterial(Section):
     """Isotropic linear elastic material."""
 
-    young: Pressure = Field(gt=0, description="Young's modulus; steel 210 GPa.")
+    young: Modulus = Field(gt=0, description="Young's modulus; steel 210 GPa.")
     poisson: Ratio = Field(gt=-1, lt=0.5, description="Poisson's ratio; steel 0.3.")
     density: Density = Field(gt=0, description="Density; steel 7850 kg/m^3.")
 

@@ -1,6 +1,6 @@
 """Where the shape of a body comes from: a drawn outline, a STEP file, or a finished mesh."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import tau
 from typing import Annotated, Literal, Self
 
@@ -8,10 +8,10 @@ from pydantic import Field, model_validator
 
 from klack.errors import InputError
 from klack.input.existing_file import InputPath
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, Key
 from klack.input.section import Count, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
-from klack.units import Angle, Length, LengthUnit, format_si
+from klack.units import LENGTH, Angle, Length, LengthUnit, format_si
 
 __all__ = [
     "ContactRefinement",
@@ -81,6 +81,15 @@ class Outline(Section):
                 )
         return self
 
+    def points(self) -> Iterator[tuple[Key, Point]]:
+        """Every point with the keys that lead to it."""
+        yield ("start",), self.start
+        for i, edge in enumerate(self.edges):
+            for name in ("line", "arc", "centre"):
+                point = getattr(edge, name)
+                if point is not None:
+                    yield ("edges", i, name), point
+
     def profile(self, unit: float) -> Profile:
         """Build the meridian; ``unit`` is the length of one drawing unit [m]."""
 
@@ -111,6 +120,15 @@ class ProfileGeometry(Section):
     @model_validator(mode="after")
     def _drawable(self) -> Self:
         for name, part in self.parts.items():
+            for key, point in part.points():
+                if not all(LENGTH.holds(x * self.unit) for x in point):
+                    raise CaseProblem(
+                        ("parts", name, *key),
+                        got=f"the point {list(point)} in a unit of {self.unit:g} m",
+                        expected=f"coordinates of 0, or of {LENGTH.smallest:g} to "
+                        f"{LENGTH.largest:g} m",
+                        hint="check the unit of the profile and the powers of ten.",
+                    )
             try:
                 part.profile(self.unit)
             except InputError as error:
@@ -239,14 +257,18 @@ class Geometry(Section):
 class ContactRefinement(Section):
     """Small elements around the ring or point of first touch."""
 
-    size: Length = Field(gt=0, description="Edge length there; half the contact width or less.")
-    extent: Length = Field(gt=0, description="Distance from the first touch up to which it holds.")
+    size: Length = Field(
+        examples=["5 um"], gt=0, description="Edge length there; half the contact width or less."
+    )
+    extent: Length = Field(
+        examples=["50 um"], gt=0, description="Distance from the first touch up to which it holds."
+    )
 
 
 class MeshSettings(Section):
     """How fine klack meshes a profile or a STEP file."""
 
-    size: Length = Field(gt=0, description="Largest edge length anywhere.")
+    size: Length = Field(examples=["1 mm"], gt=0, description="Largest edge length anywhere.")
     grading: Number = Field(
         default=0.3,
         gt=0,

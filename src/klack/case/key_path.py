@@ -12,7 +12,7 @@ from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
 from klack.units import RATIO, Kind
 
-__all__ = ["Quantity", "quantity_at", "split_path", "written_at"]
+__all__ = ["Quantity", "kind_in", "quantity_at", "split_path", "written_at"]
 
 
 class Quantity:
@@ -101,7 +101,7 @@ def quantity_at(case: Section, key: Key) -> Quantity:
         if isinstance(node, Section):
             field = _fields(node)[str(part)]
         node = found[part]
-    kind = None if field is None else _kind_in(field.annotation, field.metadata)
+    kind = None if field is None else kind_in(field.annotation, field.metadata)
     if kind is None and isinstance(node, float):
         kind = RATIO  # a plain number
     if kind is None or field is None or isinstance(node, bool) or not isinstance(node, float | int):
@@ -148,7 +148,7 @@ def _fields(node: Section) -> dict[str, FieldInfo]:
     return {info.alias or name: info for name, info in type(node).model_fields.items()}
 
 
-def _kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
+def kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
     """Kind of quantity that a type takes, wherever it is nested."""
     for item in metadata:
         if isinstance(item, BeforeValidator) and isinstance(item.func, partial):
@@ -157,9 +157,9 @@ def _kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
                 return kind
     arguments = get_args(annotation)
     if getattr(annotation, "__metadata__", None):
-        return _kind_in(arguments[0], annotation.__metadata__)
+        return kind_in(arguments[0], annotation.__metadata__)
     for argument in arguments:
-        kind = _kind_in(argument, ())
+        kind = kind_in(argument, ())
         if kind is not None:
             return kind
     return None

@@ -52,7 +52,9 @@ class NoisePlate(Section):
 class NoiseDrive(Section):
     """How often the valve is actuated in the drive pattern that can be listened to."""
 
-    frequency: Frequency | None = Field(default=None, gt=0, description="Strokes per second.")
+    frequency: Frequency | None = Field(
+        examples=["10 Hz"], default=None, gt=0, description="Strokes per second."
+    )
     speed: Rotation | None = Field(
         default=None, gt=0, description="Speed of the engine, e.g. 2000 rpm."
     )

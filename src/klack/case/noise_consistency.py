@@ -1,8 +1,9 @@
 """Checks of the section ``noise`` against the bodies and materials of its case."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from klack.case.consistency import check_surface, require_known
+from klack.case.valve_roles import find_roles
 from klack.input.problem import CaseProblem, Key, one_of
 
 if TYPE_CHECKING:
@@ -10,6 +11,15 @@ if TYPE_CHECKING:
     from klack.case.valve import ValveCase
 
 __all__ = ["check_noise"]
+
+
+def _moving(case: "Case | ValveCase") -> str:
+    """Body that makes sense without a support: the one that hits, or the needle."""
+    contact = getattr(case, "contact", None)
+    if contact is not None:
+        return str(contact.moving.body)
+    valve = cast("ValveCase", case)
+    return str(getattr(valve.network.components[find_roles(valve).needle], "body", ""))
 
 
 def check_noise(case: "Case | ValveCase") -> None:
@@ -21,13 +31,21 @@ def check_noise(case: "Case | ValveCase") -> None:
     for i, surface in enumerate(noise.surfaces or ()):
         key: Key = ("noise", "surfaces", i)
         check_surface(case, key, surface)
-        if surface.body not in held:
+        if surface.body in held:
+            continue
+        if surface.body == _moving(case):
             raise CaseProblem(
                 key,
                 got=f"'{surface}', but nothing holds '{surface.body}'",
-                expected=f"surfaces of held bodies ({one_of(held) or 'the case has none'})",
+                expected=f"surfaces of held bodies ({one_of(held)})",
                 hint="a body that moves freely, such as a needle, radiates into the fluid.",
             )
+        raise CaseProblem(
+            ("bodies", surface.body),
+            got=f"no key 'fixed', but '{surface}' shall radiate sound (noise.surfaces)",
+            expected=f"fixed: the surfaces that hold '{surface.body}'",
+            hint="add 'fixed: [{surface: NAME}]' to the body, or take its surfaces out of 'noise'.",
+        )
     if noise.plate is not None:
         key = ("noise", "plate", "material")
         require_known(key, noise.plate.material, case.materials, "material")

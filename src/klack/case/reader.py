@@ -12,15 +12,17 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from klack.case.bodies import CaseFile
+from klack.case.field_example import fitting_example
 from klack.case.schema import Case
+from klack.case.yaml_limits import UnboundedTree, bounded_yaml
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text, nearest
+from klack.units import QuantityError
 
 __all__ = [
     "Lines",
@@ -36,8 +38,6 @@ __all__ = [
 _Kind = TypeVar("_Kind", bound=CaseFile)
 
 _LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
-_MOST_VALUES = 200_000
-_DEEPEST = 40
 _NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")  # an escape such as "\\ud800" is half a letter
 
 
@@ -111,7 +111,7 @@ def validated(
     try:
         return kind.model_validate(data, context=context)
     except ValidationError as error:
-        raise _first_error(error, data, lines, path) from None
+        raise _first_error(kind, error, data, lines, path) from None
 
 
 def case_schema() -> dict[str, Any]:
@@ -154,11 +154,17 @@ def text_of(path: Path) -> str:
 
 def parse(text: str, path: Path) -> tuple[Any, Lines]:
     """Plain data of a YAML text, and where each key and value stands."""
-    yaml = YAML(typ="rt")
     try:
-        data = yaml.load(StringIO(text))
+        data = bounded_yaml().load(StringIO(text))
     except DuplicateKeyError as error:
         raise _duplicate(error, path) from None
+    except UnboundedTree as error:
+        raise InputError(
+            f"{path}:{error.problem_mark.line + 1}",
+            got=str(error.problem),
+            expected="a plain tree of keys and values",
+            hint="close the brackets; write out what an alias repeats.",
+        ) from None
     except MarkedYAMLError as error:
         raise _syntax_error(error, path) from None
     except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
@@ -194,13 +200,10 @@ class _Plain:
     """Turn the nodes of ruamel.yaml into plain data and note their lines."""
 
     def __init__(self, path: Path, lines: Lines) -> None:
-        self.path, self.lines, self.count = path, lines, 0
+        self.path, self.lines = path, lines
 
     def of(self, node: Any, key: Key) -> Any:
         """Plain copy of a node."""
-        self.count += 1
-        if self.count > _MOST_VALUES or len(key) > _DEEPEST:
-            self._refuse(key, "aliases or nesting without end", "a plain tree of keys and values")
         if isinstance(node, CommentedMap):
             return {self._name(node, k, key): self.of(v, (*key, k)) for k, v in node.items()}
         if isinstance(node, CommentedSeq):
@@ -272,11 +275,13 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     )
 
 
-def _first_error(error: ValidationError, data: Any, lines: Lines, path: Path) -> InputError:
+def _first_error(
+    case: type[CaseFile], error: ValidationError, data: Any, lines: Lines, path: Path
+) -> InputError:
     """Turn the first of pydantic's complaints into ours; say how many more there are."""
     details = error.errors(include_url=False)
     first, more = details[0], len(details) - 1
-    problem = _problem(first, data)
+    problem = _problem(first, data, case)
     key = _existing(data, first["loc"]) + problem.key
     line = lines.find(key, on_key=problem.on_key)
     name = key_text(key)
@@ -301,13 +306,17 @@ def _existing(data: Any, location: Sequence[str | int]) -> Key:
     return tuple(key)
 
 
-def _problem(details: ErrorDetails, data: Any) -> CaseProblem:
+def _problem(details: ErrorDetails, data: Any, case: type[CaseFile]) -> CaseProblem:
     """Our words for one complaint."""
     own = details.get("ctx", {}).get("error")
     if isinstance(own, CaseProblem):
         return own
     if isinstance(own, InputError):
-        return CaseProblem((), got=own.got, expected=own.expected, hint=own.hint)
+        hint = own.hint
+        if isinstance(own, QuantityError):
+            example = fitting_example(case, data, _existing(data, details["loc"]), own.kind)
+            hint = hint.replace(own.kind.example, example)
+        return CaseProblem((), got=own.got, expected=own.expected, hint=hint)
     value = _value_at(data, _existing(data, details["loc"]))
     kind, context = details["type"], details.get("ctx", {})
     key: Key = ()

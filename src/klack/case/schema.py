@@ -35,7 +35,7 @@ from klack.units import (
     Force,
     Frequency,
     Length,
-    Pressure,
+    Modulus,
     Ratio,
     Speed,
     Stiffness,
@@ -103,7 +103,9 @@ class LinearLocalLaw(Section):
     """Constant local stiffness."""
 
     kind: Literal["linear"] = Field(description="Which law: linear.")
-    stiffness: Stiffness = Field(gt=0, description="Stiffness of the contact zone alone.")
+    stiffness: Stiffness = Field(
+        examples=["1e10 N/m"], gt=0, description="Stiffness of the contact zone alone."
+    )
 
 
 class HertzLocalLaw(Section):
@@ -111,7 +113,7 @@ class HertzLocalLaw(Section):
 
     kind: Literal["hertz"] = Field(description="Which law: hertz.")
     radius: Length = Field(gt=0, description="Effective radius R: 1/R = 1/R1 + 1/R2.")
-    modulus: Pressure | None = Field(
+    modulus: Modulus | None = Field(
         default=None,
         gt=0,
         description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; that of the "
@@ -221,7 +223,9 @@ class TransferSweep(Section):
 class Run(Section):
     """What is computed."""
 
-    duration: Time = Field(gt=0, description="Time to compute, from the start of the motion.")
+    duration: Time = Field(
+        examples=["50 us"], gt=0, description="Time to compute, from the start of the motion."
+    )
     reduced_step: Time = Field(default=20e-9, gt=0, description="Time step of the reduced levels.")
     interface_step: Time = Field(
         default=40e-9, gt=0, description="Time step of the interface level."

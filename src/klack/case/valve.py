@@ -87,7 +87,9 @@ class CaseStop(Section):
 class StrokeRun(Section):
     """What is computed."""
 
-    duration: Time = Field(gt=0, description="Time to compute, from the start of the drivers.")
+    duration: Time = Field(
+        examples=["5 ms"], gt=0, description="Time to compute, from the start of the drivers."
+    )
     step: Time = Field(default=20e-9, gt=0, description="Fine time step.")
     coarse: Count = Field(
         default=16, le=256, description="Fine steps in a coarse one, taken far from the stops."

@@ -104,7 +104,10 @@ def _needle(case: "ValveCase", points: dict[str, tuple[str, ...]]) -> str:
             ("run",),
             got=f"{len(free)} bodies that can move ({one_of(free)})",
             expected="lift: the point of the needle whose displacement is the lift",
-            hint=f"add 'lift: {free[0]}.{points[free[0]][0]}'." if free else "add a needle.",
+            hint=f"hold the others (fixed: [{{surface: NAME}}] in 'bodies'), or add 'lift: "
+            f"{free[0]}.{points[free[0]][0]}'."
+            if free
+            else "add a needle.",
         )
     return free[0]
 

@@ -158,13 +158,31 @@ class Film(Section):
         if cavitation is None:
             cavitation = fluid.vapour_pressure
         if cavitation > around:
-            raise InputError(
-                f"{rows.component}.film.cavitation_pressure",
-                got=f"{format_si(cavitation, 'Pa')} absolute",
-                expected=f"less than the pressure around the film, {format_si(around, 'Pa')}",
+            raise self._all_vapour(rows.component, fluid.name, cavitation, around)
+        return self.film_row(float(fluid.viscosity(around)), around - cavitation)
+
+    def _all_vapour(
+        self, component: str, fluid: str, cavitation: float, around: float
+    ) -> InputError:
+        """Error of a film in surroundings below its cavitation pressure, at a key that is given."""
+        limit, words = format_si(cavitation, "Pa"), format_si(around, "Pa")
+        film = f"the film of '{component}'"
+        if self.cavitation_pressure is not None:
+            return InputError(
+                f"network.components.{component}.film.cavitation_pressure",
+                got=f"{limit} absolute",
+                expected=f"less than the pressure around the film, {words}",
                 hint="pressures are absolute; leave it out for the vapour pressure.",
             )
-        return self.film_row(float(fluid.viscosity(around)), around - cavitation)
+        key = "network.ambient.pressure"
+        if self.pressure is not None:
+            key = f"network.components.{component}.film.pressure"
+        return InputError(
+            key,
+            got=f"{words} absolute around {film}",
+            expected=f"more than the vapour pressure of {fluid}, {limit}",
+            hint="pressures are absolute: surroundings have about 1 bar.",
+        )
 
 
 class DiscFilm(Film):

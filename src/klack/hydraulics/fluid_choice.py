@@ -16,6 +16,7 @@ from klack.units import (
     Density,
     DynamicViscosity,
     KinematicViscosity,
+    Modulus,
     Pressure,
     Ratio,
     Speed,
@@ -67,12 +68,19 @@ class FluidChoice(Section):
     """
 
     name: Text = Field(description="Name of the library, or of your own fluid.")
-    density: Density | None = Field(default=None, gt=0, description="At one atmosphere.")
-    table: DensityTable | None = Field(default=None, description="Instead of density: a curve.")
-    bulk_modulus: Pressure | None = Field(
-        default=None, gt=0, description="Isentropic (from the speed of sound), at one atmosphere."
+    density: Density | None = Field(
+        examples=["750 kg/m^3"], default=None, gt=0, description="At one atmosphere."
     )
-    sound_speed: Speed | None = Field(default=None, gt=0, description="Instead of bulk_modulus.")
+    table: DensityTable | None = Field(default=None, description="Instead of density: a curve.")
+    bulk_modulus: Modulus | None = Field(
+        examples=["1.5 GPa"],
+        default=None,
+        gt=0,
+        description="Isentropic (from the speed of sound), at one atmosphere.",
+    )
+    sound_speed: Speed | None = Field(
+        examples=["1300 m/s"], default=None, gt=0, description="Instead of bulk_modulus."
+    )
     bulk_modulus_slope: Ratio | None = Field(
         default=None, gt=0, description="Rise of the bulk modulus over pressure; default 10."
     )
@@ -86,10 +94,16 @@ class FluidChoice(Section):
         description="Pressure over which the viscosity grows by e = 2.72; fuels 1000 bar.",
     )
     vapour_pressure: Pressure | None = Field(
-        default=None, gt=0, description="Where it boils, absolute; default 10 Pa."
+        examples=["5 kPa"],
+        default=None,
+        gt=0,
+        description="Where it boils, absolute; default 10 Pa.",
     )
     vapour_density: Density | None = Field(
-        default=None, gt=0, description="Of the saturated vapour; default: ideal, 0.1 kg/mol."
+        examples=["1 kg/m^3"],
+        default=None,
+        gt=0,
+        description="Of the saturated vapour; default: ideal, 0.1 kg/mol.",
     )
     gas_fraction: Ratio = Field(
         default=0.0,

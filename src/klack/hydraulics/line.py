@@ -12,7 +12,7 @@ from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW
 from klack.network.rows import Rows
-from klack.units import Length, Pressure
+from klack.units import Length, Modulus, Pressure
 
 if TYPE_CHECKING:
     from klack.hydraulics.fluid import Fluid
@@ -52,15 +52,15 @@ class Line(Component):
     type: ClassVar[str] = "line"
     ports: ClassVar = {"a": FLOW, "b": FLOW}
 
-    length: Length = Field(gt=0, description="From end to end.")
-    diameter: Length = Field(gt=0, description="Of the bore.")
+    length: Length = Field(examples=["100 mm"], gt=0, description="From end to end.")
+    diameter: Length = Field(examples=["2 mm"], gt=0, description="Of the bore.")
     pressure: Pressure = Field(
         gt=0, description="Absolute, about which waves run; sets sound speed and density."
     )
     wall_thickness: Length | None = Field(
         default=None, gt=0, description="Of a tube; without it the wall is rigid."
     )
-    wall_modulus: Pressure | None = Field(
+    wall_modulus: Modulus | None = Field(
         default=None, gt=0, description="Young's modulus of a tube."
     )
     friction: Literal["none", "steady", "kagawa"] = Field(

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
 from klack.input.section import Section
-from klack.units import Force, Length, Pressure, Stiffness
+from klack.units import Force, Length, Modulus, Stiffness
 
 __all__ = [
     "AsperityStopLaw",
@@ -33,7 +33,9 @@ class LinearStopLaw(Section):
     """Constant stiffness, ``F = k d``."""
 
     kind: Literal["linear"] = Field(description="Which law: linear.")
-    stiffness: Stiffness = Field(gt=0, description="Stiffness k of the contact zone alone.")
+    stiffness: Stiffness = Field(
+        examples=["1e9 N/m"], gt=0, description="Stiffness k of the contact zone alone."
+    )
 
     def contact_law(self) -> LinearLaw:
         """Return the law."""
@@ -45,7 +47,7 @@ class HertzStopLaw(Section):
 
     kind: Literal["hertz"] = Field(description="Which law: hertz.")
     radius: Length = Field(gt=0, description="Effective radius R: 1/R = 1/R1 + 1/R2.")
-    modulus: Pressure = Field(
+    modulus: Modulus = Field(
         gt=0, description="E*: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; 115 GPa for steel on steel."
     )
 

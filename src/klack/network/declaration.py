@@ -22,7 +22,7 @@ from klack.network.network import Network
 from klack.network.rows import Ambient
 from klack.units import Pressure, Temperature
 
-__all__ = ["AmbientSection", "AnyComponent", "NetworkSection", "read_component"]
+__all__ = ["AmbientSection", "AnyComponent", "LateSection", "NetworkSection", "read_component"]
 
 
 def read_component(value: Any, context: Any = None) -> Component:
@@ -96,8 +96,13 @@ def _read_fluid(value: Any, info: ValidationInfo) -> Any:
     return found.model_validate(value, context=info.context)
 
 
-class _FluidSchema:
-    """JSON schema of the section ``fluid``: a name alone, or a mapping."""
+class LateSection:
+    """The section ``fluid``, which is imported when it is used: a name alone, or a mapping."""
+
+    def section(self) -> type[Section]:
+        """Class of the section."""
+        found: type[Section] = _fluid_section()
+        return found
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -125,7 +130,7 @@ class NetworkSection(Section):
     """Everything around the bodies: components and how they are joined."""
 
     ambient: AmbientSection = Field(default=AmbientSection(), description="Surroundings.")
-    fluid: Annotated[Any, BeforeValidator(_read_fluid), _FluidSchema()] = Field(
+    fluid: Annotated[Any, BeforeValidator(_read_fluid), LateSection()] = Field(
         default=None, description="What flows through the valve; none: a dry valve."
     )
     components: Mapping[Name, AnyComponent] = Field(
