@@ -179,7 +179,8 @@ def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: 
     for p in range(ports):
         displacement = max(displacement, abs(S[Y1 + p]))
         by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
-    return moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
+    # a force or displacement that is not finite never settles
+    return work < np.inf and moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
