@@ -227,7 +227,8 @@ def _largest_divisor(number: int, most: int) -> int:
 
 
 def _has_python_steps(rows: Rows) -> bool:
-    return any(hasattr(row.step, "errors") for row in (*rows.elements, *rows.branches))
+    steps = [row.step for row in rows.elements] + [row.step for row in rows.branches]
+    return any(hasattr(step, "errors") for step in steps)
 
 
 def _run(
@@ -256,7 +257,7 @@ def _run(
                 good = 0
         if good:
             steps = int(clock[0]) + grid.look_steps * np.arange(1 - good, 1)
-            recorder.take(grid.step * steps, finder)
+            recorder.take(np.asarray(grid.step * steps, dtype=float), finder)
         progress(recorder.looked / looks)
         if failure is not None:
             return failure
@@ -452,13 +453,12 @@ def _not_a_number(name: str, time: float) -> ConvergenceError:
 
 def _not_finite_part(network: CompiledNetwork) -> str:
     """Component in whose last step a number was none; empty if all were."""
-    for rows, data in (
-        (network.rows.elements, network.elements),
-        (network.rows.branches, network.branches),
-    ):
-        for k, row in enumerate(rows):
+    elements = [row.component for row in network.rows.elements]
+    branches = [row.component for row in network.rows.branches]
+    for names, data in ((elements, network.elements), (branches, network.branches)):
+        for k, name in enumerate(names):
             if not np.all(np.isfinite(data.outputs[data.output0[k] : data.output0[k + 1]])):
-                return row.component
+                return name
     for i, handle in enumerate(network.node_order):
         if not np.isfinite(network.nodes.p[i]):
             return f"{network.rows.nodes[handle].component} pressure"
