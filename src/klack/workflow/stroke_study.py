@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.errors import ConvergenceError
 from klack.reduction.structure import Structure
 from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
 from klack.workflow.study import BodySummary
 
 __all__ = [
     "FluidSummary",
+    "IncompleteStrokeError",
     "LineSummary",
     "StopSummary",
     "StrokeChannels",
@@ -219,7 +221,8 @@ class StrokeStudy:
         When the drivers' command ends; nan if no driver says.
     duration, step : float [s]
     variants : mapping of name to StrokeVariant
-        The first one is the one to compare with.
+        The first one is the one to compare with; the last one may be incomplete, see
+        :attr:`~klack.simulation.network_result.NetworkResult.failure`.
     channels : StrokeChannels
     bodies : tuple of BodySummary
         Their ``compliance_share`` is the smallest of all contact ports.
@@ -273,3 +276,18 @@ class StrokeStudy:
     def closing_time(self) -> float:
         """Closing time of the reference [s]."""
         return self.reference.closing_time
+
+
+class IncompleteStrokeError(ConvergenceError):
+    """A variant failed on its way; ``study`` holds it until then, and all variants before it.
+
+    Parameters
+    ----------
+    text : str
+    study : StrokeStudy
+        Says in its warnings what is missing.
+    """
+
+    def __init__(self, text: str, study: StrokeStudy) -> None:
+        super().__init__(text)
+        self.study = study

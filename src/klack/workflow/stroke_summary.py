@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Any
 
 from klack.simulation.network_result import ImpactEvent
+from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 
 __all__ = [
@@ -52,7 +53,9 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
         ``case``, ``own_components`` (with the first digits of the SHA-256 of their code),
         ``variant`` (the reference) and its numbers: ``events``, ``opening_time_s``,
         ``closing_time_s``, ``energy_residual`` (share of the throughput), ``steps``,
-        ``wall_time_s`` (of the time loop), ...; ``variants``: the same of every variant by its
+        ``wall_time_s`` (of the time loop), ...; ``complete`` and ``failure`` (why the run ended
+        early, at ``end_time_s``); ``fine_record_ends_s`` (end stops whose force in fine steps is
+        known up to there only; empty if all are); ``variants``: the same of every variant by its
         name.  Numbers that do not exist (nan) are None.
     """
     variants = {name: _numbers(variant) for name, variant in study.variants.items()}
@@ -122,6 +125,10 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
     result = variant.result
     return {
         "label": variant.label,
+        "complete": not result.failure,
+        "failure": result.failure or None,
+        "end_time_s": _number(float(result.time[-1])),
+        "fine_record_ends_s": {stop: _number(t) for stop, t in cut_records(result).items()},
         "events": [_event(event) for event in result.events],
         "opening_time_s": _number(variant.opening_time),
         "closing_time_s": _number(variant.closing_time),
