@@ -71,6 +71,8 @@ _SETTLED_COARSE = 3e-8  # the same for a coarse step, whose forces change more
 _ENERGY_LEFT = 1e-10  # energy that what is left of that change costs, over the work of the step
 _UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
 _ROUND_OFF = 4e-16  # of the displacements themselves
+_FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
+_FEW_SWEEPS = 8  # are enough, unless what still changes is round-off
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
@@ -204,6 +206,51 @@ def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: 
         by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
     # a force or displacement that is not finite never settles
     return work < np.inf and moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
+
+
+@njit(cache=True)
+def _moved_by_round_off(
+    G: Any,
+    ports: int,
+    elements: StepRows,
+    branches: StepRows,
+    nodes: Nodes,
+    interfaces: Interfaces,
+    fi: Any,
+    p: Any,
+    rho: Any,
+    slope: Any,
+) -> float:
+    """Displacement that the round-off of the forces of a sweep makes [m], the largest of a port.
+
+    Forces that hold each other in balance leave a sum of nothing, but not without the round-off of
+    each.  A pressure that follows from the mass in a volume is known to the round-off of that mass
+    times the bulk modulus ``rho dp/drho``.  ``G`` of its level is zero between bodies.
+    """
+    largest = 0.0
+    for row in range(ports):
+        total = 0.0
+        for k in range(elements.function.size):
+            q0 = elements.port0[k]
+            for j in range(q0, elements.port0[k + 1]):
+                force = elements.outputs[elements.output0[k] + j - q0]
+                total += abs(G[row * PORTS + elements.ports[j]] * force)
+        for k in range(branches.function.size):
+            q0 = branches.port0[k]
+            for j in range(q0, branches.port0[k + 1]):
+                force = branches.outputs[branches.output0[k] + 3 + j - q0]
+                total += abs(G[row * PORTS + branches.ports[j]] * force)
+        for w in range(nodes.wall_node.size):
+            i = nodes.wall_node[w]
+            known = abs(p[i]) + nodes.ambient
+            if i < nodes.volumes and slope[i] > 0.0:
+                known += rho[i] / slope[i]
+            total += abs(G[row * PORTS + nodes.wall_port[w]] * nodes.wall_area[w]) * known
+        for c in range(interfaces.upper.size):
+            way = G[row * PORTS + interfaces.upper[c]] - G[row * PORTS + interfaces.lower[c]]
+            total += abs(way * fi[c])
+        largest = max(largest, total)
+    return _FORCE_ROUND_OFF * largest
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -679,6 +726,10 @@ def run_network(
                         work += abs(fi[c] * (gap - interface_gap[c]))
                 share = _SETTLED if level == 0 else _SETTLED_COARSE
                 settled = _settled(S, ports, moved, share, left, work)
+                if not settled and sweep >= _FEW_SWEEPS:
+                    settled = moved <= _moved_by_round_off(
+                        own_G, ports, elements, branches, nodes, interfaces, fi, p, rho, slope
+                    )
                 if settled:
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
