@@ -13,6 +13,7 @@ from klack import energy_balance
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import impact_events
+from klack.simulation.limits import Limits
 from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
     BEFORE,
@@ -137,24 +138,33 @@ def simulate_network(
     _read_stores(network)
     before = energy_stores(network)
     recorder.take(0)
+    limits = Limits(network, [column.name for column in recorder.points])
+    time = step * np.arange(records + 1, dtype=float) * (per_record * block) + first_step * step
     chunk = max(1, _CHUNK // (per_record * block))
     begin = perf_counter()
     for first in range(0, records, chunk):
         count = min(chunk, records - first)
-        _advance(
-            network,
-            recorder.recording,
-            clock,
-            count * per_record,
-            per_record,
-            first + 1,
-            step,
-            block,
-            coarse > 1,
-        )
+        try:
+            _advance(
+                network,
+                recorder.recording,
+                clock,
+                count * per_record,
+                per_record,
+                first + 1,
+                step,
+                block,
+                coarse > 1,
+            )
+        except ConvergenceError as error:
+            # a range left on the way there is the better word
+            filled = int(np.searchsorted(time, (error.time or 0.0) + 0.5 * step))
+            limits.look(recorder.recording.points[first:filled], time[first:filled])
+            raise
+        seen = slice(first, first + count + 1)
+        limits.look(recorder.recording.points[seen], time[seen])
         progress((first + count) / records)
     wall_time = perf_counter() - begin
-    time = step * np.arange(records + 1, dtype=float) * (per_record * block) + first_step * step
     channels = recorder.channels()
     interfaces = recorder.interfaces()
     books = energy_books(network, before)
@@ -299,7 +309,8 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         words = failed.failures.get(code, f"status {code} of its step function")
         return ConvergenceError(
             f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
-            "Try: a smaller step, and look whether its parameters and start values make sense."
+            "Try: a smaller step, and look whether its parameters and start values make sense.",
+            time=time,
         )
     if status == STATUS_PRESSURES:
         handle = network.node_order[row]
@@ -308,12 +319,14 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
             f"{name}: the pressures did not settle {when}.\n"
             f"State: {_numbers(network.nodes.p)} Pa.\n"
             "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
-            "entrained gas."
+            "entrained gas.",
+            time=time,
         )
     return ConvergenceError(
         f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
         f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
-        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
+        "Try: a smaller step; look for a stiffness far above 1e10 N/m.",
+        time=time,
     )
 
 
