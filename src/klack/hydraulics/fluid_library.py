@@ -162,7 +162,7 @@ WATER = _measured(
     "CoolProp 8.0.0: IAPWS-95, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002); viscosity "
     "Huber et al., J. Phys. Chem. Ref. Data 38 (2009)",
     0.018015,
-    4000e5,
+    2500e5,
     density=(1000.046, 998.390, 992.391, 983.370, 971.969, 958.536),
     bulk_modulus=(1.9686e9, 2.1958e9, 2.3219e9, 2.3678e9, 2.3509e9, 2.2851e9),
     bulk_modulus_slope=(5.723, 6.030, 6.373, 6.707, 7.046, 7.390),

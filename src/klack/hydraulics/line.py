@@ -129,7 +129,7 @@ class Line(Component):
         return 2.0 * self.length / self.wave_speed(fluid, pressure)
 
     def mean_pressure(self, rows: Rows) -> float:
-        """Pressure [Pa] whose properties the line has: its own, or that of its ends at the start."""
+        """Pressure [Pa] whose properties the line has: given, or that of its ends at the start."""
         if self.pressure is not None:
             return self.pressure
         ends = [rows.nodes.get(rows.port(port)) for port in self.ports]

@@ -54,7 +54,8 @@ def _pressures(rows: Rows) -> list[LimitRow]:
             unit="Pa",
             valid=(known.lowest, known.highest),
             usable=(-inf, known.usable),
-            law=f"the fluid '{name}' ({known.source})",
+            law=f"the fluid '{name}'",
+            source=known.source,
             effect=lambda value: (
                 "Stiffness and waves are more than 10 % and 5 % off, volumes and flows less."
             ),
@@ -91,7 +92,7 @@ def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
         raise CaseProblem(
             ("components", limit.component, *([limit.key] if limit.key else [])),
             got=f"{value_text(limit.start, limit.unit)} at the start",
-            expected=f"a {limit.quantity} {range_text(limit)}, the range of {limit.law}",
+            expected=f"a {limit.quantity} in the range of {limit.law}, {range_text(limit)}",
             hint=limit.advice,
         )
     for way, stops, is_out in (
@@ -128,19 +129,21 @@ def _check_pressure(rows: Rows, limit: LimitRow) -> None:
     raise CaseProblem(
         key,
         got=f"a pressure of {value_text(highest, 'Pa')}",
-        expected=f"at most {value_text(limit.usable[1], 'Pa')}: beyond it {limit.law} says nothing",
+        expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
+        f"{range_text(limit)}",
         hint=limit.advice,
     )
 
 
 def range_text(limit: LimitRow) -> str:
-    """Range of the law in words: "of 0 um to 4 mm", "above 0 m^3"."""
+    """Range of the law in words: "from 0 m to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
     low, high = limit.valid
+    text = f"from {value_text(low, limit.unit)} to {value_text(high, limit.unit)}"
     if high == inf:
-        return f"above {value_text(low, limit.unit)}"
-    if low <= 0.0 and limit.unit == "Pa":
-        return f"up to {value_text(high, limit.unit)}"
-    return f"from {value_text(low, limit.unit)} to {value_text(high, limit.unit)}"
+        text = f"above {value_text(low, limit.unit)}"
+    elif low <= 0.0 and limit.unit == "Pa":
+        text = f"up to {value_text(high, limit.unit)}"
+    return f"{text} ({limit.source})" if limit.source else text
 
 
 def value_text(value: float, unit: str) -> str:

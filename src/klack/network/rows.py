@@ -250,6 +250,8 @@ class LimitRow:
     law : str
         Whose range it is: ``"the magnetic circuit of 'coil'"``; where ranges of several rows bear
         the same name, only the first that is left is warned of.
+    source : str
+        Where the range comes from; may be empty.
     effect : callable
         What is wrong at a value outside, as a sentence.
     advice : str
@@ -270,6 +272,7 @@ class LimitRow:
     usable: tuple[float, float] = (-inf, inf)
     slack: float = 0.0
     law: str
+    source: str = ""
     effect: Callable[[float], str]
     advice: str
     key: str = ""

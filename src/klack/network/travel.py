@@ -76,7 +76,7 @@ class Travel:
             b_ub=np.array(self._gaps) / scale,
             bounds=(None, None),
         )
-        if found.status != 0:
+        if found.fun is None or found.status != 0:
             return inf, ()
         bounding = np.abs(found.ineqlin.marginals) > 1e-9
         names = tuple(name for name, is_met in zip(self._names, bounding, strict=True) if is_met)
