@@ -123,14 +123,11 @@ def test_a_map_has_to_hold_every_gap_that_the_stops_allow(old, new, said):
 def test_an_armature_that_no_stop_holds_ends_the_run_with_its_name_and_time():
     text = MAGNET.replace("stop.lower, ", "").replace("stop.upper, ", "")
     text = re.sub(r"    stop: .*\n", "", text)
-    with (
-        warnings.catch_warnings(record=True) as caught,
-        pytest.raises(
-            ConvergenceError, match=r"^coil: the gap is -\d+\.\d* um at [\d.]+ us"
-        ) as end,
-    ):
+    rows, said = rows_of(text), r"^coil: the gap is -\d+\.\d* um at [\d.]+ us"
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        simulate_network(rows_of(text), duration=4e-3, step=100e-9)
+        with pytest.raises(ConvergenceError, match=said) as end:
+            simulate_network(rows, duration=4e-3, step=100e-9)
 
     told = [str(item.message) for item in caught if "'coil'" in str(item.message)]
     assert len(told) == 1
