@@ -172,16 +172,15 @@ def chain(control):
 
 def test_bodies_that_push_each_other_end_at_the_stop_of_the_last_one():
     rows = chain(control=10e-9).rows()
-    ports = {row.component: row.ports[0] for row in rows.bodies}
-    travel = Travel(rows)
+    travel = Travel.of(rows)
 
-    far, stops = travel.highest([(ports["needle"], 1.0)])
+    far, stops = travel.highest({"needle": 1.0})
     assert far == pytest.approx(270e-6, rel=1e-12)
-    assert set(stops) == {"rod", "stop"}
-    assert travel.lowest([(ports["needle"], 1.0)]) == (0.0, ("seat",))
-    assert travel.lowest([(ports["piston"], 1.0)])[0] == pytest.approx(-20e-6, rel=1e-12)
+    assert stops == ("stop", "rod")  # what ends the way of both comes first
+    assert travel.lowest({"needle": 1.0}) == (0.0, ("seat",))
+    assert travel.lowest({"piston": 1.0})[0] == pytest.approx(-20e-6, rel=1e-12)
     # the piston up by 250 um, the needle still on its seat: 10 mm^2 250 um
-    least = travel.lowest([(ports["needle"], 4e-6), (ports["piston"], -10e-6)])[0]
+    least = travel.lowest({"needle": 4e-6, "piston": -10e-6})[0]
     assert least == pytest.approx(-2.5e-9, rel=1e-12)
 
 

@@ -75,7 +75,7 @@ def check_ranges(rows: Rows) -> None:
     CaseProblem
         That names the component and, where stops allow the motion, their gaps.
     """
-    travel = Travel(rows)
+    travel = Travel.of(rows)
     for limit in limits_of(rows):
         if limit.ports:
             _check_motion(rows, limit, travel)
@@ -85,8 +85,9 @@ def check_ranges(rows: Rows) -> None:
 
 def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
     low, high = limit.valid
-    least, below = travel.lowest(limit.ports)
-    most, above = travel.highest(limit.ports)
+    factors = Travel.factors(rows, limit.ports)
+    least, below = travel.lowest(factors)
+    most, above = travel.highest(factors)
     slack = _ROUNDING * abs(limit.start)
     if not low - slack <= limit.start <= high + slack:
         raise CaseProblem(
