@@ -6,7 +6,8 @@ from scipy.integrate import quad
 
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import FLUIDS, library_fluid
-from klack.hydraulics.fluid_table import HIGHEST_PRESSURE, fluid_at, fluid_table, pressure_at
+from klack.hydraulics.fluid_table import fluid_at, fluid_table, pressure_at
+from klack.hydraulics.liquid import HIGHEST_PRESSURE
 
 AMBIENT = 101_325.0
 USER = FluidChoice(

@@ -1,11 +1,13 @@
 """Who is who in a valve: the needle, its seat, its opening stop, and where its lift is measured."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.network.network import Network
 from klack.network.port import Role
+from klack.network.travel import StopBound, Travel
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase
@@ -33,8 +35,8 @@ class ValveRoles:
     needle, point : str
         Component that moves, and its point whose displacement is the lift.
     seat, opening_stop : str
-        End stops below and above the needle, of several the one with the smallest gap; empty if
-        there is none.
+        End stops that end its way down and up, perhaps of another body that it pushes or rests on;
+        empty if there is none.
     """
 
     needle: str
@@ -76,13 +78,32 @@ def find_roles(case: "ValveCase") -> ValveRoles:
     gaps = {name: float(getattr(network.components[name], "gap", 0.0)) for name in meetings}
     above = [name for name, met in meetings.items() if met.lower and met.lower[0] == needle]
     below = [name for name, met in meetings.items() if met.upper and met.upper[0] == needle]
-    seat = min(below, key=gaps.__getitem__, default="")
-    opening = min(above, key=gaps.__getitem__, default="")
-    sides = [meetings[seat].upper] if seat else [meetings[opening].lower] if opening else []
-    point = sides[0][1] if sides and sides[0] else points[needle][0]
+    nearest_below = min(below, key=gaps.__getitem__, default="")
+    nearest_above = min(above, key=gaps.__getitem__, default="")
+    met = meetings.get(nearest_below or nearest_above)
+    side = met and (met.upper if nearest_below else met.lower)
+    point = side[1] if side else points[needle][0]
+    travel = _travel(case, network, meetings)
+    seat = next(iter(travel.lowest({needle: 1.0})[1]), nearest_below)
+    opening = next(iter(travel.highest({needle: 1.0})[1]), nearest_above)
     if case.run.lift is not None:
         point = case.run.lift.surface
     return ValveRoles(needle=needle, point=point, seat=seat, opening_stop=opening)
+
+
+def _travel(case: "ValveCase", network: Network, meetings: Mapping[str, Meeting]) -> Travel:
+    """How far the end stops that have a law let the free bodies go."""
+
+    def free(side: tuple[str, str] | None) -> str | None:
+        return None if side is None or _held(case, side[0]) else side[0]
+
+    bounds = []
+    for name, met in meetings.items():
+        part = network.components[name]
+        upper, lower = free(met.upper), free(met.lower)
+        if getattr(part, "law", None) is not None and upper != lower:
+            bounds.append(StopBound(name, upper, lower, float(getattr(part, "gap", 0.0))))
+    return Travel(bounds)
 
 
 def _needle(case: "ValveCase", points: dict[str, tuple[str, ...]]) -> str:

@@ -159,9 +159,18 @@ def _time(option: str, text: str) -> float:
 
 
 def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.stroke_summary import VARIANT_COLUMNS, variant_rows
+    from klack.workflow.stroke_summary import (
+        TIME_COLUMNS,
+        VARIANT_COLUMNS,
+        time_rows,
+        variant_rows,
+    )
 
     print_table(study.title, VARIANT_COLUMNS, variant_rows(study), to_stderr=to_stderr)
+    times = time_rows(study)
+    if times:
+        title = "times at shares of the lift"
+        print_table(title, TIME_COLUMNS, times, left=3, to_stderr=to_stderr)
     for variant in study.variants.values():
         _print_impacts(variant, to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, require_nonnegative, require_positive
-from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, barus_viscosity
+from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, PressureRange, barus_viscosity
 from klack.hydraulics.mixture import LOWEST_PRESSURE, EntrainedGas, Vapour
 
 __all__ = ["Fluid"]
@@ -41,6 +41,8 @@ class Fluid:
         ``alpha`` of :func:`~klack.hydraulics.liquid.barus_viscosity`.
     gas : EntrainedGas
     vapour : Vapour
+    known_range : PressureRange, optional
+        Where more is known of it than what the liquid's law says of itself.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class Fluid:
     vapour: Vapour
     gas: EntrainedGas = field(default_factory=EntrainedGas)
     pressure_viscosity: float = 0.0
+    known_range: PressureRange | None = None
 
     def __post_init__(self) -> None:
         require_positive("Fluid.temperature", self.temperature, "K")
@@ -76,6 +79,11 @@ class Fluid:
     def vapour_pressure(self) -> float:
         """Pressure [Pa] at which it boils."""
         return self.vapour.pressure
+
+    @property
+    def pressure_range(self) -> PressureRange:
+        """Absolute pressures for which the fluid is described, and where that comes from."""
+        return self.known_range or self.liquid.pressure_range
 
     @property
     def kinks(self) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from klack.hydraulics.liquid import (
     ATMOSPHERE,
     LiquidLaw,
     Murnaghan,
+    PressureRange,
     TabulatedLiquid,
     Tait,
     walther_viscosity,
@@ -293,6 +294,8 @@ class FluidDefinition:
         What the properties rest on.
     lowest_temperature, highest_temperature : float [K]
         Range in which the constants hold.
+    pressure_range : PressureRange, optional
+        Absolute pressures for which they hold; by default what the law of the liquid says.
     """
 
     name: str
@@ -300,6 +303,7 @@ class FluidDefinition:
     constants: tuple[Constant, ...] = ()
     lowest_temperature: float = 0.0
     highest_temperature: float = float("inf")
+    pressure_range: PressureRange | None = None
 
     @property
     def verified(self) -> bool:
@@ -342,6 +346,7 @@ class FluidDefinition:
             liquid=state.liquid,
             base_viscosity=state.viscosity,
             pressure_viscosity=state.pressure_viscosity,
+            known_range=self.pressure_range,
             vapour=Vapour(
                 pressure=state.vapour_pressure,
                 density=state.vapour_density,

@@ -15,6 +15,7 @@ from klack.hydraulics.fluid_definition import (
     MineralOil,
     TaitOil,
 )
+from klack.hydraulics.liquid import PressureRange
 from klack.input.problem import nearest, one_of
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
@@ -24,7 +25,13 @@ _READ_AT = 5e5  # [Pa]
 
 _GENERIC_OIL = "OpenHydraulics (Modelica), GenericOil.mo: 'approximately an ISO VG 46 oil'"
 _GUIDE = "usual value of this class of fluids, not traced to a measurement"
+_ISENTROPE = "bulk modulus within 10 % of the equation of state along isentropes from 0 to 100 degC"
+_LIKE_ALKANES = "n-decane and n-dodecane at the same share of the bulk modulus, within 10 %"
+_BARUS = "above it the viscosity of Barus is too steep"
 _FITTED = "Walther line through the two viscosities of the grade"
+
+_FUEL_PRESSURES = PressureRange(highest=2000e5, source=_LIKE_ALKANES)
+_OIL_PRESSURES = PressureRange(highest=1000e5, source=_BARUS)
 
 # column of MeasuredProperties: label, unit
 _COLUMNS = {
@@ -60,7 +67,7 @@ Source = tuple[float, str, bool]  # value, source, verified
 
 
 def _measured(
-    name: str, source: str, molar_mass: float, **columns: tuple[float, ...]
+    name: str, source: str, molar_mass: float, highest: float, **columns: tuple[float, ...]
 ) -> FluidDefinition:
     constants = [
         Constant(label=label, value=columns[key], unit=unit, source=source, verified=True)
@@ -81,6 +88,7 @@ def _measured(
         constants=(*constants, mass),
         lowest_temperature=_TEMPERATURES[0],
         highest_temperature=_TEMPERATURES[-1],
+        pressure_range=PressureRange(highest=highest, source=_ISENTROPE),
     )
 
 
@@ -90,6 +98,7 @@ def _from_constants(
     labels: Mapping[str, tuple[str, str]],
     lowest: float,
     highest: float,
+    pressures: PressureRange,
     **constants: Source,
 ) -> FluidDefinition:
     return FluidDefinition(
@@ -102,6 +111,7 @@ def _from_constants(
         ),
         lowest_temperature=lowest,
         highest_temperature=highest,
+        pressure_range=pressures,
     )
 
 
@@ -110,6 +120,7 @@ HEPTANE = _measured(
     "CoolProp 8.0.0: Span and Wagner, Int. J. Thermophys. 24 (2003) 41; viscosity Michailidou "
     "et al., J. Phys. Chem. Ref. Data 43 (2014)",
     0.100202,
+    500e5,
     density=(700.862, 684.196, 667.261, 649.925, 632.032, 613.385),
     bulk_modulus=(1.0725e9, 9.0843e8, 7.6385e8, 6.3631e8, 5.2372e8, 4.2431e8),
     bulk_modulus_slope=(12.055, 11.945, 11.844, 11.752, 11.665, 11.583),
@@ -123,6 +134,7 @@ DECANE = _measured(
     "CoolProp 8.0.0: Lemmon and Span, J. Chem. Eng. Data 51 (2006); viscosity Huber et al., Fluid "
     "Phase Equilib. 224 (2004)",
     0.142282,
+    750e5,
     density=(746.254, 730.724, 715.222, 699.659, 683.947, 667.995),
     bulk_modulus=(1.3377e9, 1.1527e9, 9.9123e8, 8.4955e8, 7.2475e8, 6.1446e8),
     bulk_modulus_slope=(12.572, 12.386, 12.218, 12.068, 11.931, 11.810),
@@ -136,6 +148,7 @@ DODECANE = _measured(
     "CoolProp 8.0.0: Lemmon and Huber, Energy Fuels 18 (2004); viscosity Huber et al., Energy "
     "Fuels 18 (2004)",
     0.170335,
+    800e5,
     density=(764.601, 749.724, 734.964, 720.227, 705.423, 690.464),
     bulk_modulus=(1.4725e9, 1.2741e9, 1.102e9, 9.5166e8, 8.1959e8, 7.0307e8),
     bulk_modulus_slope=(12.767, 12.563, 12.378, 12.208, 12.053, 11.907),
@@ -149,6 +162,7 @@ WATER = _measured(
     "CoolProp 8.0.0: IAPWS-95, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002); viscosity "
     "Huber et al., J. Phys. Chem. Ref. Data 38 (2009)",
     0.018015,
+    2500e5,
     density=(1000.046, 998.390, 992.391, 983.370, 971.969, 958.536),
     bulk_modulus=(1.9686e9, 2.1958e9, 2.3219e9, 2.3678e9, 2.3509e9, 2.2851e9),
     bulk_modulus_slope=(5.723, 6.030, 6.373, 6.707, 7.046, 7.390),
@@ -163,6 +177,7 @@ ISO_4113 = _from_constants(
     _OIL,
     273.15,
     373.15,
+    _FUEL_PRESSURES,
     density=(
         825.0,
         "middle of the band of ISO 4113:2010 (read as KS R ISO 4113:2012), 820 to 830 kg/m^3",
@@ -185,6 +200,7 @@ DIESEL = _from_constants(
     _OIL,
     273.15,
     373.15,
+    _FUEL_PRESSURES,
     density=(835.0, "within the band of EN 590, 820 to 845 kg/m^3", False),
     expansion=(8.3e-4, _GUIDE, False),
     bulk_modulus=(1.58e9, f"{_GUIDE}; compare Tat and Van Gerpen, JAOCS 80 (2003) 1127", False),
@@ -203,6 +219,7 @@ VG_32 = _from_constants(
     _OIL,
     263.15,
     373.15,
+    _OIL_PRESSURES,
     density=(870.0, _GUIDE, False),
     expansion=(7.0e-4, _GUIDE, False),
     bulk_modulus=(1.62e9, _GUIDE, False),
@@ -221,6 +238,7 @@ VG_46 = _from_constants(
     _OIL,
     263.15,
     373.15,
+    _OIL_PRESSURES,
     density=(875.0, _GUIDE, False),
     expansion=(7.0e-4, _GUIDE, False),
     bulk_modulus=(1.65e9, _GUIDE, False),
@@ -239,6 +257,7 @@ GENERIC_OIL = _from_constants(
     _TAIT,
     273.15,
     373.15,
+    _OIL_PRESSURES,
     density=(870.0, _GENERIC_OIL, True),
     expansion=(7.7e-4, _GENERIC_OIL, True),
     bulk_modulus=(8.4e9, _GENERIC_OIL, True),
@@ -257,6 +276,7 @@ DOT_4 = _from_constants(
     _OIL,
     233.15,
     373.15,
+    _OIL_PRESSURES,
     density=(1064.0, "middle of a data sheet's band 1.05 to 1.10 at 20 degC", False),
     expansion=(8.0e-4, _GUIDE, False),
     bulk_modulus=(2.2e9, f"{_GUIDE}, uncertain by 15 %", False),

@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.mixture import LOWEST_PRESSURE
 
-__all__ = ["HIGHEST_PRESSURE", "fluid_at", "fluid_table", "pressure_at"]
-
-HIGHEST_PRESSURE = 4e8
-"""Absolute pressure [Pa] up to which tables reach; beyond it the density goes on as a line."""
+__all__ = ["fluid_at", "fluid_table", "pressure_at"]
 
 _ROW = 8
 _TRACE = 1e-9  # [kg/m^3]

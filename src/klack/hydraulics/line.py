@@ -1,17 +1,21 @@
 """Line with water hammer: a bore in which pressure travels as waves."""
 
-from math import pi, sqrt
+from math import pi
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
+from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW
-from klack.network.rows import Rows
+from klack.network.rows import LimitRow, Rows
 from klack.units import Length, Modulus, Pressure
 
 if TYPE_CHECKING:
@@ -19,6 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Line"]
 
+_FOLLOWED = 0.1  # error of wave speed and impedance that is not worth a word
+_LOOKED_AT = 400  # pressures, in equal ratios
 _SEGMENTS = 2  # with friction: damps all modes of a fed line as spread friction does
 
 
@@ -42,7 +48,8 @@ class Line(Component):
     line; oils of 50 mm^2/s and more want 4 to 8, cavities a segment for each place.
 
     Limits: one sound speed and density, those at ``pressure`` (steps of some 10 bar change them by
-    a few per cent, free gas by far more); laminar friction, which fits transients of ms from rest
+    a few per cent, free gas by far more: a run in which the pressure at an end makes more than 10 %
+    of either says so, with both speeds); laminar friction, which fits transients of ms from rest
     also above Re = 2300; bends and fittings belong into an orifice.  A line needs a chamber or a
     pressure at each end; a tiny chamber closes it.
     Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
@@ -54,8 +61,11 @@ class Line(Component):
 
     length: Length = Field(examples=["100 mm"], gt=0, description="From end to end.")
     diameter: Length = Field(examples=["2 mm"], gt=0, description="Of the bore.")
-    pressure: Pressure = Field(
-        gt=0, description="Absolute, about which waves run; sets sound speed and density."
+    pressure: Pressure | None = Field(
+        default=None,
+        gt=0,
+        description="Absolute, about which waves run; sets sound speed and density. Default: the "
+        "start pressure of its ends (their mean).",
     )
     wall_thickness: Length | None = Field(
         default=None, gt=0, description="Of a tube; without it the wall is rigid."
@@ -88,25 +98,51 @@ class Line(Component):
         """Number of segments in use."""
         return self.segments or (1 if self.friction == "none" else _SEGMENTS)
 
-    def wave_speed(self, fluid: "Fluid") -> float:
-        r"""Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``."""
-        slowness = float(fluid.sound_speed(self.pressure)) ** -2
+    def wave_speed(self, fluid: "Fluid", pressure: float | None = None) -> float:
+        r"""Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``.
+
+        Parameters
+        ----------
+        fluid : Fluid
+        pressure : float, optional [Pa]
+            Absolute, about which they run; by default the one that the line was given.
+        """
+        about = self.pressure if pressure is None else pressure
+        if about is None:
+            raise InputError(
+                "Line.wave_speed: pressure",
+                got="none",
+                expected="the pressure about which the waves run",
+                hint="give it here or to the line; in a network it is that of its ends.",
+            )
+        return float(self._speeds(fluid, about))
+
+    def _speeds(self, fluid: "Fluid", pressure: ArrayLike) -> NDArray[np.float64]:
+        slowness = fluid.sound_speed(pressure) ** -2.0
         if self.wall_modulus is not None and self.wall_thickness is not None:
             stretch = self.diameter / (self.wall_modulus * self.wall_thickness)
-            slowness += float(fluid.density(self.pressure)) * stretch
-        return 1.0 / sqrt(slowness)
+            slowness = slowness + fluid.density(pressure) * stretch
+        return np.asarray(1.0 / np.sqrt(slowness))
 
-    def echo_time(self, fluid: "Fluid") -> float:
+    def echo_time(self, fluid: "Fluid", pressure: float | None = None) -> float:
         """Return ``2 L / a`` [s], after which an end hears of the other one."""
-        return 2.0 * self.length / self.wave_speed(fluid)
+        return 2.0 * self.length / self.wave_speed(fluid, pressure)
+
+    def mean_pressure(self, rows: Rows) -> float:
+        """Pressure [Pa] whose properties the line has: given, or that of its ends at the start."""
+        if self.pressure is not None:
+            return self.pressure
+        ends = [rows.nodes.get(rows.port(port)) for port in self.ports]
+        return float(np.mean([end.pressure[0] for end in ends if end is not None]))
 
     def add_rows(self, rows: Rows) -> None:
         """Add the delay line."""
         fluid = network_fluid(rows)
-        rho = float(fluid.density(self.pressure))
+        pressure = self.mean_pressure(rows)
+        rho = float(fluid.density(pressure))
         # the network counts P = rho_ref g and q = mdot / rho_ref, with rho_ref at ambient pressure
         scale = (float(fluid.density(rows.ambient.pressure)) / rho) ** 2
-        a, viscosity = self.wave_speed(fluid), float(fluid.viscosity(self.pressure))
+        a, viscosity = self.wave_speed(fluid, pressure), float(fluid.viscosity(pressure))
         resistance = scale * laminar_resistance(self.length, self.diameter, viscosity)
         gain, rate = unsteady_terms(
             KAGAWA,
@@ -126,3 +162,46 @@ class Line(Component):
             unsteady_rate=rate if memory else (),
             vapour_pressure=fluid.vapour_pressure,
         )
+        rows.limits += self._limits(rows, fluid, pressure)
+
+    def _limits(self, rows: Rows, fluid: "Fluid", pressure: float) -> list[LimitRow]:
+        """Pressures at the ends about which its one wave speed and its one impedance hold."""
+
+        def error(p: ArrayLike) -> NDArray[np.float64]:
+            """Larger of both errors [-]; the impedance is ``a / rho`` as the network counts it."""
+            at = np.append(np.asarray(p, dtype=float).ravel(), pressure)
+            speed = self._speeds(fluid, at)
+            both = [q[-1] / q[:-1] - 1.0 for q in (speed, speed / fluid.density(at))]
+            return np.asarray(np.max(np.abs(both), axis=0))
+
+        def effect(p: float) -> str:
+            speeds = [self.wave_speed(fluid, x) for x in (pressure, p)]
+            return (
+                f"Its waves run at {speeds[0]:.4g} m/s, those at {1e-5 * p:.4g} bar at "
+                f"{speeds[1]:.4g} m/s: the times of echoes, the pressures of a change of flow and "
+                f"the fluid that the line stores are up to {100.0 * float(error(p)[0]):.2g} % off "
+                "at such times."
+            )
+
+        boiling = fluid.vapour.kinks[1]  # below it the line opens a cavity of its own
+        below = np.geomspace(min(boiling, pressure), pressure, _LOOKED_AT)
+        above = np.geomspace(pressure, max(HIGHEST_PRESSURE, 2.0 * pressure), _LOOKED_AT)
+        fits_below, fits_above = error(below) <= _FOLLOWED, error(above) <= _FOLLOWED
+        low = 0.0 if fits_below.all() else float(below[np.flatnonzero(~fits_below)[-1] + 1])
+        high = above[-1] if fits_above.all() else above[np.flatnonzero(~fits_above)[0] - 1]
+        nodes = {rows.port(port) for port in self.ports} & rows.nodes.keys()
+        return [
+            LimitRow(
+                component=rows.component,
+                quantity="pressure at an end",
+                unit="Pa",
+                valid=(low, float(high)),
+                law=f"the line '{rows.component}' with the fluid of {1e-5 * pressure:.4g} bar",
+                effect=effect,
+                advice=f"give components.{rows.component}.pressure the one at which the waves that "
+                "matter run, and compare two runs with pressures that include it.",
+                key="pressure",
+                node=node,
+            )
+            for node in sorted(nodes)
+        ]

@@ -41,6 +41,7 @@ from klack.magnetics.flux_kernel import (
 )
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_table import MAP, MOST_TUBES, circuit_numbers
+from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import (
     map_current,
     map_energy,
@@ -49,7 +50,7 @@ from klack.magnetics.map_kernel import (
     map_step,
 )
 from klack.magnetics.quiet_step import DIODE, FRONT, quiet_step
-from klack.network.rows import Book, Channel, Rows
+from klack.network.rows import Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
 
 __all__ = [
@@ -84,6 +85,15 @@ FAILURES = {
     " the current moves in a step; widen the band, take a smaller step, or give the coil more"
     " leakage",
 }
+
+_GAP_ADVICE = (
+    "the stroke has to end before the working gap does: raise components.{name}.gap, or lower the "
+    "gap of the stop that ends the stroke (residual_gap stays open beside both)."
+)
+_MAP_ADVICE = (
+    "give components.{name}.gap as the table counts it, and in components.{name}.gaps every gap "
+    "that the stops allow."
+)
 
 _TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
 _MOST_EVENTS = 30
@@ -416,6 +426,7 @@ def flux_rows(
     armature: int,
     base: int,
     fluxes: ArrayLike = (),
+    gap_range: GapRange | None = None,
 ) -> None:
     """Add a solenoid to the rows of a network.
 
@@ -436,6 +447,8 @@ def flux_rows(
         Mechanical ports, perhaps :data:`klack.network.rows.GROUND`.
     fluxes : array, shape (n_loops,) [Wb]
         Loop fluxes at the start, at zero current: remanence.
+    gap_range : GapRange, optional
+        That of the tables of the plant by default.
 
     Raises
     ------
@@ -451,4 +464,23 @@ def flux_rows(
         books=BOOKS,
         channels=CHANNELS,
         failures=FAILURES,
+    )
+    known = gap_range or GapRange.of(plant)
+    advice = _MAP_ADVICE if isinstance(plant, FluxMap) else _GAP_ADVICE
+    way = -1.0 if closing else 1.0
+    rows.limits.append(
+        LimitRow(
+            component=rows.component,
+            quantity="gap",
+            unit="m",
+            valid=known.valid,
+            usable=known.usable,
+            slack=known.slack,
+            law=f"the magnet of '{rows.component}'",
+            effect=lambda value: "Its force there is a guess.",
+            advice=advice.format(name=rows.component),
+            key="gap",
+            start=gap,
+            ports=((armature, way), (base, -way)),
+        )
     )

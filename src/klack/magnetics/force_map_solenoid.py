@@ -13,10 +13,12 @@ from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
-from klack.network.rows import Rows
+from klack.network.rows import LimitRow, Rows
 from klack.units import Current, Flux, Force, Length, Resistance, Temperature
 
 __all__ = ["ForceMapSolenoid"]
+
+_BEYOND = 0.02  # of the largest current: a driver that limits it there overshoots a little
 
 
 class ForceMapSolenoid(Component):
@@ -28,6 +30,9 @@ class ForceMapSolenoid(Component):
     with one stored energy :math:`W(\psi, x)` built from the table, so that a stroke neither makes
     nor loses energy; see :class:`~klack.magnetics.flux_map.FluxMap`.  A force table is compared
     with that, and a disagreement above 5 % of its peak is warned of.
+
+    The table must hold every gap that the stops allow, and every current: beyond the last current
+    the linkage goes on straight, which is warned of.
 
     Limits: static map, so no eddy currents and no hysteresis; use
     :class:`~klack.magnetics.solenoid.Solenoid` where the first 100 us matter.
@@ -93,4 +98,18 @@ class ForceMapSolenoid(Component):
             closing=self.closes == "upward",
             armature=rows.port("armature"),
             base=rows.port("base"),
+        )
+        most = max(self.current)
+        rows.limits.append(
+            LimitRow(
+                component=rows.component,
+                quantity="current",
+                unit="A",
+                valid=(-most, most),
+                slack=_BEYOND * most,
+                law=f"the map of '{rows.component}'",
+                effect=lambda value: "The linkage goes on straight there, without saturation.",
+                advice="add currents to the table, or limit the current by the driver.",
+                channel=f"{rows.component} current",
+            )
         )

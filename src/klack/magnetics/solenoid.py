@@ -1,6 +1,7 @@
 """The solenoid of a valve: coil, pole gaps, iron, leakage, eddy currents."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ from klack.input.section import Number
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import flux_rows
+from klack.magnetics.gap_range import GapRange
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
 from klack.magnetics.static import static_state
@@ -47,6 +49,10 @@ class Solenoid(Component):
     ``residual_gap`` is what stays open when iron would touch: coating, shim, roughness.
     ``residual_flux`` sets a constant remanence such that this flux passes the closed gap without
     current; it lets an armature stick.
+
+    The stops have to end the stroke before the working gap is closed: a case in which they let the
+    armature pass through its pole is refused, and a run stops where contacts give way by half of
+    the residual gap.
 
     Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
     is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
@@ -137,19 +143,38 @@ class Solenoid(Component):
             armature=rows.port("armature"),
             base=rows.port("base"),
             fluxes=static_state(circuit, current=0.0, gap=self.gap).loop_fluxes,
+            gap_range=self.gap_range(),
+        )
+
+    def gap_range(self) -> GapRange:
+        """Gaps [m] from touching poles to where a pole is no wider than its gap.
+
+        A contact that gives way closes some of the residual gap as well: warned of from a tenth,
+        at half of it the run stops.
+        """
+        widest = max(pole.outer_radius for pole in self.poles)
+        end = max(widest, 2.0 * self.gap + self.residual_gap)
+        return GapRange(
+            valid=(0.0, end),
+            slack=0.1 * self.residual_gap,
+            usable=(-0.5 * self.residual_gap, 2.0 * end),
         )
 
     def _gap_law(self) -> GapReluctance:
-        """All poles in series, from half the residual gap of overlap to twice the start gap."""
+        """All poles in series, over the whole range of gaps; finest around the working gap."""
 
         def reluctance(x: Any) -> tuple[Any, Any]:
             parts = [pole.reluctance(x + self.residual_gap) for pole in self.poles]
             return sum(R for R, _ in parts), sum(dR for _, dR in parts)
 
-        start, end = -0.5 * self.residual_gap, 2.0 * self.gap + self.residual_gap
-        return GapReluctance.of(
-            reluctance, hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
-        )
+        known = self.gap_range()
+        ends = (known.usable[0], 2.0 * self.gap + self.residual_gap, known.valid[1])
+        grids = [
+            hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
+            for start, end in pairwise(ends)
+            if end > start
+        ]
+        return GapReluctance.of(reluctance, np.unique(np.concatenate(grids)))
 
     def _remanence(self, gap: GapReluctance, parasitic: float) -> float:
         """Constant mmf [A] that drives the residual flux through the closed circuit."""

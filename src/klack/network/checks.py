@@ -8,6 +8,7 @@ from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.network.nodes import Joint, Node
 from klack.network.port import Role
+from klack.network.ranges import check_ranges
 from klack.network.rows import GROUND, Rows
 from klack.units import format_si
 
@@ -182,7 +183,8 @@ def check_rows(rows: Rows) -> None:
     Raises
     ------
     InputError
-        For no body at all, an interface closed at the start, or a node without a row.
+        For no body at all, an interface closed at the start, a node without a row, or a stroke
+        that leaves the range of a law (:mod:`klack.network.ranges`).
 
     Warns
     -----
@@ -205,6 +207,7 @@ def check_rows(rows: Rows) -> None:
                 hint="start touching (gap 0): a preload then presses the stop together.",
             )
     _check_node_rows(rows)
+    check_ranges(rows)
     _warn_of_loose_bodies(rows)
 
 

@@ -4,8 +4,9 @@ Handles are plain integers: of a mechanical port (a degree of freedom along +z o
 a hydraulic node (one pressure).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -31,6 +32,7 @@ __all__ = [
     "ElementRow",
     "FilmRow",
     "InterfaceRow",
+    "LimitRow",
     "LineRow",
     "NodeRow",
     "Rows",
@@ -224,6 +226,62 @@ class LineRow:
     vapour_pressure: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LimitRow:
+    """Range in which a law holds, of one quantity that changes while the network runs.
+
+    The quantity is ``start + sum(factor * displacement)`` over ``ports``, or the pressure of
+    ``node``, or a recorded ``channel``.
+
+    Parameters
+    ----------
+    component : str
+        Whose quantity it is.
+    quantity : str
+        What it is called, as after "the": ``"gap"``.
+    unit : str
+        SI.
+    valid : (float, float)
+        Range of the law.  A motion that the stops allow may not leave it; checked before the run.
+    slack : float
+        What contacts may give way beyond that range before it is warned of, once.
+    usable : (float, float)
+        Beyond it the run stops.
+    law : str
+        Whose range it is: ``"the magnetic circuit of 'coil'"``; where ranges of several rows bear
+        the same name, only the first that is left is warned of.
+    source : str
+        Where the range comes from; may be empty.
+    effect : callable
+        What is wrong at a value outside, as a sentence.
+    advice : str
+        What to try.
+    key : str
+        Key of the component that sets the start; empty where no key does.
+    start : float
+    ports : tuple of (int, float)
+        Handle of a mechanical port, and its factor.
+    node : int, optional
+    channel : str
+    """
+
+    component: str
+    quantity: str
+    unit: str
+    valid: tuple[float, float]
+    usable: tuple[float, float] = (-inf, inf)
+    slack: float = 0.0
+    law: str
+    source: str = ""
+    effect: Callable[[float], str]
+    advice: str
+    key: str = ""
+    start: float = 0.0
+    ports: tuple[tuple[int, float], ...] = ()
+    node: int | None = None
+    channel: str = ""
+
+
 @dataclass(eq=False)
 class Rows:
     """Collects the rows of a network, one component after the other.
@@ -244,6 +302,7 @@ class Rows:
     walls: list[WallRow] = field(default_factory=list)
     interfaces: list[InterfaceRow] = field(default_factory=list)
     lines: list[LineRow] = field(default_factory=list)
+    limits: list[LimitRow] = field(default_factory=list)
 
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.

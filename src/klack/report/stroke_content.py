@@ -30,7 +30,13 @@ from klack.report.wording import count, own_code, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
 from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
-from klack.workflow.stroke_summary import first_impact, real_time_factor
+from klack.workflow.stroke_summary import (
+    NOT_REACHED,
+    TIME_COLUMNS,
+    first_impact,
+    real_time_factor,
+    time_rows,
+)
 
 __all__ = ["stroke_charts", "stroke_content"]
 
@@ -43,7 +49,11 @@ def stroke_content(study: StrokeStudy) -> Content:
     """Put a study into words, tables and figures."""
     libraries = [f"{name} {version}" for name, version in study.versions.items()]
     sections = [
-        Section(title="The actuation", charts=_named(actuation_chart(study))),
+        Section(
+            title="The actuation",
+            charts=_named(actuation_chart(study)),
+            tables=_time_tables(study),
+        ),
         _comparison(study, wet=True),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
         Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
@@ -260,6 +270,15 @@ def _fluid_table(fluid: FluidSummary) -> Table:
 # --------------------------------------------------------------------------- tables
 
 
+def _time_tables(study: StrokeStudy) -> tuple[Table, ...]:
+    rows = time_rows(study)
+    return (Table(columns=TIME_COLUMNS, rows=rows),) if rows else ()
+
+
+def _moment(time: float | None) -> str:
+    return NOT_REACHED if time is None else quantity(time, "s")
+
+
 def _number_table(study: StrokeStudy) -> Table:
     """Quantities down, variants across."""
     variants = list(study.variants.values())
@@ -290,8 +309,8 @@ def _number_table(study: StrokeStudy) -> Table:
 
 
 _VARIANT_ROWS: tuple[tuple[str, Callable[[StrokeVariant], str]], ...] = (
-    ("opening time", lambda v: quantity(v.opening_time, "s")),
-    ("closing time", lambda v: quantity(v.closing_time, "s")),
+    ("opening time", lambda v: _moment(v.needle_times.opening.touch)),
+    ("closing time", lambda v: _moment(v.needle_times.closing.touch)),
     ("impacts", lambda v: count(len(v.result.events))),
 )
 
@@ -368,8 +387,10 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "opening time, closing time",
-        "From the start of the run to the first touch of the opening stop, and to the first touch "
-        "of the seat after that (after the largest lift, if the stop is not reached).",
+        "From the start of the run to the first touch of the opening stop and of the seat, in the "
+        "first stroke that passes 90 % of the lift (else in the longest). A stroke begins and ends "
+        "at 10 % of the lift from where the needle was at rest; a valve that starts open closes "
+        "first. What a run does not reach, or a film cushions to the end, is not reached.",
     ),
     (
         "impact",

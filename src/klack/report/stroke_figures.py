@@ -195,13 +195,14 @@ def _moments(
     study: StrokeStudy, variant: StrokeVariant
 ) -> tuple[tuple[Mark, ...], tuple[Mark, ...]]:
     """Marks at opening, switching off and closing: with their words, and without."""
+    touches = variant.needle_times
     times = (
-        (variant.opening_time, "opening stop touched"),
-        (study.switch_off, "drive ends"),
-        (variant.closing_time, "seat touched"),
+        (touches.opening.touch, "opening stop touched"),
+        (study.switch_off if isfinite(study.switch_off) else None, "drive ends"),
+        (touches.closing.touch, "seat touched"),
     )
     end = float(variant.result.time[-1])
-    seen = [(1e3 * time, word) for time, word in times if isfinite(time) and time <= end]
+    seen = [(1e3 * time, word) for time, word in times if time is not None and time <= end]
     return (
         tuple(Mark(value=time, label=word) for time, word in sorted(seen)),
         tuple(Mark(value=time) for time, _ in seen),

@@ -7,7 +7,7 @@ import numpy as np
 from klack.report.wording import quantity, share
 from klack.simulation.network_result import ImpactEvent
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
-from klack.workflow.stroke_summary import first_impact, real_time_factor
+from klack.workflow.stroke_summary import real_time_factor, touch_event
 
 __all__ = ["largest", "stroke_answer"]
 
@@ -15,7 +15,11 @@ __all__ = ["largest", "stroke_answer"]
 def stroke_answer(study: StrokeStudy) -> str:
     """Opening, closing and the impacts of the reference, and how the other variants differ."""
     variant = study.reference
-    words = [f"{_opening(study, variant)} {_closing(study, variant)}"]
+    times = variant.needle_times
+    ways = [_opening(study, variant), _closing(study, variant)]
+    if times.starts == "open":
+        ways = [f"The {study.needle} starts open.", *ways[::-1]]
+    words = [" ".join(ways)]
     words.append(
         f"These numbers come from the variant '{variant.name}' ({variant.label}), "
         f"{quantity(float(variant.result.time[-1] - variant.result.time[0]), 's', 3)} computed in "
@@ -33,27 +37,46 @@ def largest(variant: StrokeVariant, channels: tuple[str, ...]) -> float:
 
 
 def _opening(study: StrokeStudy, variant: StrokeVariant) -> str:
+    passage = variant.needle_times.opening
     stop = study.channels.opening_stop
-    event = first_impact(variant, stop) if stop else None
-    if event is None or not isfinite(variant.opening_time):
-        lift = variant.channel(study.channels.lift)
-        way = float(lift.values.max()) if lift is not None else float("nan")
-        end = " and does not reach the opening stop." if stop else "."
-        return f"The {study.needle} lifts by {quantity(way, 'm', 3)}{end}"
-    return (
-        f"The {study.needle} reaches the opening stop after "
-        f"{quantity(variant.opening_time, 's', 4)} {_hit(study, variant, event)}."
-    )
+    event = touch_event(variant, passage)
+    if passage.touch is not None and event is not None:
+        again = " again" if variant.needle_times.starts == "open" else ""
+        return (
+            f"The {study.needle} reaches the opening stop{again} after "
+            f"{quantity(passage.touch, 's', 4)} {_hit(study, variant, event)}."
+        )
+    if variant.needle_times.starts == "open":
+        if passage.at_90 is not None:
+            return f"It is open again, to 90 % of its lift, at {quantity(passage.at_90, 's', 4)}."
+        return "It has not opened again at the end of the run."
+    lift = variant.channel(study.channels.lift)
+    way = float(lift.values.max()) if lift is not None else float("nan")
+    end = " and does not reach the opening stop." if stop else "."
+    if stop and passage.at_90 is not None:
+        end = (
+            f", passes 90 % of its lift at {quantity(passage.at_90, 's', 4)} and does not touch "
+            "the opening stop."
+        )
+    return f"The {study.needle} lifts by {quantity(way, 'm', 3)}{end}"
 
 
 def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
     seat = study.channels.seat
-    if not isfinite(variant.closing_time):
+    passage = variant.needle_times.closing
+    if passage.touch is None:
+        if passage.at_10 is not None:
+            return (
+                f"It is closed to 10 % of its lift at {quantity(passage.at_10, 's', 4)} and does "
+                "not touch its seat."
+            )
         return "It has not closed at the end of the run." if seat else ""
-    event = first_impact(variant, seat)
-    text = f"It is back on its seat at {quantity(variant.closing_time, 's', 4)}"
-    if isfinite(study.switch_off) and variant.closing_time > study.switch_off:
-        after = quantity(variant.closing_time - study.switch_off, "s", 3)
+    event = touch_event(variant, passage)
+    is_first = variant.needle_times.starts == "open"
+    text = f"It {'touches' if is_first else 'is back on'} its seat at "
+    text += quantity(passage.touch, "s", 4)
+    if isfinite(study.switch_off) and passage.touch > study.switch_off:
+        after = quantity(passage.touch - study.switch_off, "s", 3)
         text += f", {after} after the end of the drive"
     if event is None:
         return f"{text}."
@@ -77,11 +100,12 @@ def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
 def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
     """How much later or earlier another variant opens and closes."""
     parts = []
+    here, there = reference.needle_times, other.needle_times
     for word, one, two in (
-        ("opens", reference.opening_time, other.opening_time),
-        ("closes", reference.closing_time, other.closing_time),
+        ("opens", here.opening.touch, there.opening.touch),
+        ("closes", here.closing.touch, there.closing.touch),
     ):
-        if isfinite(one) and isfinite(two):
+        if one is not None and two is not None:
             side = "later" if two >= one else "earlier"
             apart = abs(two - one)
             parts.append(f"{word} {quantity(apart, 's', 3)} {side} ({share(apart / one, 1)})")

@@ -13,6 +13,7 @@ from klack import energy_balance
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.limits import Limits
 from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
     BEFORE,
@@ -153,8 +154,10 @@ def simulate_network(
     _read_stores(network)
     before = energy_stores(network)
     recorder.start(step * first_step, finder, fresh=fresh)
+    limits = Limits(network, [column.name for column in recorder.points])
+    limits.look(recorder.recording.points[:1], np.array([step * first_step]))
     begin = perf_counter()
-    failure = _run(network, recorder, finder, clock, grid, progress)
+    failure = _run(network, recorder, finder, limits, clock, grid, progress)
     wall_time = perf_counter() - begin
     records = recorder.looked // grid.looks
     if failure is not None and not records:
@@ -235,6 +238,7 @@ def _run(
     network: CompiledNetwork,
     recorder: Recorder,
     finder: ImpactFinder,
+    limits: Limits,
     clock: NDArray[np.int64],
     grid: _Grid,
     progress: Callable[[float], None],
@@ -248,11 +252,11 @@ def _run(
         to_record = grid.looks - recorder.looked % grid.looks
         count = min(chunk, looks - recorder.looked if chunk >= grid.looks else to_record)
         kept = _everything(network, clock)
-        good, failure = _try_chunk(network, recorder, clock, grid, count)
+        good, failure = _try_chunk(network, recorder, limits, clock, grid, count)
         if failure is not None:
             # again, without the looks that failed, so that all that is kept is of one moment
             _put_back(kept)
-            if good and _try_chunk(network, recorder, clock, grid, good)[1] is not None:
+            if good and _try_chunk(network, recorder, limits, clock, grid, good)[1] is not None:
                 _put_back(kept)  # one that cannot be repeated
                 good = 0
         if good:
@@ -267,6 +271,7 @@ def _run(
 def _try_chunk(
     network: CompiledNetwork,
     recorder: Recorder,
+    limits: Limits,
     clock: NDArray[np.int64],
     grid: _Grid,
     count: int,
@@ -299,6 +304,12 @@ def _try_chunk(
     elif failure is None and (name := _not_finite_account(network)):
         good = 0
         failure = _not_a_number(name, grid.step * int(clock[0]))
+    time = grid.step * (first + grid.look_steps * np.arange(1, good + 1))
+    try:
+        limits.look(recorder.recording.points[:good], time)
+    except ConvergenceError as error:  # a range left on the way is the better word
+        good = int(np.searchsorted(time, (error.time or 0.0) - 0.5 * grid.step))
+        failure = error
     return good, failure
 
 
@@ -426,7 +437,8 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         words = failed.failures.get(code, f"status {code} of its step function")
         return ConvergenceError(
             f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
-            "Try: a smaller step, and look whether its parameters and start values make sense."
+            "Try: a smaller step, and look whether its parameters and start values make sense.",
+            time=time,
         )
     if status == STATUS_PRESSURES:
         handle = network.node_order[row]
@@ -435,12 +447,14 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
             f"{name}: the pressures did not settle {when}.\n"
             f"State: {_numbers(network.nodes.p)} Pa.\n"
             "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
-            "entrained gas."
+            "entrained gas.",
+            time=time,
         )
     return ConvergenceError(
         f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
         f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
-        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
+        "Try: a smaller step; look for a stiffness far above 1e10 N/m.",
+        time=time,
     )
 
 

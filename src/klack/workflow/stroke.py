@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
+from math import isfinite
 from time import perf_counter
 
 import numpy as np
@@ -19,6 +20,7 @@ from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.rows import Rows
+from klack.network.travel import Travel
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.units import format_si
@@ -36,10 +38,11 @@ from klack.workflow.stroke_study import (
     StrokeStudy,
     StrokeVariant,
 )
+from klack.workflow.stroke_times import all_lift_times
 from klack.workflow.study import BodySummary
 from klack.workflow.valve import Valve, build_valve
 
-__all__ = ["opening_and_closing", "run_stroke", "run_variant", "variant_network"]
+__all__ = ["run_stroke", "run_variant", "variant_network"]
 
 
 def run_stroke(
@@ -97,7 +100,7 @@ def run_stroke(
         wall_time=perf_counter() - begin,
         stage_times=clock.times(),
         needle=roles.needle,
-        lift=_lift(valve.network, roles),
+        lift=_lift(rows[0], roles.needle),
         switch_off=_switch_off(valve.network),
         duration=case.run.duration,
         step=case.run.step,
@@ -210,7 +213,7 @@ def _run(
         )
     except IncompleteRunError as error:
         result, failure = error.result, error
-    opening, closing = opening_and_closing(result, roles)
+    times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     variant = StrokeVariant(
         name=name,
@@ -218,28 +221,13 @@ def _run(
         wet=wet,
         flexible=flexible,
         modes=sum(row.body.mode_count for row in rows.bodies),
-        opening_time=opening,
-        closing_time=closing,
+        opening_time=times[0].opening.touch if times else None,
+        closing_time=times[0].closing.touch if times else None,
+        times=times,
         result=result,
         setup_time=perf_counter() - begin - result.wall_time,
     )
     return _Run(variant=variant, rows=rows, failure=failure)
-
-
-def opening_and_closing(result: NetworkResult, roles: ValveRoles) -> tuple[float, float]:
-    """First touch of the opening stop, and of the seat after that [s]; nan if never."""
-    times = {stop: [e.time for e in result.events if e.stop == stop] for stop in _stops(roles)}
-    opening = min(times.get(roles.opening_stop, []), default=float("nan"))
-    since = opening
-    if np.isnan(opening):  # a short stroke: it left the seat, and came back
-        lift = result.channels[f"{roles.needle}.{roles.point} displacement"].values
-        since = float(result.time[int(np.argmax(lift))])
-    after = [time for time in times.get(roles.seat, []) if time > since]
-    return opening, min(after, default=float("nan"))
-
-
-def _stops(roles: ValveRoles) -> tuple[str, ...]:
-    return tuple(name for name in (roles.seat, roles.opening_stop) if name)
 
 
 def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
@@ -264,15 +252,11 @@ def _highest_pressure(rows: Rows) -> float:
     )
 
 
-def _lift(network: Network, roles: ValveRoles) -> float:
-    """Travel between the two stops [m], unloaded."""
-    gaps = [_gap(network, name) for name in _stops(roles)]
-    return sum(gaps) if roles.opening_stop else float("nan")
-
-
-def _gap(network: Network, name: str) -> float:
-    part = network.components[name]
-    return part.gap if isinstance(part, EndStop) else float("nan")
+def _lift(rows: Rows, needle: str) -> float:
+    """Travel between the stops [m], unloaded; nan if nothing ends it."""
+    travel = Travel.of(rows)
+    lift = travel.highest({needle: 1.0})[0] - travel.lowest({needle: 1.0})[0]
+    return lift if isfinite(lift) else float("nan")
 
 
 def _switch_off(network: Network) -> float:

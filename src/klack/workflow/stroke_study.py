@@ -6,6 +6,7 @@ without the solver.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from klack.errors import ConvergenceError
 from klack.reduction.structure import Structure
 from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
+from klack.workflow.stroke_times import LiftTimes, Passage
 from klack.workflow.study import BodySummary
 
 __all__ = [
@@ -166,11 +168,14 @@ class StrokeVariant:
     wet, flexible : bool
     modes : int
         Degrees of freedom of all bodies.
-    opening_time : float [s]
-        From the start of the run to the first touch of the opening stop; nan if never.
-    closing_time : float [s]
-        From the start of the run to the first touch of the seat after that (after the needle
-        left it, if it never reached the opening stop); nan if never.
+    opening_time : float or None [s]
+        From the start of the run to the first touch of the opening stop in the stroke of
+        ``times``; None if it is not touched.
+    closing_time : float or None [s]
+        The same for the seat.  A valve that starts open closes before it opens.
+    times : tuple of LiftTimes
+        Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
+        lift, and the touches.
     result : NetworkResult
     setup_time : float [s]
         Wall time of everything before the time loop that is this variant's own.
@@ -181,10 +186,30 @@ class StrokeVariant:
     wet: bool
     flexible: bool
     modes: int
-    opening_time: float
-    closing_time: float
+    opening_time: float | None
+    closing_time: float | None
     result: NetworkResult
     setup_time: float
+    times: tuple[LiftTimes, ...] = ()
+
+    @property
+    def needle_times(self) -> LiftTimes:
+        """Opening and closing of the needle; of older results, its touches only."""
+        if self.times:
+            return self.times[0]
+        touches = [
+            time if time is not None and isfinite(time) else None
+            for time in (self.opening_time, self.closing_time)
+        ]
+        opening, closing = (Passage(touch=touch) for touch in touches)
+        return LiftTimes(
+            body="",
+            starts="closed",
+            lift=None,
+            between_stops=False,
+            opening=opening,
+            closing=closing,
+        )
 
     def impacts(self, stop: str, *, slowest: float = 0.0) -> tuple[ImpactEvent, ...]:
         """Impacts on one stop, faster than ``slowest`` [m/s], in order of time."""
@@ -268,13 +293,13 @@ class StrokeStudy:
         return next(iter(self.variants.values()))
 
     @property
-    def opening_time(self) -> float:
-        """Opening time of the reference [s]."""
+    def opening_time(self) -> float | None:
+        """Opening time of the reference [s]; None if it does not reach its stop."""
         return self.reference.opening_time
 
     @property
-    def closing_time(self) -> float:
-        """Closing time of the reference [s]."""
+    def closing_time(self) -> float | None:
+        """Closing time of the reference [s]; None if it does not reach its seat."""
         return self.reference.closing_time
 
 

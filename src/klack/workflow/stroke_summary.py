@@ -7,14 +7,19 @@ from typing import Any
 from klack.simulation.network_result import ImpactEvent
 from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.stroke_times import LiftTimes, Passage
 
 __all__ = [
     "IMPACT_COLUMNS",
+    "NOT_REACHED",
+    "TIME_COLUMNS",
     "VARIANT_COLUMNS",
     "first_impact",
     "impact_rows",
     "real_time_factor",
     "stroke_to_json",
+    "time_rows",
+    "touch_event",
     "variant_rows",
 ]
 
@@ -29,6 +34,17 @@ VARIANT_COLUMNS = (
     "wall time [s]",
     "real-time factor",
 )
+TIME_COLUMNS = (
+    "variant",
+    "body",
+    "way",
+    "10 % [ms]",
+    "50 % [ms]",
+    "90 % [ms]",
+    "touch [ms]",
+    "of",
+)
+NOT_REACHED = "not reached"
 IMPACT_COLUMNS = (
     "stop",
     "time [ms]",
@@ -52,11 +68,15 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
     dict
         ``case``, ``own_components`` (with the first digits of the SHA-256 of their code),
         ``variant`` (the reference) and its numbers: ``events``, ``opening_time_s``,
-        ``closing_time_s``, ``energy_residual`` (share of the throughput), ``steps``,
-        ``wall_time_s`` (of the time loop), ...; ``complete`` and ``failure`` (why the run ended
-        early, at ``end_time_s``); ``fine_record_ends_s`` (end stops whose force in fine steps is
-        known up to there only; empty if all are); ``variants``: the same of every variant by its
-        name.  Numbers that do not exist (nan) are None.
+        ``closing_time_s`` (the touches of both stops), ``opening`` and ``closing`` (the stop, its
+        ``touch_s``, and ``at_10_percent_s``, ``at_50_percent_s``, ``at_90_percent_s`` of the
+        lift), ``starts`` (closed or open: which of both comes first), ``lift_m``, ``bodies`` (the
+        same of every other body between stops), ``energy_residual`` (share of the throughput),
+        ``steps``, ``wall_time_s`` (of the time loop), ...; ``complete`` and ``failure`` (why the
+        run ended early, at ``end_time_s``); ``fine_record_ends_s`` (end stops whose force in fine
+        steps is known up to there only; empty if all are); ``variants``: the same of every
+        variant by its name.  Times that are not reached in the run, and numbers that do not
+        exist, are None.
     """
     variants = {name: _numbers(variant) for name, variant in study.variants.items()}
     reference = study.reference.name
@@ -75,8 +95,8 @@ def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
             variant.name,
-            _text(1e3 * variant.opening_time, ".4f"),
-            _text(1e3 * variant.closing_time, ".4f"),
+            _moment(variant.needle_times.opening.touch),
+            _moment(variant.needle_times.closing.touch),
             str(len(variant.result.events)),
             f"{variant.result.books.relative_residual:.1e}",
             str(variant.modes),
@@ -85,6 +105,37 @@ def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
             _text(real_time_factor(variant), ".3g"),
         )
         for variant in study.variants.values()
+    )
+
+
+def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`TIME_COLUMNS`: both ways of every body between stops, the first one first."""
+    return tuple(
+        (
+            variant.name,
+            times.body,
+            way,
+            _moment(passage.at_10),
+            _moment(passage.at_50),
+            _moment(passage.at_90),
+            _moment(passage.touch) if passage.stop else "no stop",
+            passage.stop or "–",
+        )
+        for variant in study.variants.values()
+        for times in variant.times
+        for way, passage in times.in_order
+    )
+
+
+def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
+    """Impact that ends a way; None if it does not reach its stop."""
+    return next(
+        (
+            event
+            for event in variant.result.events
+            if event.time == passage.touch and passage.stop in ("", event.stop)
+        ),
+        None,
     )
 
 
@@ -130,8 +181,10 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
         "end_time_s": _number(float(result.time[-1])),
         "fine_record_ends_s": {stop: _number(t) for stop, t in cut_records(result).items()},
         "events": [_event(event) for event in result.events],
-        "opening_time_s": _number(variant.opening_time),
-        "closing_time_s": _number(variant.closing_time),
+        "opening_time_s": variant.needle_times.opening.touch,
+        "closing_time_s": variant.needle_times.closing.touch,
+        **_times(variant.needle_times),
+        "bodies": {times.body: _times(times) for times in variant.times[1:]},
         "energy_residual": _number(result.books.relative_residual),
         "energy_throughput_J": _number(result.books.throughput),
         "steps": int(result.fine_steps + result.coarse_steps),
@@ -141,6 +194,26 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
         "wall_time_s": _number(result.wall_time),
         "real_time_factor": _number(real_time_factor(variant)),
         "degrees_of_freedom": int(variant.modes),
+    }
+
+
+def _times(times: LiftTimes) -> dict[str, Any]:
+    return {
+        "starts": times.starts,
+        "lift_m": times.lift,
+        "lift_between_stops": times.between_stops,
+        "opening": _passage(times.opening),
+        "closing": _passage(times.closing),
+    }
+
+
+def _passage(passage: Passage) -> dict[str, str | float | None]:
+    return {
+        "at_10_percent_s": passage.at_10,
+        "at_50_percent_s": passage.at_50,
+        "at_90_percent_s": passage.at_90,
+        "stop": passage.stop or None,
+        "touch_s": passage.touch,
     }
 
 
@@ -162,6 +235,10 @@ def _event(event: ImpactEvent) -> dict[str, str | float | None]:
 def _number(value: float) -> float | None:
     """JSON knows no nan and no infinity."""
     return float(value) if isfinite(value) else None
+
+
+def _moment(time: float | None) -> str:
+    return NOT_REACHED if time is None else f"{1e3 * time:.4f}"
 
 
 def _text(value: float, form: str) -> str:

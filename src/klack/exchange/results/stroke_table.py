@@ -12,6 +12,7 @@ from klack.exchange.results.table import (
 )
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord, NetworkResult
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.stroke_times import LiftTimes
 
 __all__ = ["stroke_table"]
 
@@ -129,13 +130,28 @@ def _events(stop: str, events: list[ImpactEvent]) -> tuple[ResultAxis, list[Resu
     ]
 
 
+def _times(times: LiftTimes) -> list[tuple[str, str, float, str]]:
+    """Moments of the needle that the run reaches."""
+    ways = (("opening", times.opening, "the opening stop"), ("closing", times.closing, "the seat"))
+    found = [
+        entry
+        for way, passage, stop in ways
+        for entry in (
+            (f"{way} time", passage.touch, f"first touch of {passage.stop or stop}"),
+            (f"{way} time at 10 percent", passage.at_10, "of the lift"),
+            (f"{way} time at 50 percent", passage.at_50, "of the lift"),
+            (f"{way} time at 90 percent", passage.at_90, "of the lift"),
+        )
+    ]
+    return [(name, "s", time, meaning) for name, time, meaning in found if time is not None]
+
+
 def _scalars(
     variant: StrokeVariant, result: NetworkResult, step: float
 ) -> tuple[ResultScalar, ...]:
     books = result.books
     numbers = [
-        ("opening time", "s", variant.opening_time, "first touch of the opening stop"),
-        ("closing time", "s", variant.closing_time, "first touch of the seat after that"),
+        *_times(variant.needle_times),
         ("complete", "1", not result.failure, "1 if the run came to its end"),
         ("impacts", "1", len(result.events), "on all stops"),
         ("energy residual", "1", books.relative_residual, "share of the throughput"),

@@ -1,0 +1,156 @@
+"""Ranges of a whole network, and what can be said of them before it runs."""
+
+from collections import defaultdict
+from math import inf
+
+from klack.input.problem import CaseProblem
+from klack.network.rows import AMBIENT, LimitRow, Rows
+from klack.network.travel import Travel
+from klack.units import format_si
+
+__all__ = ["check_ranges", "limits_of", "range_text", "value_text"]
+
+_ROUNDING = 1e-9  # of the start value: what sums of lengths leave
+
+
+def limits_of(rows: Rows) -> list[LimitRow]:
+    """Every range of a network: those of its components, of its volumes, and of its fluid."""
+    return [*rows.limits, *_volumes(rows), *_pressures(rows)]
+
+
+def _volumes(rows: Rows) -> list[LimitRow]:
+    walls = defaultdict[int, list[tuple[int, float]]](list)
+    for wall in rows.walls:
+        if rows.nodes[wall.node].volume > 0.0:
+            walls[wall.node].append((wall.port, wall.area))
+    return [
+        LimitRow(
+            component=rows.nodes[node].component,
+            quantity="volume",
+            unit="m^3",
+            valid=(0.0, inf),
+            usable=(0.0, inf),
+            law="a chamber",
+            effect=lambda value: "No fluid is left in it.",
+            advice="give it its volume with all faces where they start, dead volume included, or "
+            "give the face that moves in its true area.",
+            key="volume",
+            start=rows.nodes[node].volume,
+            ports=tuple(ports),
+        )
+        for node, ports in walls.items()
+    ]
+
+
+def _pressures(rows: Rows) -> list[LimitRow]:
+    if rows.fluid is None:
+        return []
+    known = rows.fluid.pressure_range
+    name = rows.fluid.name
+    return [
+        LimitRow(
+            component=row.component,
+            quantity="pressure",
+            unit="Pa",
+            valid=(known.lowest, known.highest),
+            usable=(-inf, known.usable),
+            law=f"the fluid '{name}'",
+            source=known.source,
+            effect=lambda value: (
+                "Stiffness and waves are more than 10 % and 5 % off, volumes and flows less."
+            ),
+            advice="check volumes, flows and pressures (absolute, with their units); where they "
+            "are meant, give a fluid of your own with a table of densities.",
+            node=node,
+        )
+        for node, row in rows.nodes.items()
+    ]
+
+
+def check_ranges(rows: Rows) -> None:
+    """Refuse what must leave a range: by the stops, by a start, or by a prescribed pressure.
+
+    Raises
+    ------
+    CaseProblem
+        That names the component and, where stops allow the motion, their gaps.
+    """
+    travel = Travel.of(rows)
+    for limit in limits_of(rows):
+        if limit.ports:
+            _check_motion(rows, limit, travel)
+        elif limit.node is not None:
+            _check_pressure(rows, limit)
+
+
+def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
+    low, high = limit.valid
+    factors = Travel.factors(rows, limit.ports)
+    least, below = travel.lowest(factors)
+    most, above = travel.highest(factors)
+    slack = _ROUNDING * abs(limit.start)
+    if not low - slack <= limit.start <= high + slack:
+        raise CaseProblem(
+            ("components", limit.component, *([limit.key] if limit.key else [])),
+            got=f"{value_text(limit.start, limit.unit)} at the start",
+            expected=f"a {limit.quantity} in the range of {limit.law}, {range_text(limit)}",
+            hint=limit.advice,
+        )
+    for way, stops, is_out in (
+        (least, below, limit.start + least < low - slack),
+        (most, above, limit.start + most > high + slack),
+    ):
+        if not is_out or abs(way) == inf:  # nothing bounds it: the run will show
+            continue
+        raise CaseProblem(
+            ("components", limit.component, *([limit.key] if limit.key else [])),
+            got=_way_text(rows, limit, way, stops),
+            expected=f"a {limit.quantity} {range_text(limit)} wherever the stops let it go",
+            hint=limit.advice,
+        )
+
+
+def _way_text(rows: Rows, limit: LimitRow, way: float, stops: tuple[str, ...]) -> str:
+    """Both numbers: what there is at the start, and what the stops let the motion take or add."""
+    start, change = (value_text(abs(value), limit.unit) for value in (limit.start, way))
+    gaps = {row.component: row.gap for row in rows.interfaces}
+    named = " and ".join(f"components.{name}.gap: {format_si(gaps[name], 'm')}" for name in stops)
+    if not stops:
+        return f"{start} at the start"
+    does = "from which a stroke can take" if way < 0.0 else "to which a stroke can add"
+    return f"{start} at the start, {does} up to {change} ({named})"
+
+
+def _check_pressure(rows: Rows, limit: LimitRow) -> None:
+    assert limit.node is not None
+    highest = float(rows.nodes[limit.node].pressure.max())
+    if highest <= limit.usable[1]:
+        return
+    key = ("ambient",) if limit.node == AMBIENT else ("components", limit.component)
+    raise CaseProblem(
+        key,
+        got=f"a pressure of {value_text(highest, 'Pa')}",
+        expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
+        f"{range_text(limit)}",
+        hint=limit.advice,
+    )
+
+
+def range_text(limit: LimitRow) -> str:
+    """Range of the law in words: "from 0 m to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
+    low, high = limit.valid
+    text = f"from {value_text(low, limit.unit)} to {value_text(high, limit.unit)}"
+    if high == inf:
+        text = f"above {value_text(low, limit.unit)}"
+    elif low <= 0.0 and limit.unit == "Pa":
+        text = f"up to {value_text(high, limit.unit)}"
+    return f"{text} ({limit.source})" if limit.source else text
+
+
+def value_text(value: float, unit: str) -> str:
+    """Quantity as people of this field write it: pressures in bar, volumes in mm^3."""
+    if unit == "Pa":
+        return f"{1e-5 * value:.5g} bar"
+    if unit == "m^3":
+        return f"{1e9 * value:.4g} mm^3"
+    return format_si(value, unit)

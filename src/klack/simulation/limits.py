@@ -1,0 +1,108 @@
+"""Ranges of laws while a network runs: left, they are warned of once; left grossly, the run stops.
+
+Looked at are the records of the time loop, not its steps: an excursion shorter than a record may be
+missed, one that matters for a result is not.
+"""
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import AccuracyWarning, ConvergenceError
+from klack.network.ranges import limits_of, range_text, value_text
+from klack.network.rows import LimitRow
+from klack.simulation.network_compile import CompiledNetwork
+from klack.units import format_si
+
+__all__ = ["Limits"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class Limits:
+    """Watches all ranges of a network.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+    columns : sequence of str
+        Names of the recorded columns, displacements of all ports first: see
+        :func:`klack.simulation.network_kernel.record_points`.
+    """
+
+    def __init__(self, network: CompiledNetwork, columns: list[str]) -> None:
+        self._told: set[str] = set()
+        ports = len(network.ports)
+        pressures = 2 * ports + sum(row.body.rigid_count > 0 for row in network.rows.bodies)
+        self._watched: list[tuple[LimitRow, Vector]] = []
+        for limit in limits_of(network.rows):
+            weights = np.zeros(len(columns))
+            for handle, factor in limit.ports:
+                place = network.port_of[handle]
+                if place < ports:  # the last one is the ground
+                    weights[place] += factor
+            if limit.node is not None:
+                weights[pressures + network.node_order.index(limit.node)] = 1.0
+            if limit.channel:
+                weights[columns.index(limit.channel)] = 1.0
+            self._watched.append((limit, weights))
+
+    def look(self, points: Matrix, time: Vector) -> None:
+        """Look at some records.
+
+        Parameters
+        ----------
+        points : array, shape (n, columns)
+        time : array, shape (n,) [s]
+
+        Warns
+        -----
+        AccuracyWarning
+            Once for each law whose range is left.
+
+        Raises
+        ------
+        ConvergenceError
+            Where a quantity leaves what can be computed with.
+        """
+        left = []
+        for limit, weights in self._watched:
+            used = np.flatnonzero(weights)
+            values = limit.start + points[:, used] @ weights[used]
+            low, high = limit.usable
+            gone = np.flatnonzero((values <= low) | (values > high))
+            if gone.size:
+                left.append((int(gone[0]), limit, values))
+            low, high = limit.valid[0] - limit.slack, limit.valid[1] + limit.slack
+            out = np.flatnonzero((values < low) | (values > high))
+            if out.size and limit.law not in self._told:
+                self._told.add(limit.law)
+                warnings.warn(_warning(limit, values, time, int(out[0])), AccuracyWarning, 3)
+        if left:
+            place, limit, values = min(left, key=lambda item: item[0])
+            raise _stop(limit, float(values[place]), float(time[place]))
+
+
+def _warning(limit: LimitRow, values: Vector, time: Vector, first: int) -> str:
+    low, high = limit.valid
+    beyond = np.maximum(low - values, values - high)
+    worst = int(np.nanargmax(beyond))
+    furthest = value_text(float(values[worst]), limit.unit)
+    if worst != first:
+        furthest = f"{value_text(float(values[first]), limit.unit)}, later {furthest}"
+    return (
+        f"'{limit.component}': at {format_si(float(time[first]), 's')} the {limit.quantity} leaves "
+        f"the range of {limit.law}, {range_text(limit)}: it is {furthest}. "
+        f"{limit.effect(float(values[worst]))}\nTry: {limit.advice}"
+    )
+
+
+def _stop(limit: LimitRow, value: float, time: float) -> ConvergenceError:
+    return ConvergenceError(
+        f"{limit.component}: the {limit.quantity} is {value_text(value, limit.unit)} at "
+        f"{format_si(time, 's', 6)}, far outside the range of {limit.law}, {range_text(limit)}.\n"
+        f"Try: {limit.advice}",
+        time=time,
+    )

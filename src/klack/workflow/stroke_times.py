@@ -1,0 +1,232 @@
+"""When a valve opens and closes: passing 10, 50 and 90 % of its lift, and touching its stops."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.network.rows import Rows
+from klack.network.travel import Travel
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+
+__all__ = ["LiftTimes", "Passage", "all_lift_times", "lift_times"]
+
+Vector = NDArray[np.float64]
+
+_MOVED = 0.1  # share of the lift at which a motion begins and ends
+_NO_LIFT = 1e-8  # [m] less is the elasticity of what is closed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passage:
+    """One way between the ends of a lift; None where it does not get there within the run.
+
+    Parameters
+    ----------
+    at_10, at_50, at_90 : float or None [s]
+        From the start of the run, at these shares of the lift: 0 closed, 1 open.
+    stop : str
+        End stop at which the way ends; empty if there is none.
+    touch : float or None [s]
+        First contact there.  None as well where a film cushions it to the end.
+    """
+
+    at_10: float | None = None
+    at_50: float | None = None
+    at_90: float | None = None
+    stop: str = ""
+    touch: float | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it passes anything."""
+        return any(time is not None for time in (self.at_10, self.at_50, self.at_90, self.touch))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiftTimes:
+    """Opening and closing of one body in a run.
+
+    Parameters
+    ----------
+    body : str
+        Component.
+    starts : str
+        ``"closed"`` or ``"open"``: the nearer end of the lift at the start.  A valve that starts
+        open closes first, and its opening is the one after that.
+    lift : float or None [m]
+        Between both ends; None if nothing moved.
+    between_stops : bool
+        Whether stops end the lift; else it counts to the furthest place of the run.
+    opening, closing : Passage
+    """
+
+    body: str
+    starts: str
+    lift: float | None
+    between_stops: bool
+    opening: Passage
+    closing: Passage
+
+    @property
+    def in_order(self) -> tuple[tuple[str, Passage], ...]:
+        """Both motions, the first one first."""
+        both = (("opening", self.opening), ("closing", self.closing))
+        return both if self.starts == "closed" else both[::-1]
+
+
+def all_lift_times(
+    result: NetworkResult, rows: Rows, needle: str, point: str
+) -> tuple[LiftTimes, ...]:
+    """Times of the needle first, then of every other body that stops hold on both sides.
+
+    Parameters
+    ----------
+    result : NetworkResult
+    rows : Rows
+        Of the same run.
+    needle, point : str
+        Component, and its port whose displacement is the lift.
+    """
+    travel = Travel.of(rows)
+    found = []
+    for row in sorted(rows.bodies, key=lambda row: row.component != needle):
+        low, below = travel.lowest({row.component: 1.0})
+        high, above = travel.highest({row.component: 1.0})
+        is_needle = row.component == needle
+        if row.body.rigid_count == 0 or not (
+            is_needle or (isfinite(high - low) and high - low > _NO_LIFT)
+        ):
+            continue
+        port = point if is_needle else row.names[0]
+        found.append(
+            lift_times(
+                result.time,
+                result.channels[f"{row.component}.{port} displacement"].values,
+                result.events,
+                body=row.component,
+                ends=(low, high),
+                stops=("".join(below[:1]), "".join(above[:1])),
+            )
+        )
+    return tuple(found)
+
+
+def lift_times(
+    time: Vector,
+    displacement: Vector,
+    events: Sequence[ImpactEvent],
+    *,
+    body: str,
+    ends: tuple[float, float],
+    stops: tuple[str, str],
+) -> LiftTimes:
+    """Times of one body: the first stroke that passes 90 % of its lift, else the longest one.
+
+    A stroke begins where 10 % of the lift from the end at rest are passed, and ends where the body
+    comes back below them; between two records the displacement is a straight line.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+    displacement : array, shape (n,) [m]
+        Along +z, the direction of opening.
+    events : sequence of ImpactEvent
+    body : str
+    ends : (float, float) [m]
+        Displacements closed and open; infinite where no stop ends the lift.
+    stops : (str, str)
+        End stops there.
+    """
+    closed, opened = ends
+    free = not (isfinite(closed) and isfinite(opened))
+    low = closed if isfinite(closed) else float(displacement.min())
+    high = opened if isfinite(opened) else float(displacement.max())
+    if high - low <= _NO_LIFT:
+        return LiftTimes(
+            body=body,
+            starts="closed",
+            lift=None,
+            between_stops=not free,
+            opening=Passage(stop=stops[1]),
+            closing=Passage(stop=stops[0]),
+        )
+    share = (displacement - low) / (high - low)
+    is_open = bool(share[0] > 0.5)
+    rest, far = stops[::-1] if is_open else stops
+    away, back = _stroke(time, 1.0 - share if is_open else share, events, rest, far)
+    if is_open:  # passed 10 % from the open end: 90 % of the lift
+        away, back = _mirrored(away), _mirrored(back)
+    return LiftTimes(
+        body=body,
+        starts="open" if is_open else "closed",
+        lift=high - low,
+        between_stops=not free,
+        opening=back if is_open else away,
+        closing=away if is_open else back,
+    )
+
+
+def _stroke(
+    time: Vector, share: Vector, events: Sequence[ImpactEvent], rest: str, far: str
+) -> tuple[Passage, Passage]:
+    """Away from the end at rest, and back."""
+    outside = np.concatenate(([False], share >= _MOVED, [False]))
+    edges = np.flatnonzero(outside[1:] != outside[:-1])
+    strokes = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    if not strokes:
+        return Passage(stop=far), Passage(stop=rest)
+    peaks = [float(share[a:b].max()) for a, b in strokes]
+    whole = [i for i, peak in enumerate(peaks) if peak >= 1.0 - _MOVED]
+    first, end = strokes[whole[0] if whole else int(np.argmax(peaks))]
+    inside = share[first:end]
+    top = first + int(np.argmax(inside >= 1.0 - _MOVED) if whole else np.argmax(inside))
+
+    def leaving(level: float) -> float | None:
+        k = first + int(np.argmax(inside >= level))
+        return _crossing(time, share, k - 1, level) if k > 0 and share[k] >= level else None
+
+    def returning(level: float) -> float | None:
+        at = np.flatnonzero(inside >= level)
+        k = first + int(at[-1]) if at.size else time.size
+        return _crossing(time, share, k, level) if k + 1 < time.size else None
+
+    until = time[end] if end < time.size else np.inf
+    away = Passage(
+        at_10=leaving(0.1),
+        at_50=leaving(0.5),
+        at_90=leaving(0.9),
+        stop=far,
+        touch=_touch(events, far, float(time[max(first - 1, 0)]), float(until)),
+    )
+    back = Passage(
+        at_10=returning(0.1),
+        at_50=returning(0.5),
+        at_90=returning(0.9),
+        stop=rest,
+        touch=_touch(events, rest, float(time[top]), np.inf),
+    )
+    return away, back
+
+
+def _mirrored(motion: Passage) -> Passage:
+    return Passage(
+        at_10=motion.at_90,
+        at_50=motion.at_50,
+        at_90=motion.at_10,
+        stop=motion.stop,
+        touch=motion.touch,
+    )
+
+
+def _crossing(time: Vector, share: Vector, k: int, level: float) -> float:
+    """Time of a level between the records ``k`` and ``k + 1``."""
+    part = (level - share[k]) / (share[k + 1] - share[k])
+    return float(time[k] + part * (time[k + 1] - time[k]))
+
+
+def _touch(events: Sequence[ImpactEvent], stop: str, after: float, until: float) -> float | None:
+    times = [event.time for event in events if event.stop == stop and after <= event.time <= until]
+    return min(times, default=None)
