@@ -20,7 +20,7 @@ from klack.contact.history import ImpactHistory
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
 from klack.workflow.interface_level import ExactGaps, build_interface, exact_gaps, simulate_case
-from klack.workflow.levels import mode_pools, run_full
+from klack.workflow.levels import kept_modes, mode_pools, run_full
 from klack.workflow.problem import build_problem
 from klack.workflow.progress import silent
 
@@ -78,7 +78,8 @@ def main() -> None:
         begin = perf_counter()
         model = build_interface(problem, pools)
         built = perf_counter() - begin
-        full, result = run_full(problem, pools, progress=silent, threads=options.threads)
+        kept = kept_modes(problem, pools)
+        full, result = run_full(problem, pools, kept=kept, progress=silent, threads=options.threads)
         print(
             f"{name}: full order {full.measures.peak_force:.2f} N, "
             f"{1e6 * full.measures.contact_time:.2f} us, restitution "

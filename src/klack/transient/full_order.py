@@ -7,7 +7,9 @@ Between :math:`t` and :math:`t + h` a body with trapezoidal inertia obeys
 
 with the free flight :math:`w = u_0 + h v_0`, the contact forces :math:`\lambda` of mid step and
 the gaps :math:`g = g_0 + \sum_b G_b u_b` at the end, :math:`0 \le \lambda \perp g_1 \ge 0`.  There
-is no penalty and no regularisation.  Two schemes keep the forces quiet:
+is no penalty and no regularisation.  Damping (:mod:`klack.transient.body_damping`) adds
+:math:`\tfrac{2}{h} C (u_1 - u_0)` to the left side and takes
+:math:`\tfrac{1}{h} (u_1 - u_0)^T C (u_1 - u_0)` in a step.  Two schemes keep the forces quiet:
 
 ``contact-stabilised-newmark``
     (Deuflhard, Krause & Ertel 2008.)  Where free flight would carry the inertia of contact nodes
@@ -46,8 +48,9 @@ from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.transient.body_damping import BodyDamping, DampedSolve, DampingMatrix
 from klack.transient.inertia import InverseMass, massless_nodes
-from klack.transient.interface_solve import interface_solve
+from klack.transient.interface_solve import InterfaceSolve, interface_solve
 from klack.transient.result import (
     EnergyRecord,
     FieldsOfBody,
@@ -101,6 +104,7 @@ def simulate_full_order(
     step: float = 50e-9,
     scheme: Scheme = "contact-stabilised-newmark",
     axial_force: float = 0.0,
+    damping: tuple[BodyDamping | None, BodyDamping | None] = (None, None),
     stop_after_separation: float | None = None,
     energy_interval: int = 10,
     longest_period: float = 0.0,
@@ -132,6 +136,8 @@ def simulate_full_order(
     scheme : {"contact-stabilised-newmark", "massless"}
     axial_force : float [N]
         Constant force on a along +z (negative presses a onto b), spread over it like its weight.
+    damping : pair of BodyDamping or None
+        Of body a and of body b; without any by default.
     stop_after_separation : float, optional [s]
         End the run early when no point has carried a force for this long after a contact.
     energy_interval : int
@@ -179,9 +185,9 @@ def simulate_full_order(
         )
     begin = perf_counter()
     with ExitStack() as stack:
-        bodies = [_Motion(body_a, space.G_a, "a")]
+        bodies = [_Motion(body_a, space.G_a, "a", damping[0])]
         if body_b is not None:
-            bodies.append(_Motion(body_b, space.G_b, "b"))
+            bodies.append(_Motion(body_b, space.G_b, "b", damping[1]))
         if bodies[0].supported:
             raise InputError(
                 f"simulate_full_order: body '{bodies[0].name}'",
@@ -230,7 +236,9 @@ def _share(threads: int, bodies: Sequence["_Motion"]) -> int:
 class _Motion:
     """State of one body on its free degrees of freedom, and what one step does to it."""
 
-    def __init__(self, body: ElasticBody, G: csr_array, role: str) -> None:
+    def __init__(
+        self, body: ElasticBody, G: csr_array, role: str, damping: BodyDamping | None
+    ) -> None:
         self.name = body.name
         self.role = role
         self.dimension = body.dimension
@@ -249,6 +257,8 @@ class _Motion:
         fixed[self.free] = False
         self.supported = bool(np.any(fixed & (axis > 0)))
         self.whole_mass = csr_array(body.M)
+        self.body, self.damping = body, damping
+        self.C: DampingMatrix | None = None
         self.K = csr_array(body.K)[self.free][:, self.free]
         self.G = csr_array(G)[:, self.free]
         self.contact_nodes = np.unique(csr_array(G).indices // self.dimension).astype(np.int64)
@@ -280,9 +290,16 @@ class _Motion:
         self.G_transposed = csr_array(self.G.T)
         self.G_axis = self.G @ self.axis
         self.mobility = np.zeros((self.G.shape[0],) * 2)
-        S = csr_array(self.M * (4.0 / step**2) + self.K)
-        self.factor = factorize(S, backend=backend, threads=threads, precision=precision)
-        self.solve = interface_solve(self.factor, self.G)
+        S = self.M * (4.0 / step**2) + self.K
+        if self.damping is not None:
+            self.C = DampingMatrix.of(self.damping, self.body, csr_array(M))
+            S = S + self.C.sparse * (2.0 / step)
+        self.factor = factorize(csr_array(S), backend=backend, threads=threads, precision=precision)
+        self.solve: InterfaceSolve = interface_solve(self.factor, self.G)
+        if self.C is not None and len(self.C.rate):
+            self.solve = DampedSolve(
+                self.solve, self.factor, self.G, self.C.columns, 2.0 / step * self.C.rate
+            )
 
     def learn(self, points: NDArray[np.int64]) -> None:
         """Work out the response to contact points that come near for the first time."""
@@ -302,12 +319,14 @@ class _Motion:
     def fly(self) -> NDArray[np.float64]:
         """Free flight w of this step; the gaps change by its return value, shape (nc,) [m]."""
         self.w = self.u + self.step * self.v
-        self.strain_force = self.K @ (self.u + self.w)
+        self.resistance = self.K @ (self.u + self.w)
+        if self.C is not None:
+            self.resistance += 2.0 * self.C.force(self.v)
         return self.G @ self.w
 
     def predict(self, push: NDArray[np.float64]) -> NDArray[np.float64]:
         """First half of the solve; returns the change of the watched gaps."""
-        self.solve.predict(2.0 * self.force - self.strain_force + self.G_transposed @ push)
+        self.solve.predict(2.0 * self.force - self.resistance + self.G_transposed @ push)
         return self.solve.response()
 
     def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -315,6 +334,13 @@ class _Motion:
         self.change = self.solve.complete(lam)
         self.next = self.w + self.change
         return self.G @ self.next
+
+    def damped(self) -> float:
+        """Energy that the damping took in this step [J]."""
+        if self.C is None:
+            return 0.0
+        moved = self.next - self.u
+        return float(moved @ self.C.force(moved)) / self.step
 
     def commit(self) -> None:
         """Make the end of the step the new state."""
@@ -377,7 +403,7 @@ class _Run:
         self.watched = np.zeros(count, dtype=bool)
         self.learned = np.zeros(count, dtype=bool)
         self.share = 1.0 if scheme == "massless" else 2.0
-        self.contact_loss = self.overshoot_loss = self.work = 0.0
+        self.contact_loss = self.overshoot_loss = self.damped = self.work = 0.0
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
     def place(self) -> tuple[float, float]:
@@ -498,6 +524,7 @@ class _Run:
             if np.any(self.mu) or np.any(self.y):
                 self.y = (2.0 / self.step) * self.mu - self.y
         centre = self.bodies[0].centre()
+        self.damped += sum(body.damped() for body in self.bodies)
         for body in self.bodies:
             body.commit()
         self.work += self.axial_force * (self.bodies[0].centre() - centre)
@@ -560,7 +587,7 @@ class _Record:
     def keep_energy(self, run: _Run) -> None:
         kinetic = [body.kinetic(run.y) for body in run.bodies]
         strain = [body.strain() for body in run.bodies]
-        losses = (run.contact_loss, run.overshoot_loss, run.work)
+        losses = (run.contact_loss, run.overshoot_loss, run.work, run.damped)
         self.energy.append((*kinetic, *strain, *losses))
         self.energy_step.append(run.steps)
 
@@ -674,6 +701,7 @@ def _result(
         contact=energy[:, 2 * count],
         overshoot=energy[:, 2 * count + 1],
         work=energy[:, 2 * count + 2],
+        damping=energy[:, 2 * count + 3],
     )
     history = ImpactHistory(
         step=run.step,
@@ -731,6 +759,7 @@ def _ledger(
         initial=float(book.total[0]),
         bodies=tuple(entries),
         contact_dissipation=float(book.contact[-1] + book.overshoot[-1]),
+        damping=float(book.damping[-1]),
         work=float(book.work[-1]),
     )
 

@@ -35,6 +35,8 @@ class EnergyRecord:
         Taken out by removing the inertial overshoot, >= 0; the second one.
     work : array, shape (k,) [J]
         Done by the constant force.
+    damping : array, shape (k,) [J]
+        Lost in the damping of the bodies, >= 0.
     """
 
     time: NDArray[np.float64]
@@ -43,6 +45,7 @@ class EnergyRecord:
     contact: NDArray[np.float64]
     overshoot: NDArray[np.float64]
     work: NDArray[np.float64]
+    damping: NDArray[np.float64]
 
     @property
     def total(self) -> NDArray[np.float64]:
@@ -52,7 +55,8 @@ class EnergyRecord:
     @property
     def residual(self) -> NDArray[np.float64]:
         """Energy from nowhere, shape (k,) [J]: round-off in a sound run."""
-        return self.total - self.total[0] + self.contact + self.overshoot - self.work
+        lost = self.contact + self.overshoot + self.damping
+        return self.total - self.total[0] + lost - self.work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -197,5 +201,6 @@ class FullOrderResult:
     @property
     def energy_loss(self) -> float:
         """Energy that the scheme lost, relative to the energy at the start [-]."""
-        lost = self.energy.total[0] + self.energy.work[-1] - self.energy.total[-1]
+        given = self.energy.total[0] + self.energy.work[-1]
+        lost = given - self.energy.damping[-1] - self.energy.total[-1]
         return float(lost / max(self.energy.total[0], abs(self.energy.work[-1])))

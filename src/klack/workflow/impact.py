@@ -37,6 +37,7 @@ from klack.workflow.levels import (
     deviations,
     elastic_count,
     first_stiffness,
+    kept_modes,
     mode_pools,
     own_pair,
     participating,
@@ -152,7 +153,13 @@ def run_impact(
         sections: tuple[SectionPicture, ...] = ()
         if "full" in wanted:
             with warnings_of("level 'full'"):
-                results["full"], run = run_full(problem, pools, progress=clock, threads=threads)
+                results["full"], run = run_full(
+                    problem,
+                    pools,
+                    kept=kept_modes(problem, pools, own.ports),
+                    progress=clock,
+                    threads=threads,
+                )
             sections = _sections(problem, run)
     # the best of what was run; the lumped model is nobody's reference
     best = (name for name in ("full", "interface", "reduced") if name in results)

@@ -34,10 +34,11 @@ from klack.errors import InputError
 from klack.reduction.ports import Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
+from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection, select
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.transient.body_damping import BodyDamping, body_damping
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult, Snapshots
 from klack.workflow.damping_choice import damping_of
@@ -58,6 +59,8 @@ __all__ = [
     "first_stiffness",
     "hertz_coefficient",
     "impact_system",
+    "is_damped",
+    "kept_modes",
     "level_result",
     "lumped_level",
     "mode_pool",
@@ -421,6 +424,7 @@ def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
 def simulate_in_full(
     problem: ContactProblem,
     *,
+    kept: Mapping[str, Modes],
     progress: Progress,
     threads: int | None,
     longest_period: float = 0.0,
@@ -431,6 +435,9 @@ def simulate_in_full(
     Parameters
     ----------
     problem : ContactProblem
+    kept : mapping of body name to Modes
+        Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
+        there.  Only damped bodies are looked up.
     progress : callable
     threads : int or None
     longest_period : float [s]
@@ -447,6 +454,7 @@ def simulate_in_full(
         duration=case.run.duration,
         step=case.run.full_step,
         axial_force=-case.motion.closing_force,
+        damping=(_damping(case, pair.upper, kept), _damping(case, pair.lower, kept)),
         longest_period=longest_period,
         threads=threads or 2,
         progress=lambda fraction: progress("full order", fraction),
@@ -454,17 +462,57 @@ def simulate_in_full(
     )
 
 
+def is_damped(case: Case, name: str) -> bool:
+    """Tell whether a case gives a body any damping."""
+    return bool(damping_of(case.bodies[name].damping).ratios([1.0])[0] > 0.0)
+
+
+def kept_modes(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port] | None = None,
+) -> dict[str, Modes]:
+    """Elastic modes of both bodies that the reduced level keeps.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of body name to Modes
+    ports : pair of Port, optional
+        Contact ports, for modes chosen by participation; near the highest force without.
+    """
+    if ports is None:
+        loads = problem.static.load_patterns(0.7 * problem.static.max_force)
+    else:
+        loads = (ports[0].pattern, ports[1].pattern)
+    kept = {}
+    for body, load in zip((problem.pair.upper, problem.pair.lower), loads, strict=True):
+        pool = pools[body.name]
+        selection = selection_of(problem.case.reduction.choice(body.name))
+        chosen = select(selection, pool.omega, pool.shapes.T @ load[:, None])
+        kept[body.name] = Modes(pool.omega[chosen], pool.shapes[:, chosen])
+    return kept
+
+
+def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:
+    if not is_damped(case, body.name):
+        return None
+    return body_damping(damping_of(case.bodies[body.name].damping), kept[body.name])
+
+
 def run_full(
     problem: ContactProblem,
     pools: Mapping[str, Modes],
     *,
+    kept: Mapping[str, Modes],
     progress: Progress,
     threads: int | None,
 ) -> tuple[LevelResult, FullOrderResult]:
-    """Impact with every degree of freedom."""
+    """Impact with every degree of freedom; ``kept`` as in :func:`simulate_in_full`."""
     case, pair = problem.case, problem.pair
     result = simulate_in_full(
         problem,
+        kept=kept,
         longest_period=_longest_period(pools[pair.upper.name]),
         progress=progress,
         threads=threads,

@@ -21,7 +21,7 @@ from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.transient.result import MotionOfBody, Snapshots
 from klack.whole_file import whole_files
-from klack.workflow.levels import simulate_in_full
+from klack.workflow.levels import is_damped, kept_modes, mode_pools, simulate_in_full
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 
@@ -141,11 +141,15 @@ def _fields(stress: StressField | None, body: MotionOfBody) -> dict[str, NDArray
 def _run_full(
     problem: ContactProblem, film: _Film, frames: int, progress: Progress, threads: int | None
 ) -> None:
-    run = problem.case.run
+    case = problem.case
+    kept = {}
+    if any(is_damped(case, body.name) for body in (problem.pair.upper, problem.pair.lower)):
+        kept = kept_modes(problem, mode_pools(problem, at_least=1, progress=progress))
     problem.close()
-    steps = _instants(run.duration, run.full_step, frames)
+    steps = _instants(case.run.duration, case.run.full_step, frames)
     simulate_in_full(
         problem,
+        kept=kept,
         progress=progress,
         threads=threads,
         snapshots=Snapshots(steps=steps, receive=film.add),

@@ -1,0 +1,192 @@
+r"""Viscous damping of a body with every degree of freedom, as the reduced levels have it.
+
+.. math:: C = \sum_i 2 \zeta_i \omega_i \, (M \varphi_i)(M \varphi_i)^T
+    + \alpha \left(M - M R R^T M\right) + \beta K
+
+with mass-normalised modes :math:`\varphi_i` and rigid modes *R*: a damping ratio for each of a few
+modes is a matrix of low rank, Rayleigh damping a sparse one.  Rigid motion is never damped, as in
+:mod:`klack.reduction.damping`.
+
+A step of the full order solves :math:`(S + Z D Z^T) x = b + G^T \lambda` with a sparse *S* and the
+thin :math:`Z`.  With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}` (Woodbury)
+
+.. math::
+    x = S^{-1}\left(b - Z P \, Y^T b + G^T \lambda\right) - Y P \, (G Y)^T \lambda
+
+which costs two thin products beside the solve with *S*.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.sparse import csr_array
+
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.factorization import Factorization
+from klack.errors import require_nonnegative
+from klack.reduction.damping import Damping, RayleighDamping
+from klack.transient.interface_solve import InterfaceSolve
+
+__all__ = ["BodyDamping", "DampedSolve", "DampingMatrix", "body_damping"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyDamping:
+    """Damping of one body, see the module.
+
+    Parameters
+    ----------
+    shapes : array, shape (n_dof, m)
+        Mass-normalised elastic modes, zero where fixed.
+    rate : array, shape (m,) [rad/s]
+        ``2 zeta omega`` of each.
+    alpha : float [1/s]
+    beta : float [s]
+    """
+
+    shapes: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        lowest = float(np.min(self.rate, initial=np.inf))
+        require_nonnegative("BodyDamping.rate", lowest, "rad/s")
+        require_nonnegative("BodyDamping.alpha", self.alpha, "1/s")
+        require_nonnegative("BodyDamping.beta", self.beta, "s")
+
+
+def body_damping(damping: Damping, modes: Modes) -> BodyDamping | None:
+    """Damping of a whole body; None without any.
+
+    Parameters
+    ----------
+    damping : Damping
+        Rayleigh damping acts on the whole body; a ratio or a loss factor on the modes given.
+    modes : Modes
+        Elastic modes that the reduced levels keep.
+    """
+    if isinstance(damping, RayleighDamping):
+        if damping.alpha == 0.0 == damping.beta:
+            return None
+        return BodyDamping(
+            shapes=modes.shapes[:, :0],
+            rate=np.zeros(0),
+            alpha=damping.alpha,
+            beta=damping.beta,
+        )
+    rate = 2.0 * damping.ratios(modes.omega) * modes.omega
+    damped = rate > 0.0
+    if not np.any(damped):
+        return None
+    return BodyDamping(shapes=modes.shapes[:, damped], rate=rate[damped])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DampingMatrix:
+    """C on the free degrees of freedom: a sparse part and Z diag(rate) Z^T [N s/m].
+
+    Parameters
+    ----------
+    sparse : sparse array, shape (n, n) [N s/m]
+    columns : array, shape (n, r) [kg^(1/2)]
+        Z.
+    rate : array, shape (r,) [rad/s]
+        Below zero for what takes the drag of ``alpha M`` off the rigid motion.
+    """
+
+    sparse: csr_array
+    columns: NDArray[np.float64]
+    rate: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, damping: BodyDamping, body: ElasticBody, M: csr_array) -> "DampingMatrix":
+        """Put the matrix of a body together.
+
+        Parameters
+        ----------
+        damping : BodyDamping
+        body : ElasticBody
+        M : sparse array, shape (n_dof, n_dof) [kg]
+            Mass that the run moves, which may differ from the one of the body at its contact nodes.
+        """
+        free = body.free
+        columns, rate = [(M @ damping.shapes)[free]], [damping.rate]
+        if damping.alpha > 0.0 and not body.is_fixed:
+            loads = M @ body.rigid_modes
+            root = np.linalg.cholesky(body.rigid_modes.T @ loads)
+            columns.append(solve_triangular(root, loads[free].T, lower=True).T)
+            rate.append(np.full(loads.shape[1], -damping.alpha))
+        sparse = csr_array(damping.alpha * M + damping.beta * csr_array(body.K))
+        return cls(
+            sparse=csr_array(sparse[free][:, free]),
+            columns=np.hstack(columns),
+            rate=np.concatenate(rate),
+        )
+
+    def force(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """C v of a velocity, shape (n,) [N]."""
+        return self.sparse @ v + self.columns @ (self.rate * (self.columns.T @ v))
+
+
+class DampedSolve:
+    """An :class:`InterfaceSolve` of S with the low-rank term Z diag(weight) Z^T added.
+
+    Parameters
+    ----------
+    plain : InterfaceSolve
+        Of S alone.
+    factorization : Factorization
+        Of S.
+    G : sparse array, shape (nc, n) [-]
+    columns : array, shape (n, r)
+        Z.
+    weight : array, shape (r,)
+        None of them zero; S + Z diag(weight) Z^T is positive definite.
+    """
+
+    def __init__(
+        self,
+        plain: InterfaceSolve,
+        factorization: Factorization,
+        G: csr_array,
+        columns: NDArray[np.float64],
+        weight: NDArray[np.float64],
+    ) -> None:
+        self._plain = plain
+        self._Z = columns
+        self._Y = factorization.solve(columns)
+        inner = np.diag(1.0 / weight) + columns.T @ self._Y
+        self._P = np.linalg.inv(0.5 * (inner + inner.T))
+        self._traces = G @ self._Y
+        self._taken = self._traces @ self._P @ self._traces.T
+        self._selected = self._traces[:0]
+        self.compliance = np.zeros((G.shape[0],) * 2)
+
+    def learn(self, points: NDArray[np.int64]) -> None:
+        """See :class:`InterfaceSolve`."""
+        self._plain.learn(points)
+        self.compliance = self._plain.compliance - self._taken
+
+    def select(self, points: NDArray[np.int64]) -> None:
+        """See :class:`InterfaceSolve`."""
+        self._plain.select(points)
+        self._selected = self._traces[points]
+
+    def predict(self, b: NDArray[np.float64]) -> None:
+        """See :class:`InterfaceSolve`."""
+        self._plain.predict(b - self._Z @ (self._P @ (self._Y.T @ b)))
+
+    def response(self) -> NDArray[np.float64]:
+        """See :class:`InterfaceSolve`."""
+        return self._plain.response()
+
+    def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See :class:`InterfaceSolve`."""
+        x = self._plain.complete(lam)
+        if np.any(lam):
+            x = x - self._Y @ (self._P @ (self._selected.T @ lam))
+        return x
