@@ -304,7 +304,8 @@ def _try_chunk(
     elif failure is None and (name := _not_finite_account(network)):
         good = 0
         failure = _not_a_number(name, grid.step * int(clock[0]))
-    time = grid.step * (first + grid.look_steps * np.arange(1, good + 1))
+    steps = first + grid.look_steps * np.arange(1, good + 1)
+    time = np.asarray(grid.step * steps, dtype=float)
     try:
         limits.look(recorder.recording.points[:good], time)
     except ConvergenceError as error:  # a range left on the way is the better word
