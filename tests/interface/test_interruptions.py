@@ -70,6 +70,21 @@ def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path:
     assert places == sorted(places, reverse=True)  # and nothing comes back
 
 
+@pytest.mark.parametrize("again", [1, 7])
+def test_ctrl_c_at_any_operation_leaves_no_stage(again: int, tmp_path: Path):
+    """Also while the stage is made, while files move, and while it is removed; pressed twice."""
+    found = crashes("stopped", str(tmp_path / "small"), str(again))
+
+    assert found["operations"] > 20
+    assert {row["code"] for row in found["rows"]} == {130}
+    words = [row["found"] for row in found["rows"]]
+    assert words == sorted(words, reverse=True)
+    assert {word for (word,) in words} == {"old", "new"}
+    for row in found["rows"]:
+        left = ["mine.txt", "note", "page", "store"]
+        assert row["left"] == (left if row["found"] == ["old"] else ["mine.txt", "page", "store"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "points"),
