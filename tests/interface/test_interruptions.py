@@ -117,6 +117,19 @@ def test_a_crash_of_a_command_costs_nothing(words: list[str], points: int, tmp_p
 # --------------------------------------------------------------------------- kill -9
 
 
+@pytest.mark.slow
+def test_commands_killed_at_any_time_leave_one_of_two_results(tmp_path: Path):
+    """Half of the kills come while files are written; the others at any time of the run."""
+    words = [str(tmp_path / "campaign"), str(4 * LONGER), "1", "csv", "noise"]
+    program = [sys.executable, str(DATA / "kill_campaign.py"), *words]
+    done = subprocess.run(program, env=ALONE, capture_output=True, text=True, check=True)
+
+    for found in json.loads(done.stdout).values():
+        assert found["wrong"] == []
+        assert found["kills"] == 4 * LONGER
+        assert found["while_writing"] > 0
+
+
 def start(*words: str, folder: Path) -> "subprocess.Popen[str]":
     """Start klack as the first process of a group of its own, as a terminal does.
 
