@@ -10,7 +10,7 @@ from pathlib import Path
 
 from klack.errors import InputError
 
-__all__ = ["SAFELY", "caller", "kind_of", "open_own_file", "require_own_file"]
+__all__ = ["SAFELY", "caller", "kind_of", "open_own_file", "planted", "require_own_file"]
 
 SAFELY = (
     getattr(os, "O_NOFOLLOW", 0)
@@ -88,6 +88,25 @@ def require_own_file(path: Path | str, state: os.stat_result) -> None:
             hint="somebody else may have put it there: look at it, then remove it, or give another "
             "folder.",
         )
+
+
+def planted(path: Path) -> str | None:
+    """What another user has put at a name for others to go through, in words; None if it is not so.
+
+    A link or a pipe in a folder that others may write to, neither of the caller nor of the owner of
+    the folder: the rule by which Linux protects links (``protected_symlinks``), for all systems.
+    """
+    try:
+        state, folder = path.lstat(), path.absolute().parent.stat()
+    except OSError:
+        return None
+    if not (stat.S_ISLNK(state.st_mode) or stat.S_ISFIFO(state.st_mode)):
+        return None
+    if caller() in (None, state.st_uid) or folder.st_uid == state.st_uid:
+        return None
+    if not folder.st_mode & 0o022:
+        return None
+    return f"{kind_of(state)} of another user (number {state.st_uid})"
 
 
 def kind_of(state: os.stat_result) -> str:

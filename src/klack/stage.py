@@ -104,13 +104,14 @@ class Stage(Closing):
         state = self.folder.state(self.name)
         if state is None or not os.path.samestat(state, self.held.own_state()):
             return False
+        if self.held.names():  # what is in it would be removed with it
+            self.close()
+            raise _swapped()
         try:
             self._write(_SEAL, "")
             seal = self.held.state(_SEAL)
-            if seal is None or seal.st_uid != self.held.own_state().st_uid:
-                raise PermissionError(
-                    errno.EPERM, "somebody else put a folder in the place of klack's"
-                )
+            if seal is None or not _of_one_user(self.held.own_state(), seal):
+                raise _swapped()
             self._write(_MANIFEST, json.dumps({"format": _FORMAT, "seal": _seal_of(seal)}))
             self.held.make(NEW)
         except BaseException:
@@ -341,6 +342,19 @@ def name_outdated(content: Path, names: Iterable[str]) -> None:
     handle = os.open(content.parent / _GONE, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump(list(names), file)
+
+
+def _of_one_user(folder: os.stat_result, file: os.stat_result) -> bool:
+    """Tell whether a folder is of the user who made a file in it, who alone may write to it.
+
+    Compared with the file, since some file systems show one user and one mode for everything.
+    """
+    open_to_others = folder.st_mode & ~file.st_mode & 0o022
+    return folder.st_uid == file.st_uid and not open_to_others
+
+
+def _swapped() -> PermissionError:
+    return PermissionError(errno.EPERM, "somebody put another folder in the place of klack's own")
 
 
 def _seal_of(state: os.stat_result) -> list[int]:

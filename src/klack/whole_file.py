@@ -13,6 +13,7 @@ somebody has replaced the files since.  What stands in the folder is the one tru
 nothing is ever read from a stage.
 """
 
+import errno
 import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,6 +23,7 @@ from pathlib import Path
 from klack.errors import InputError, LeftAloneWarning
 from klack.folder_lock import LOCK_NAME, locked
 from klack.held_folder import HeldFolder, Mark, synchronise
+from klack.own_file import planted
 from klack.stage import PREFIX, Stage, dead_stage, is_stage_content, name_outdated
 from klack.uninterrupted import uninterrupted
 
@@ -82,6 +84,8 @@ def whole_files(
     stage: Stage | None = None
     try:
         with uninterrupted():
+            if found := planted(folder):
+                raise PermissionError(errno.EPERM, f"it is {found}")
             folder.mkdir(parents=True, exist_ok=True)
             held = HeldFolder(folder)
             _complete(held)

@@ -1,11 +1,12 @@
 """Crash a process at every operation on files that it does, one after another.
 
-``python crash_points.py small FOLDER EVERY`` or ``python crash_points.py WORDS FOLDER COUNT``; a
-program of its own, since it forks.  A child works in FOLDER and is gone, without a word and
-unflushed, just before its n-th operation (opening for writing, mkdir, rename, link, unlink, ...).
-For the small work n runs over all operations; for a command of klack, given as a JSON list of
-words, over COUNT of them: half of these spread over the run, half at its very end.  Prints one JSON
-object: how many operations there are, and what is found after each crash.
+``python crash_points.py small FOLDER EVERY``, ``python crash_points.py stopped FOLDER LATER`` (with
+Ctrl-C instead of crashes, twice) or ``python crash_points.py WORDS FOLDER COUNT``; a program of its
+own, since it forks.  A child works in FOLDER and is gone, without a word and unflushed, just before
+its n-th operation (opening for writing, mkdir, rename, link, unlink, truncate, ...).  For the
+small work n runs over all operations; for a command of klack, given as a JSON list of words, over
+COUNT of them: half of these spread over the run, half at its very end.  Prints one JSON object: how
+many operations there are, and what is found after each crash.
 """
 
 import json
@@ -16,7 +17,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-CRASHED = 99
+CRASHED, STOPPED = 99, 130
 OPERATIONS = {
     *("os.mkdir", "os.rename", "os.link", "os.symlink", "os.remove", "os.rmdir", "os.truncate"),
     "klack.swap_names",
@@ -32,8 +33,13 @@ def changes_files(event: str, given: tuple) -> bool:
     return event in OPERATIONS
 
 
-def forked(act: Callable[[], object], crash_at: int | None) -> tuple[int, int]:
-    """Exit code of a child that does something, and how many operations it did."""
+def forked(
+    act: Callable[[], object], crash_at: int | None, stop_at: tuple[int, ...] = ()
+) -> tuple[int, int]:
+    """Exit code of a child that does something, and how many operations it did.
+
+    It is gone before one operation, or gets Ctrl-C before some of them.
+    """
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -45,14 +51,19 @@ def forked(act: Callable[[], object], crash_at: int | None) -> tuple[int, int]:
                 if count == crash_at:
                     os._exit(CRASHED)
                 count += 1
+                if count - 1 in stop_at:
+                    signal.raise_signal(signal.SIGINT)
 
         code = 1
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.alarm(300)  # s; a child that hangs shall not hold up the others
         try:
             sys.addaudithook(note)
             found = act()
             code = found if isinstance(found, int) else 0
             os.write(writer, b"%d" % count)
+        except KeyboardInterrupt:
+            code = STOPPED
         except BaseException:
             import traceback
 
@@ -118,6 +129,19 @@ def small(folder: Path, every: int) -> dict:
         row |= {"store": store, "page": page}
         row["twice"] = [] if n % every else twice(folder, n)
         rows.append(row)
+    return {"operations": total, "rows": rows}
+
+
+def stopped(folder: Path, again: int) -> dict:
+    """Press Ctrl-C at every point, and once more some operations later."""
+    fresh(folder)
+    total = forked(lambda: put(folder, "new"), None)[1]
+    rows = []
+    for n in range(total):
+        fresh(folder)
+        code = forked(lambda: put(folder, "new"), None, (n, n + again))[0]
+        words = in_place(folder, "store/a", "store/b", "page")
+        rows.append({"at": n, "code": code, "found": words, "left": litter(folder)})
     return {"operations": total, "rows": rows}
 
 
@@ -234,6 +258,8 @@ def main(arguments: list[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if arguments[0] == "small":
         found = small(folder, int(arguments[2]))
+    elif arguments[0] == "stopped":
+        found = stopped(folder, int(arguments[2]))
     else:
         words = json.loads(arguments[0])
         warm()

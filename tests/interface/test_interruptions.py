@@ -71,6 +71,21 @@ def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path:
     assert places == sorted(places, reverse=True)  # and nothing comes back
 
 
+@pytest.mark.parametrize("again", [1, 7])
+def test_ctrl_c_at_any_operation_leaves_no_stage(again: int, tmp_path: Path):
+    """Also while the stage is made, while files move, and while it is removed; pressed twice."""
+    found = crashes("stopped", str(tmp_path / "small"), str(again))
+
+    assert found["operations"] > 20
+    assert {row["code"] for row in found["rows"]} == {130}
+    words = [row["found"] for row in found["rows"]]
+    assert words == sorted(words, reverse=True)
+    assert {word for (word,) in words} == {"old", "new"}
+    for row in found["rows"]:
+        left = ["mine.txt", "note", "page", "store"]
+        assert row["left"] == (left if row["found"] == ["old"] else ["mine.txt", "page", "store"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "points"),
@@ -101,6 +116,19 @@ def test_a_crash_of_a_command_costs_nothing(words: list[str], points: int, tmp_p
 
 
 # --------------------------------------------------------------------------- kill -9
+
+
+@pytest.mark.slow
+def test_commands_killed_at_any_time_leave_one_of_two_results(tmp_path: Path):
+    """Half of the kills come while files are written; the others at any time of the run."""
+    words = [str(tmp_path / "campaign"), str(4 * LONGER), "1", "csv", "noise"]
+    program = [sys.executable, str(DATA / "kill_campaign.py"), *words]
+    done = subprocess.run(program, env=ALONE, capture_output=True, text=True, check=True)
+
+    for found in json.loads(done.stdout).values():
+        assert found["wrong"] == []
+        assert found["kills"] == 4 * LONGER
+        assert found["while_writing"] > 0
 
 
 def start(*words: str, folder: Path) -> "subprocess.Popen[str]":

@@ -4,8 +4,10 @@ Truth: what a link leads to is as it was; nothing waits for ever; numbers come f
 files or are computed anew.
 """
 
+import json
 import os
 import shutil
+import subprocess
 import sys
 import tarfile
 from collections.abc import Callable
@@ -29,6 +31,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users, links an
 DATA = Path(__file__).parents[1] / "data"
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 RODS = str(DATA / "tiny_rods.yaml")
+LONGER = int(os.environ.get("KLACK_LONG", "1"))
 
 
 # --------------------------------------------------------------------------- logs
@@ -126,6 +129,20 @@ def test_an_unpacked_result_with_pipes_and_links_is_refused(kind, result: Path, 
         os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
         with pytest.raises(InputError, match="pipe" if kind == "pipe" else "symbolic link"):
             load_stored(copy)
+
+
+@pytest.mark.slow
+def test_tampered_results_and_entries_give_the_stored_numbers_or_one_error(
+    result: Path, tmp_path: Path
+):
+    """Bytes, words, shapes, missing and special files; checksums repaired where a forger would."""
+    words = [str(result), str(tmp_path / "work"), str(20 * LONGER), "1"]
+    program = [sys.executable, str(DATA / "tampered_stores.py"), *words]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+
+    for found in json.loads(done.stdout).values():
+        assert found["wrong"] == []
+        assert found["refused"] > 10 * LONGER
 
 
 # --------------------------------------------------------------------------- cache

@@ -245,6 +245,27 @@ def test_the_folder_itself_may_be_renamed(tmp_path: Path):
     assert tree(tmp_path / "aside") == {"r": "new"}
 
 
+def test_a_folder_of_the_user_in_the_place_of_the_stage_keeps_its_files(
+    tmp_path: Path, monkeypatch
+):
+    """Who may write to the folder can give another folder of the user the name of the stage."""
+    (tmp_path / "project").mkdir()
+    (tmp_path / "project" / "work").write_text("mine")
+    make = HeldFolder.make
+
+    def swapped(self: HeldFolder, name: str, mode: int = 0o777) -> None:
+        make(self, name, mode)
+        if name.startswith(".klack-"):
+            (tmp_path / name).rename(tmp_path / "aside")
+            (tmp_path / "project").rename(tmp_path / name)
+
+    monkeypatch.setattr(HeldFolder, "make", swapped)
+    with pytest.raises(InputError, match="in the place of klack's own"):
+        write_one(tmp_path)
+    (moved,) = tmp_path.glob(STAGES)
+    assert tree(moved) == {"work": "mine"}
+
+
 # --------------------------------------------------------------------------- a second user
 
 
@@ -345,6 +366,22 @@ def test_a_full_device_and_a_pipe_as_folder(tmp_path: Path, capsys):
     os.mkfifo(tmp_path / "pipe")
     assert main(["reduce", "demo-valve", "--out", str(tmp_path / "pipe")]) == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+@as_root
+def test_a_link_of_another_user_is_no_folder_for_results(tmp_path: Path, capsys):
+    shared, home = open_to_all(tmp_path / "shared"), tmp_path / "home"
+    home.mkdir()
+    assert as_nobody(lambda: (shared / "out").symlink_to(home)) == 0
+
+    assert main(["reduce", "demo-valve", "--out", str(shared / "out")]) == 2
+    assert f"a symbolic link of another user (number {NOBODY})" in capsys.readouterr().err
+    with pytest.raises(InputError, match="a symbolic link of another user"):
+        write_one(shared / "out")
+    assert tree(home) == {}
+    (tmp_path / "own").symlink_to(home)
+    write_one(tmp_path / "own")
+    assert tree(home) == {"out": "mine"}
 
 
 @as_root

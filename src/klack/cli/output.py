@@ -2,7 +2,6 @@
 
 import json
 import os
-import stat
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,7 +10,7 @@ from typing import Any
 
 from klack.errors import InputError
 from klack.held_folder import Mark
-from klack.own_file import caller, kind_of
+from klack.own_file import planted
 from klack.whole_file import whole_file, whole_files
 
 __all__ = [
@@ -38,30 +37,14 @@ def require_file_target(option: str, path: Path | None) -> None:
         return
     if path.is_dir():
         raise _refuse(option, path, "a folder", "the name of a file")
-    if (planted := _planted(path)) is not None:
-        raise _refuse(option, path, planted, "a file, or a place for one")
+    through = path.exists() and not path.is_file()  # a link to a file is merely replaced
+    if through and (found := planted(path)) is not None:
+        raise _refuse(option, path, found, "a file, or a place for one")
     if not path.absolute().parent.is_dir():
         raise _refuse(option, path, "a file in a folder that does not exist", "an existing folder")
     target = path if path.exists() else path.absolute().parent
     if not os.access(target, os.W_OK):
         raise _refuse(option, path, "a place that may not be written to", "a writable file")
-
-
-def _planted(path: Path) -> str | None:
-    """What another user has put there for klack to write through; None if there is no such thing.
-
-    A link that is merely replaced by the new file does no harm.
-    """
-    try:
-        state = path.lstat()
-        through = path.exists() and not path.is_file()
-    except OSError:
-        return None
-    if not through or not (stat.S_ISLNK(state.st_mode) or stat.S_ISFIFO(state.st_mode)):
-        return None
-    if caller() in (None, state.st_uid) or state.st_uid == 0:
-        return None
-    return f"{kind_of(state)} of another user (number {state.st_uid})"
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
@@ -95,6 +78,8 @@ def _write_to_stream(path: Path, text: str) -> None:
 
 def require_folder(folder: Path) -> None:
     """Refuse a target of ``--out`` that cannot be written, before the long work begins."""
+    if (found := planted(folder)) is not None:
+        raise _refuse("--out", folder, found, "a folder, or a place for one")
     existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
     if not existing.is_dir():
         raise _refuse("--out", folder, f"a path through the file {existing}", "a folder")
