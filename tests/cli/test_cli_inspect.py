@@ -1,6 +1,7 @@
 """klack inspect through main(argv); truth: the drawing of the shipped needle."""
 
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -182,10 +183,52 @@ def test_a_matrix_shows_its_size_and_what_its_rows_are(tmp_path: Path, capsys):
 def test_one_of_several_matrices(tmp_path: Path, capsys):
     scipy.io.savemat(tmp_path / "two.mat", {"A": np.eye(3), "B": 2 * np.eye(3)})
 
-    assert main(["inspect", str(tmp_path / "two.mat")]) == 2
+    assert main(["inspect", str(tmp_path / "two.mat")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "matrix A 3 rows" in shown
+    assert "matrix B 3 rows" in shown
+    assert main(["inspect", str(tmp_path / "two.mat"), "--matrix", "C"]) == 2
     assert "'A', 'B'" in capsys.readouterr().err
     assert main(["inspect", str(tmp_path / "two.mat"), "--matrix", "B"]) == 0
     assert "2 to 2" in capsys.readouterr().out
+
+
+def test_both_matrices_of_ansys(capsys):
+    """Truth: the example of a package that reads such files, of solids in three directions."""
+    package = pytest.importorskip("ansys.mapdl.reader")
+    path = Path(package.__file__).parent / "examples" / "file.full"
+
+    assert main(["inspect", str(path)]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "matrix K" in shown
+    assert "matrix M" in shown
+    assert shown.count("directions x, y, z") == 2
+
+
+def test_a_matrix_that_cannot_be_used_is_shown_beside_the_others(tmp_path: Path, capsys):
+    skew = np.array([[1.0, 2.0], [1.0, 1.0]])
+    scipy.io.savemat(tmp_path / "two.mat", {"A": np.eye(2), "B": skew})
+
+    assert main(["inspect", str(tmp_path / "two.mat")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "matrix A 2 rows" in shown
+    assert "matrix B not usable" in shown
+
+
+def test_an_fmu_for_model_exchange_shows_what_it_is(spring_damper_fmu, tmp_path: Path, capsys):
+    path = tmp_path / "model.fmu"
+    with ZipFile(spring_damper_fmu()) as old, ZipFile(path, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"<CoSimulation", b"<ModelExchange"))
+
+    assert main(["inspect", str(path)]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "FMU spring_damper model exchange only: klack cannot run it, FMI 2.0" in shown
+    assert "input x m" in shown
+    assert "output F N" in shown
 
 
 def test_an_fmu_shows_its_inputs_and_outputs(tmp_path: Path, capsys):

@@ -78,7 +78,7 @@ TET = [1, 2, 3, 3, 4, 4, 4, 4]
 
 ANSYS = {
     "pyramid": (cdb([[1, 2, 5, 3, 4, 4, 4, 4]]), "a.cdb:13: element 1: got a pyramid"),
-    "shell": (cdb([[1, 2, 5, 3]], kind=181), "element 1: got element type 181"),
+    "shell": (cdb([[1, 2, 5, 3]], kind=181), "element 1: got SHELL181"),
     "no type": (cdb([TET]).replace("ET,1,185", ""), "got type 1 without an ET command"),
     "repeated": (cdb([[1, 2, 2, 3, 4, 4, 4, 4]]), "got a pyramid"),
     "repeated pair": (cdb([[1, 1, 2, 3, 4, 4, 5, 5]]), "corner nodes that repeat in no known"),

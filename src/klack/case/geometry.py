@@ -168,6 +168,16 @@ class MeshFile(Section):
         default=None,
         description="Unit of its coordinates, e.g. mm; needed unless the file names it.",
     )
+    elements: Literal["all", "solids-only"] = Field(
+        default="all",
+        description="all: the file holds solids only, and surface elements on them; solids-only: "
+        "beams, springs, masses, rigid elements and shells are left out and counted in a note.",
+    )
+
+    @property
+    def solids_only(self) -> bool:
+        """Whether elements of other kinds are left out."""
+        return self.elements == "solids-only"
 
 
 class NodeTable(Section):

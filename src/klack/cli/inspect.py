@@ -28,7 +28,8 @@ def inspect(
         Parameter(name="--unit", help='Unit of the coordinates, "mm", if the file names none.'),
     ] = None,
     matrix: Annotated[
-        str | None, Parameter(name="--matrix", help="Name of a matrix in a file of several.")
+        str | None,
+        Parameter(name="--matrix", help="Name of one matrix in a file of several. [default: all]"),
     ] = None,
     component: Components = None,
 ) -> int:

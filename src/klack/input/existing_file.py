@@ -5,9 +5,31 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 
-__all__ = ["InputPath"]
+__all__ = ["InputPath", "refuse_lfs_pointer"]
+
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+
+
+def refuse_lfs_pointer(path: Path) -> None:
+    """Raise for the short text that git leaves in place of a large file.
+
+    A file that does not exist is left to the reader.
+    """
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(_LFS_POINTER))
+    except OSError:
+        return
+    if start == _LFS_POINTER:
+        raise InputError(
+            str(path),
+            got="a pointer of git-LFS: the text that stands for a file that was not downloaded",
+            expected="the file itself",
+            hint="run 'git lfs pull' in its repository, or download the file by hand.",
+        )
 
 
 def _existing_file(value: Any, info: ValidationInfo) -> Path:
@@ -27,6 +49,10 @@ def _existing_file(value: Any, info: ValidationInfo) -> Path:
             expected="an existing file, relative to the folder of the case",
             hint="check the spelling and the folder.",
         )
+    try:
+        refuse_lfs_pointer(path)
+    except InputError as error:
+        raise CaseProblem((), got=error.got, expected=error.expected, hint=error.hint) from error
     return path
 
 

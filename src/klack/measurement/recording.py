@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from klack.closing import Closing
 from klack.errors import InputError
+from klack.input.existing_file import refuse_lfs_pointer
 from klack.measurement.time_base import TimeBase, survey_time
 
 __all__ = ["ChannelInfo", "Recording", "open_recording"]
@@ -200,6 +201,7 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
             expected="a measured file",
             hint="export the measurement again.",
         )
+    refuse_lfs_pointer(path)
     return _open(path, head, time_step)
 
 

@@ -17,8 +17,9 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 from klack.errors import InputError, MissingExtraError
+from klack.input.existing_file import refuse_lfs_pointer
 
-__all__ = ["FmuDescription", "FmuVariable", "describe_fmu", "unpack_fmu"]
+__all__ = ["FmuDescription", "FmuVariable", "describe_fmu", "inspect_fmu", "unpack_fmu"]
 
 Kind = Literal["real", "integer", "boolean", "other"]
 
@@ -60,6 +61,8 @@ class FmuDescription:
         Of FMI.
     identifier, token : str
         Name of its library; the word that library and description must share.
+    model_exchange : bool
+        True for an FMU without a solver of its own, which klack cannot run.
     variable_step : bool
         Whether steps of communication may differ in length.
     variables : mapping of str to FmuVariable
@@ -69,6 +72,7 @@ class FmuDescription:
     version: Literal[2, 3]
     identifier: str
     token: str
+    model_exchange: bool
     variable_step: bool
     variables: Mapping[str, FmuVariable]
 
@@ -83,6 +87,28 @@ def describe_fmu(path: Path) -> FmuDescription:
     MissingExtraError
         Without the package fmpy.
     """
+    fmu = inspect_fmu(path)
+    if fmu.model_exchange:
+        raise _damaged(
+            path,
+            "an FMU for model exchange only",
+            "one for co-simulation, which brings its own solver",
+            "export it again as a co-simulation FMU.",
+        )
+    return fmu
+
+
+def inspect_fmu(path: Path) -> FmuDescription:
+    """Read the description of any FMU of FMI 2.0 or 3.0, also of one for model exchange only.
+
+    Raises
+    ------
+    InputError
+        If the file is no FMU, or a damaged one.
+    MissingExtraError
+        Without the package fmpy.
+    """
+    refuse_lfs_pointer(path)
     status = path.stat()
     return _described(path, status.st_mtime_ns, status.st_size)
 
@@ -111,24 +137,22 @@ def _described(path: Path, _changed: int, _size: int) -> FmuDescription:
                 )
                 for item in read.modelVariables
             }
-            simulated = read.coSimulation
+            simulated, exchanged = read.coSimulation, read.modelExchange
         except Exception as error:  # fmpy and its XML reader raise many kinds for a damaged file
             raise _damaged(path, f"a description that cannot be read ({error})") from error
     if version != "2.0" and not version.startswith("3."):
         raise _damaged(path, f"FMI {version}", "FMI 2.0 or 3.0", "export it again as FMI 2.0.")
-    if simulated is None or not simulated.modelIdentifier:
-        raise _damaged(
-            path,
-            "an FMU for model exchange only",
-            "one for co-simulation, which brings its own solver",
-            "export it again as a co-simulation FMU.",
-        )
+    offered = next((kind for kind in (simulated, exchanged) if kind and kind.modelIdentifier), None)
+    if offered is None:
+        raise _damaged(path, "neither co-simulation nor model exchange")
     return FmuDescription(
         path=path,
         version=2 if version == "2.0" else 3,
-        identifier=str(simulated.modelIdentifier),
+        identifier=str(offered.modelIdentifier),
         token=str(read.guid),
-        variable_step=bool(simulated.canHandleVariableCommunicationStepSize),
+        model_exchange=offered is not simulated,
+        variable_step=offered is simulated
+        and bool(simulated.canHandleVariableCommunicationStepSize),
         variables=variables,
     )
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError, require_positive
 from klack.mesh.abaqus_deck import Deck, read_deck
 from klack.mesh.abaqus_elements import ElementGroup
-from klack.mesh.abaqus_faces import FaceFinder, RowBlock, require_on_solids
+from klack.mesh.abaqus_faces import FaceFinder, RowBlock, left_out
 from klack.mesh.abaqus_numbering import distinct
 from klack.mesh.abaqus_scope import Scope
 from klack.mesh.families import FAMILIES
@@ -66,16 +66,22 @@ def read_abaqus(
 
 
 def read_abaqus_model(
-    path: str | Path, unit_length: float, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read mesh, materials and sections; see :func:`read_abaqus`.
+
+    With ``solids_only`` beams, springs, masses and shells on no solid are left out, and counted.
 
     Numbers of nodes and elements are those of the file.  Where instances repeat them, they are
     counted on through the file from 1.
     """
     require_positive("read_abaqus: unit_length", unit_length, "m")
     path = Path(path)
-    return _build(path, read_deck(path), unit_length, solids)
+    return _build(path, read_deck(path, solids_only=solids_only), unit_length, solids)
 
 
 def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | None) -> MeshModel:
@@ -85,7 +91,7 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
     dimension = next(FAMILIES[group.family].dimension for group in scope.groups if group.solid)
     names, sections = _solid_names(scope)
     blocks = _blocks(scope, names)
-    require_on_solids(scope, blocks)
+    others = left_out(scope, blocks)
     blocks = _kept(path, scope, blocks, wanted)
     surfaces, node_sets = FaceFinder(blocks, scope).surfaces_and_sets()
     used = _used_nodes(scope, blocks, labels)
@@ -110,13 +116,15 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
         materials=deck.materials,
         sections={name: sections[name] for name in mesh.solids if name in sections},
         unit_length=unit_length,
+        left_out=others,
+        foreign_materials=deck.foreign,
     )
 
 
 def _require_solids(path: Path, scope: Scope) -> None:
     dimensions = {FAMILIES[group.family].dimension for group in scope.groups if group.solid}
     if len(dimensions) != 1:
-        kinds = ", ".join(sorted({group.family for group in scope.groups})) or "none"
+        kinds = ", ".join(sorted({group.family or group.kind for group in scope.groups})) or "none"
         raise InputError(
             str(path),
             got=f"elements with the topology {kinds}",

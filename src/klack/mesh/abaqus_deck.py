@@ -34,17 +34,21 @@ class Deck:
 
     scope: Scope
     materials: dict[str, FileMaterial]
+    foreign: dict[str, str]
+    """Materials that are not isotropic, and what they are."""
 
 
-def read_deck(path: Path) -> Deck:
+def read_deck(path: Path, *, solids_only: bool = False) -> Deck:
     """Read all keywords that describe the model, without its steps.
+
+    With ``solids_only`` elements of other kinds are left out.
 
     Warns
     -----
     AccuracyWarning
         Once, if the file holds *TRANSFORM or constraints between nodes, which are passed over.
     """
-    reader = _Reader(path)
+    reader = _Reader(path, Scope(solids_only=solids_only))
     in_step = False
     for keyword in read_keywords(path):
         in_step = (in_step or keyword.name == "STEP") and keyword.name != "END STEP"
@@ -74,6 +78,7 @@ class _Reader:
     placement: Placement | None = None
     material: _Material | None = None
     materials: dict[str, FileMaterial] = field(default_factory=dict)
+    foreign: dict[str, str] = field(default_factory=dict)
     ignored: dict[str, str] = field(default_factory=dict)
 
     def take(self, keyword: Keyword) -> None:
@@ -130,7 +135,7 @@ class _Reader:
                     expected="every name once",
                     hint="look for a file that is included twice.",
                 )
-            self.scope = Scope()
+            self.scope = Scope(solids_only=self.root.solids_only)
         else:
             keyword.parameter("NAME")
             if name not in self.parts:
@@ -168,7 +173,9 @@ class _Reader:
         if keyword.name == "DENSITY":
             line, fields = _first_record(keyword, (1, 2), "a density")
             self.material.density = number(line, fields[0])
-        elif keyword.parameters.get("TYPE", "ISOTROPIC").upper().startswith("ISO"):
+        elif not (kind := keyword.parameters.get("TYPE", "ISOTROPIC").upper()).startswith("ISO"):
+            self.foreign[self.material.name] = f"anisotropic (*ELASTIC, TYPE={kind[:40]})"
+        else:
             line, fields = _first_record(keyword, (2, 3), "Young's modulus and Poisson's ratio")
             self.material.elastic = number(line, fields[0]), number(line, fields[1])
         if self.material.elastic is not None:
@@ -198,7 +205,7 @@ class _Reader:
             replace(section, material=shown.get(section.material.upper(), section.material))
             for section in self.root.sections
         ]
-        return Deck(self.root, self.materials)
+        return Deck(self.root, self.materials, self.foreign)
 
     def _add_only_part(self) -> None:
         """A part without an assembly is taken as drawn."""

@@ -16,8 +16,9 @@ from klack.mesh.abaqus_scope import FaceSelection, Scope
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Surface
+from klack.mesh.named_faces import ALSO_OTHERS
 
-__all__ = ["FaceFinder", "RowBlock", "require_on_solids"]
+__all__ = ["FaceFinder", "RowBlock", "left_out"]
 
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -73,7 +74,7 @@ class _Marking:
 
 def _markings(blocks: Sequence[RowBlock], scope: Scope) -> Iterator[_Marking]:
     """Where the surface elements of every group lie."""
-    markers = [group for group in scope.groups if not group.solid]
+    markers = [group for group in scope.groups if not group.solid and group.family]
     if not markers:
         return
     nodes = np.zeros(scope.nodes.count, dtype=bool)
@@ -97,17 +98,28 @@ def _corner_candidates(group: ElementGroup) -> list[list[int]]:
     return [list(range(FAMILIES[group.family].corners))]
 
 
-def require_on_solids(scope: Scope, blocks: Sequence[RowBlock]) -> None:
-    """Surface elements carry no stiffness here, so they must be faces of solid elements."""
+def left_out(scope: Scope, blocks: Sequence[RowBlock]) -> dict[str, int]:
+    """Count, by type, the elements that are neither solids nor faces of solids.
+
+    Surface elements carry no stiffness here, so they must be faces of solid elements; all others
+    raise unless only the solids are wanted.
+    """
+    counts: dict[str, int] = {}
+    for group in scope.groups:
+        if not group.family:
+            counts[group.kind] = counts.get(group.kind, 0) + len(group.numbers)
     for marking in _markings(blocks, scope):
         group, lost = marking.group, marking.codes < 0
-        if lost.any():
+        if lost.any() and scope.solids_only:
+            counts[group.kind] = counts.get(group.kind, 0) + int(lost.sum())
+        elif lost.any():
             raise InputError(
                 f"{group.place}: *ELEMENT: element {group.numbers[lost][0]}",
                 got=f"{lost.sum()} surface elements that are no faces of a solid element",
                 expected="surface elements that only mark faces of the solid mesh",
-                hint="shells and membranes are not modelled: take them out of the file.",
+                hint=f"shells and membranes are not modelled: {ALSO_OTHERS}",
             )
+    return counts
 
 
 class FaceFinder:

@@ -130,11 +130,14 @@ def _node_table(piece: bytes) -> tuple[Integers, NDArray[np.float64]] | None:
 def _nodes_by_line(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
     labels, x = array("q"), array("d")
     for line in keyword.lines():
-        count = len(line.fields)
+        fields = list(line.fields)
+        while fields and not fields[-1]:  # spare commas at the end
+            fields.pop()
+        count = len(fields)
         if count not in (3, 4):
             _wrong_length(line, count, "a node number and 2 or 3 coordinates")
-        labels.append(integer(line, line.fields[0]))
-        x.extend(number(line, text) for text in line.fields[1:])
+        labels.append(integer(line, fields[0]))
+        x.extend(number(line, text) for text in fields[1:])
         if count == 3:
             x.append(0.0)
     return np.array(labels, dtype=np.int64), np.array(x).reshape(-1, 3)

@@ -90,6 +90,7 @@ class Scope:
     node_surfaces: NamedSets = field(default_factory=lambda: NamedSets(Names("surface")))
     instances: dict[str, Instance] = field(default_factory=dict)
     system: NodeSystem | None = None  # of the nodes that follow
+    solids_only: bool = False  # elements of other kinds are left out
     waiting: list[Keyword] = field(default_factory=list)  # until all sets are known
 
     def copy(self) -> "Scope":
@@ -104,6 +105,7 @@ class Scope:
             sections=list(self.sections),
             surfaces=self.surfaces.copy(),
             node_surfaces=self.node_surfaces.copy(),
+            solids_only=self.solids_only,
         )
 
     def take(self, keyword: Keyword) -> None:
@@ -180,13 +182,13 @@ class Scope:
         self.nodes.count += len(labels)
 
     def _take_elements(self, keyword: Keyword) -> None:
-        family, solid, table = read_elements(keyword)
+        family, solid, table = read_elements(keyword, solids_only=self.solids_only)
         numbers = np.ascontiguousarray(table[:, 0])
         label = self.elements.numbering.repeated(numbers)
         if label is not None:
             known = self.elements.numbering.find(np.array([label]))[0] >= 0
             _defined_twice(place_of_element(keyword, label, 1 if known else 2), "element", label)
-        nodes = self.nodes.numbering.find(table[:, 1:])
+        nodes = self.nodes.numbering.find(table[:, 1:]) if family else table[:, 1:]
         if (nodes < 0).any():
             row = int(np.argmax((nodes < 0).any(axis=1)))
             missing = table[row, 1:][nodes[row] < 0][0]
@@ -206,6 +208,7 @@ class Scope:
             elset=keyword.parameters.get("ELSET", ""),
             instance="",
             place=keyword.place,
+            kind=keyword.parameter("TYPE").upper(),
         )
         if group.elset:
             self.elements.sets.add(keyword.place, group.elset, group.rows)

@@ -16,6 +16,7 @@ from klack.mesh.ansys_blocks import Archive, ElementTable, read_archive
 from klack.mesh.ansys_shapes import SHAPES, faces_of, shapes_of
 from klack.mesh.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.mesh_model import FileMaterial, MeshModel
+from klack.mesh.named_faces import ALSO_OTHERS
 from klack.mesh.number_ranges import within
 from klack.mesh.plausible import SAY_UNIT
 
@@ -30,10 +31,26 @@ _UNITS = {
 _SOLID_TYPES = {45, 92, 95, 185, 186, 187, 285}
 _MARKERS = {154, 173, 174, 200}  # surface effect, contact, mesh facets: they have no stiffness
 _PASSED_OVER = {153, 169, 170, 175, 176, 177}
+_MAY_BE_LEFT_OUT = {
+    **dict.fromkeys((3, 4, 23, 24, 44, 54, 188, 189), "BEAM"),
+    **dict.fromkeys((16, 18, 20, 59, 288, 289), "PIPE"),
+    **dict.fromkeys((1, 8, 10, 11, 160, 167, 180), "LINK"),
+    **dict.fromkeys((7, 14, 37, 38, 39, 40, 165, 214), "COMBIN"),
+    **dict.fromkeys((21, 71, 166), "MASS"),
+    **dict.fromkeys((28, 41, 43, 63, 91, 93, 99, 143, 150, 163, 181, 208, 209, 281), "SHELL"),
+    **{27: "MATRIX", 184: "MPC", 290: "ELBOW", 178: "CONTA", 12: "CONTAC", 52: "CONTAC"},
+    **{171: "CONTA", 172: "CONTA", 179: "PRETS", 201: "FOLLW", 42: "PLANE", 82: "PLANE"},
+    **{151: "SURF", 152: "SURF", 156: "SURF", 182: "PLANE", 183: "PLANE"},
+}
+"""Elements without a volume of their own that carry stiffness or mass."""
 
 
 def read_ansys_archive(
-    path: str | Path, unit_length: float | None, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read mesh, components and materials of an ANSYS archive.
 
@@ -44,6 +61,8 @@ def read_ansys_archive(
         Unit of the coordinates.  None takes the one of the /UNITS command.
     solids : sequence of str or None
         Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out beams, springs, masses and shells, and count them.
 
     Returns
     -------
@@ -64,11 +83,13 @@ def read_ansys_archive(
     archive = read_archive(path)
     unit = _unit(path, archive) if unit_length is None else unit_length
     kinds, options = _element_types(archive)
-    _require_known(path, archive, kinds)
+    left_out = _left_out(archive, kinds) if solids_only else {}
+    _require_known(path, archive, kinds, solids_only=solids_only)
     element_kind = _look_up(kinds, archive.elements.kind)
     solid = np.isin(element_kind, list(_SOLID_TYPES))
     table = _subset(archive.elements, solid)
     names = _ComponentNames(archive, table)
+    materials, foreign = _materials(archive)
     raw = FileMesh(
         numbers=archive.node_numbers,
         points=archive.points,
@@ -84,7 +105,9 @@ def read_ansys_archive(
         node_sets=names.node_sets,
         faces_of_sets=True,
         loose_faces=True,
-        materials=(materials := _materials(archive)),
+        left_out=left_out,
+        materials=materials,
+        foreign_materials=foreign,
         sections=_sections(table, names.solid, materials),
     )
     return mesh_model(path, raw, unit, solids)
@@ -150,18 +173,36 @@ def _look_up(table: Mapping[int, int], labels: Ints) -> Ints:
     return np.array([table.get(label, 0) for label in unique.tolist()], dtype=np.int64)[inverse]
 
 
-def _require_known(path: Path, archive: Archive, kinds: Mapping[int, int]) -> None:
+def _left_out(archive: Archive, kinds: Mapping[int, int]) -> dict[str, int]:
+    """Count the elements that carry stiffness or mass and have no volume."""
+    counts: dict[str, int] = {}
+    for label in np.unique(archive.elements.kind).tolist():
+        kind = kinds.get(label, 0)
+        if kind in _MAY_BE_LEFT_OUT:
+            name = f"{_MAY_BE_LEFT_OUT[kind]}{kind}"
+            count = int(np.sum(archive.elements.kind == label))
+            counts[name] = counts.get(name, 0) + count
+    return counts
+
+
+def _require_known(
+    path: Path, archive: Archive, kinds: Mapping[int, int], *, solids_only: bool
+) -> None:
     for label in np.unique(archive.elements.kind).tolist():
         kind = kinds.get(label, 0)
         if kind in _SOLID_TYPES | _MARKERS | _PASSED_OVER:
             continue
+        if solids_only and kind in _MAY_BE_LEFT_OUT:
+            continue
         at = int(np.argmax(archive.elements.kind == label))
+        name = f"{_MAY_BE_LEFT_OUT.get(kind, 'element type ')}{kind}"
         raise InputError(
             f"{archive.lines.place(int(archive.elements.row[at]))}: "
             f"element {archive.elements.number[at]}",
-            got=f"element type {kind}" if kind else f"type {label} without an ET command",
+            got=name if kind else f"type {label} without an ET command",
             expected="SOLID185, SOLID186, SOLID187 or SOLID285",
-            hint="select the solid elements of the body (ESEL) and their nodes before CDWRITE.",
+            hint="select the solid elements of the body (ESEL) and their nodes before CDWRITE"
+            + (f"; or {ALSO_OTHERS}" if kind in _MAY_BE_LEFT_OUT else "."),
         )
 
 
@@ -258,8 +299,11 @@ def _sections(
     return sections
 
 
-def _materials(archive: Archive) -> dict[str, FileMaterial]:
-    """Isotropic materials of MP and MPDATA; one that depends on temperature is left out."""
+def _materials(archive: Archive) -> tuple[dict[str, FileMaterial], dict[str, str]]:
+    """Isotropic materials of MP and MPDATA, and what the others are.
+
+    One that depends on temperature is left out.
+    """
     found: dict[int, dict[str, float | None]] = {}
     for row, fields in archive.commands:
         if fields[0] == "MPDATA" and len(fields) > 6 and fields[1].upper().startswith("R"):
@@ -275,14 +319,23 @@ def _materials(archive: Archive) -> dict[str, FileMaterial]:
         values_so_far = {*numbers, own.get(what, numbers[0])} if numbers else {None}
         own[what] = values_so_far.pop() if len(values_so_far) == 1 else None
     materials = {}
+    foreign = {
+        f"material_{_whole(archive, row, fields[2])}": "anisotropic (TB, ANEL)"
+        for row, fields in archive.commands
+        if fields[0] == "TB" and len(fields) > 2 and fields[1].upper() == "ANEL"
+    }
     for number, own in found.items():
+        if any(own.get(f"E{axis}", own.get("EX")) != own.get("EX") for axis in "YZ"):
+            foreign.setdefault(f"material_{number}", "orthotropic (MP, EX, EY, EZ differ)")
+        if f"material_{number}" in foreign:
+            continue
         young, poisson = own.get("EX"), own.get("PRXY", own.get("NUXY"))
         if young is not None and poisson is not None:
             name = f"material_{number}"
             materials[name] = FileMaterial(
                 name=name, young=young, poisson=poisson, density=own.get("DENS")
             )
-    return materials
+    return materials, foreign
 
 
 def _real(archive: Archive, row: int, text: str) -> float:

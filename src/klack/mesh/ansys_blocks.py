@@ -15,7 +15,7 @@ from klack.errors import InputError
 from klack.mesh.number_ranges import Ranges
 from klack.mesh.text_columns import TextLines, read_bytes
 
-__all__ = ["Archive", "ElementTable", "is_archive", "read_archive"]
+__all__ = ["Archive", "ElementTable", "is_archive", "read_archive", "refuse_script"]
 
 _KIND = "an ANSYS archive (CDWRITE, DB)"
 _CUT_OFF = "the file may be cut off: write it again with CDWRITE, DB."
@@ -132,6 +132,28 @@ def read_archive(path: Path) -> Archive:
 def is_archive(path: Path) -> bool:
     """True for a text with a node block of ANSYS; the ending .dat is also that of Nastran."""
     return bool(re.search(rb"^\s*nblock\s*,", path.read_bytes(), re.IGNORECASE | re.MULTILINE))
+
+
+_SCRIPT = re.compile(
+    rb"^[ \t]*(/prep7|/batch|/solu(tion)?|/post1|/filname|finish|et[ \t]*,[ \t]*\d+[ \t]*,|"
+    rb"[av]mesh[ \t]*,|esize[ \t]*,|cdread[ \t]*,|keyopt[ \t]*,|(block|cylind|k|v)[ \t]*,.*,)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_HEAD = 20_000  # bytes in which a script shows what it is
+
+
+def refuse_script(path: Path) -> None:
+    """Raise for commands of MAPDL that make a mesh when they run; no mesh is in such a file."""
+    with path.open("rb") as stream:
+        found = _SCRIPT.search(stream.read(_HEAD))
+    if found:
+        raise InputError(
+            str(path),
+            got=f"commands of ANSYS (MAPDL), such as '{found[0].decode('latin-1').strip()}', "
+            "without a block of nodes (NBLOCK)",
+            expected="a mesh: nodes and elements in blocks",
+            hint="run the script in ANSYS, and write its mesh with CDWRITE, DB, NAME, CDB.",
+        )
 
 
 def _command_rows(lines: TextLines) -> list[int]:

@@ -15,7 +15,7 @@ from klack.errors import InputError, require_positive
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, Mesh
 from klack.mesh.mesh_model import FileMaterial, MeshModel
-from klack.mesh.named_faces import MarkedFaces, named_faces
+from klack.mesh.named_faces import LOOSE, MarkedFaces, loose_faces, named_faces
 from klack.mesh.plausible import SAY_UNIT
 from klack.mesh.quality import require_positive_jacobians
 
@@ -63,6 +63,12 @@ class FileMesh:
         True: a node set that holds all nodes of some outer faces is a surface as well.
     loose_faces : bool
         True: surface elements on no solid are passed over, for they have no stiffness.
+    solids_only : bool
+        True: surface elements on no solid are left out and counted.
+    left_out : mapping of str to int
+        Elements of other kinds that the reader left out already, by their type.
+    foreign_materials : mapping
+        As in :class:`~klack.mesh.mesh_model.MeshModel`.
     materials, sections : mappings
         As in :class:`~klack.mesh.mesh_model.MeshModel`.
     """
@@ -74,6 +80,9 @@ class FileMesh:
     node_sets: Mapping[str, Ints] = field(default_factory=dict)
     faces_of_sets: bool = False
     loose_faces: bool = False
+    solids_only: bool = False
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    foreign_materials: Mapping[str, str] = field(default_factory=dict)
     materials: Mapping[str, FileMaterial] = field(default_factory=dict)
     sections: Mapping[str, str] = field(default_factory=dict)
 
@@ -102,6 +111,9 @@ def mesh_model(
         if len(part.numbers)
     )
     sets = {name: nodes.present(members) for name, members in raw.node_sets.items()}
+    left_out = dict(raw.left_out)
+    if raw.solids_only and not raw.loose_faces and (loose := loose_faces(everything, marks)):
+        left_out[LOOSE] = loose
     kept = _kept(path, everything, wanted)
     blocks = tuple(everything[i] for i in kept)
     numbers = tuple(_merged(solids)[i].numbers for i in kept)
@@ -121,7 +133,7 @@ def mesh_model(
         blocks,
         tuple(MarkedFaces(m.name, m.numbers, new[m.corners]) for m in marks),
         sets if raw.faces_of_sets else {},
-        all_solids=wanted is None and not raw.loose_faces,
+        all_solids=wanted is None and not (raw.loose_faces or raw.solids_only),
     )
     mesh = Mesh(points=points, blocks=blocks, surfaces=surfaces, node_sets={**inner, **sets})
     _require_right_of_axis(path, mesh, nodes.sorted[used])
@@ -133,6 +145,8 @@ def mesh_model(
         materials=raw.materials,
         sections={name: raw.sections[name] for name in mesh.solids if name in raw.sections},
         unit_length=unit_length,
+        left_out=left_out,
+        foreign_materials=raw.foreign_materials,
     )
 
 

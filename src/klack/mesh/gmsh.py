@@ -42,7 +42,11 @@ _REFUSED = {
 
 
 def read_gmsh(
-    path: str | Path, unit_length: float | None, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read the mesh of a Gmsh file.
 
@@ -53,6 +57,8 @@ def read_gmsh(
         What the file's unit of length is.  Such files do not say.
     solids : sequence of str or None
         Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out shells on no solid, and count them; curves and points are node sets anyway.
 
     Returns
     -------
@@ -86,6 +92,7 @@ def read_gmsh(
                 for group in part.groups
             ),
             node_sets=_node_sets(content, dimension),
+            solids_only=solids_only,
         ),
         unit_length,
         solids,

@@ -1,13 +1,15 @@
 """Finished meshes from files of other programs; the ending of the name says which."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
+from klack.input.existing_file import refuse_lfs_pointer
 from klack.mesh.abaqus import read_abaqus_model
 from klack.mesh.ansys_archive import read_ansys_archive
-from klack.mesh.ansys_blocks import is_archive
+from klack.mesh.ansys_blocks import is_archive, refuse_script
 from klack.mesh.file_mesh import require_unit
 from klack.mesh.gmsh import read_gmsh
 from klack.mesh.mesh_model import MeshModel
@@ -20,20 +22,33 @@ __all__ = ["MESH_FORMATS", "read_mesh_file", "require_unit"]
 
 class _Reader(Protocol):
     def __call__(
-        self, path: Path, unit_length: float | None, *, solids: Sequence[str] | None
+        self,
+        path: Path,
+        unit_length: float | None,
+        *,
+        solids: Sequence[str] | None,
+        solids_only: bool,
     ) -> MeshModel: ...
 
 
-def _abaqus(path: Path, unit_length: float | None, *, solids: Sequence[str] | None) -> MeshModel:
-    return read_abaqus_model(path, require_unit(path, unit_length), solids=solids)
+def _abaqus(
+    path: Path, unit_length: float | None, *, solids: Sequence[str] | None, solids_only: bool
+) -> MeshModel:
+    if path.is_file():
+        refuse_script(path)
+    unit = require_unit(path, unit_length)
+    return read_abaqus_model(path, unit, solids=solids, solids_only=solids_only)
 
 
 def _nastran_or_ansys(
-    path: Path, unit_length: float | None, *, solids: Sequence[str] | None
+    path: Path, unit_length: float | None, *, solids: Sequence[str] | None, solids_only: bool
 ) -> MeshModel:
     """Read a file of the ending that both programs use; ANSYS opens its blocks with commands."""
-    read = read_ansys_archive if path.is_file() and is_archive(path) else read_nastran
-    return read(path, unit_length, solids=solids)
+    archive = path.is_file() and is_archive(path)
+    if path.is_file() and not archive:
+        refuse_script(path)
+    read = read_ansys_archive if archive else read_nastran
+    return read(path, unit_length, solids=solids, solids_only=solids_only)
 
 
 MESH_FORMATS: Mapping[str, tuple[str, _Reader]] = {
@@ -50,7 +65,11 @@ MESH_FORMATS: Mapping[str, tuple[str, _Reader]] = {
 
 
 def read_mesh_file(
-    path: str | Path, unit_length: float | None, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read a finished mesh.
 
@@ -62,14 +81,24 @@ def read_mesh_file(
         Unit of the coordinates: 1e-3 for millimetres.  None where the file names it.
     solids : sequence of str or None
         Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out beams, springs, masses, rigid elements, and shells on no solid, with a warning
+        that counts them; they are an error otherwise.  Volumes that klack does not know (pyramids,
+        gaskets) are an error in any case: the body would have a hole.
 
     Raises
     ------
     InputError
         With file and place, if the file cannot be read, is of another kind, names no unit, or
         holds a body of no plausible size (the sign of a wrong unit).
+
+    Warns
+    -----
+    AccuracyWarning
+        With the number and type of the elements that were left out.
     """
     path = Path(path)
+    refuse_lfs_pointer(path)
     if path.suffix.lower() not in MESH_FORMATS:
         known = ", ".join(f"{ending} ({words})" for ending, (words, _) in MESH_FORMATS.items())
         raise InputError(
@@ -79,6 +108,14 @@ def read_mesh_file(
             hint="export the mesh from its program in one of these formats.",
         )
     _, read = MESH_FORMATS[path.suffix.lower()]
-    model = read(path, unit_length, solids=solids)
+    model = read(path, unit_length, solids=solids, solids_only=solids_only)
     require_plausible_size(str(path), model.mesh, model.unit_length)
+    if model.left_out:
+        counted = ", ".join(f"{count} {kind}" for kind, count in model.left_out.items())
+        warnings.warn(
+            f"{path.name}: left out, for klack computes solids only: {counted}. Their stiffness, "
+            "mass and constraints are missing in the body.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
     return model

@@ -1,7 +1,7 @@
 """A mesh as a file holds it: with the numbers of the file, its materials and its unit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,10 @@ class MeshModel:
         Where the file says it.
     unit_length : float [m]
         Length of one unit of the file.
+    left_out : mapping of str to int
+        Elements of the file that are no solids and were left out, counted by their type.
+    foreign_materials : mapping of name to str
+        Materials that are not isotropic and linear, and what they are.
     """
 
     mesh: Mesh
@@ -74,3 +78,5 @@ class MeshModel:
     materials: Mapping[str, FileMaterial]
     sections: Mapping[str, str]
     unit_length: float
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    foreign_materials: Mapping[str, str] = field(default_factory=dict)

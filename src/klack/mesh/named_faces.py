@@ -10,9 +10,16 @@ from klack.errors import InputError
 from klack.mesh.boundary import FaceTable
 from klack.mesh.mesh import ElementBlock, FaceBlock, Surface
 
-__all__ = ["MarkedFaces", "named_faces"]
+__all__ = ["ALSO_OTHERS", "LOOSE", "MarkedFaces", "loose_faces", "named_faces"]
 
 Ints = NDArray[np.int64]
+
+ALSO_OTHERS = (
+    "say 'elements: solids-only' beside the file in the case to do without them, or take them "
+    "out of the file."
+)
+"""What to try with a file that holds elements besides solids."""
+LOOSE = "surface elements on no solid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +104,21 @@ def named_faces(
     return surfaces, {name: np.unique(np.concatenate(parts)) for name, parts in inner.items()}
 
 
+def loose_faces(blocks: tuple[ElementBlock, ...], marks: tuple[MarkedFaces, ...]) -> int:
+    """Count surface elements that lie on no face of these solids."""
+    if not marks:
+        return 0
+    near = np.zeros(2 + max(int(block.connectivity.max()) for block in blocks), dtype=bool)
+    inside = [(mark.corners >= 0) & (mark.corners < len(near) - 1) for mark in marks]
+    for mark, good in zip(marks, inside, strict=True):
+        near[mark.corners[good]] = True
+    table = FaceTable.of(_with_faces_on(blocks, near))
+    return sum(
+        int(np.sum(np.where(good.all(axis=1), table.find(mark.corners), -1) < 0))
+        for mark, good in zip(marks, inside, strict=True)
+    )
+
+
 def _with_faces_on(
     blocks: tuple[ElementBlock, ...], near: NDArray[np.bool_]
 ) -> tuple[ElementBlock, ...]:
@@ -127,5 +149,5 @@ def _refuse_shells(where: str, mark: MarkedFaces, lost: NDArray[np.bool_]) -> No
         f"{where}: element {mark.numbers[lost][0]} ('{mark.name}')",
         got=f"{lost.sum()} surface elements that are no faces of a solid element",
         expected="surface elements that only mark faces of the solid mesh",
-        hint="shells and membranes are not modelled: take them out of the file.",
+        hint=f"shells and membranes are not modelled: {ALSO_OTHERS}",
     )

@@ -16,6 +16,7 @@ from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.file_mesh import FileElements, FileMesh, mesh_model, require_unit
 from klack.mesh.mesh_model import FileMaterial, MeshModel
+from klack.mesh.named_faces import ALSO_OTHERS
 from klack.mesh.nastran_cards import BulkData, read_bulk
 from klack.mesh.nastran_frames import Frames
 from klack.mesh.nastran_sets import names_in_comments, node_sets
@@ -38,6 +39,9 @@ _SHELLS = {
 _REFUSED = {
     **{"CPYRAM": "a pyramid", "CPYRA": "a pyramid"},
     **{name: "an axisymmetric element" for name in ("CTRIAX", "CTRIAX6", "CQUADX", "CQUADX4")},
+    **{name: "an element of fluid or infinite extent" for name in ("CHACAB", "CHACBR", "CAABSF")},
+}
+_MAY_BE_LEFT_OUT = {
     **{name: "a beam or rod" for name in ("CBAR", "CBEAM", "CBEND", "CROD", "CONROD", "CTUBE")},
     **{f"CELAS{i}": "a spring" for i in (1, 2, 3, 4)},
     **{f"CDAMP{i}": "a damper" for i in (1, 2, 3, 4)},
@@ -45,13 +49,23 @@ _REFUSED = {
     **{f"CONM{i}": "a point mass" for i in (1, 2)},
     **{f"CMASS{i}": "a point mass" for i in (1, 2, 3, 4)},
     **{name: "a rigid or coupling element" for name in ("RBE1", "RBE2", "RBE3", "RBAR", "RROD")},
-    **{name: "an element of fluid or infinite extent" for name in ("CHACAB", "CHACBR", "CAABSF")},
+    **{"CSHEAR": "a shear panel", "CVISC": "a damper", "GENEL": "a general element"},
+    **{name: "a joint between parts" for name in ("CFAST", "CWELD", "CSEAM", "CBUSH2D")},
+}
+"""Elements without a volume of their own."""
+_ANISOTROPIC = {
+    **{"MAT2": "anisotropic shell", "MAT3": "orthotropic", "MAT8": "orthotropic shell"},
+    **{"MAT9": "anisotropic", "MAT11": "orthotropic", "MAT12": "orthotropic"},
 }
 _PYRAMID = "mesh with tetrahedra, hexahedra and wedges, or split every pyramid into tetrahedra."
 
 
 def read_nastran(
-    path: str | Path, unit_length: float | None, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read mesh, materials and sections of a Nastran file.
 
@@ -62,6 +76,8 @@ def read_nastran(
         What the file's unit of length is.  Such files do not say.
     solids : sequence of str or None
         Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out beams, springs, masses and shells on no solid, and count them.
 
     Returns
     -------
@@ -78,7 +94,7 @@ def read_nastran(
     path = Path(path)
     unit_length = require_unit(path, unit_length)
     bulk = read_bulk(path)
-    _refuse_elements(bulk)
+    _refuse_elements(bulk, solids_only=solids_only)
     names = names_in_comments(bulk)
     numbers, points = _nodes(bulk)
     properties = {
@@ -95,6 +111,17 @@ def read_nastran(
         ),
         node_sets=node_sets(bulk, numbers),
         faces_of_sets=True,
+        solids_only=solids_only,
+        left_out={
+            name: len(bulk.numbers_of(name)) for name in bulk.known if name in _MAY_BE_LEFT_OUT
+        },
+        foreign_materials={
+            _named(names.get("MATERIAL", {}), kind.lower(), card.integer(1, "material")): (
+                f"{words} ({kind})"
+            )
+            for kind, words in _ANISOTROPIC.items()
+            for card in bulk.cards(kind)
+        },
         materials={material.name: material for material in materials.values()},
         sections={
             _named(given, "psolid", label): materials[material].name
@@ -109,17 +136,19 @@ def _named(given: dict[int, str], kind: str, label: int) -> str:
     return given.get(label, f"{kind}_{label}")
 
 
-def _refuse_elements(bulk: BulkData) -> None:
+def _refuse_elements(bulk: BulkData, *, solids_only: bool) -> None:
+    refused = _REFUSED if solids_only else {**_REFUSED, **_MAY_BE_LEFT_OUT}
     for name in bulk.known:
-        if name in _REFUSED:
+        if name in refused:
             card = next(bulk.cards(name))
+            hint = "take elements of other kinds out of the file."
+            if name in _MAY_BE_LEFT_OUT:
+                hint = ALSO_OTHERS
             raise InputError(
                 f"{card.place}: {name} {card.field(1)}",
-                got=_REFUSED[name],
+                got=refused[name],
                 expected="CTETRA, CHEXA, CPENTA, and shells that mark surfaces",
-                hint=_PYRAMID
-                if name.startswith("CPYRA")
-                else "take elements of other kinds out of the file.",
+                hint=_PYRAMID if name.startswith("CPYRA") else hint,
             )
 
 

@@ -15,6 +15,7 @@ from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.file_mesh import FileElements, FileMesh, mesh_model, require_unit
 from klack.mesh.mesh_model import MeshModel
+from klack.mesh.named_faces import ALSO_OTHERS
 from klack.mesh.vtk_grid import VtkGrid, refuse
 from klack.mesh.vtk_legacy import read_legacy
 from klack.mesh.vtk_xml import read_xml
@@ -46,6 +47,14 @@ _REFUSED = {
     **{28: "quadrilaterals with 9 points", 29: "hexahedra with 27 points"},
     **{32: "wedges with 18 points", 33: "hexahedra with 24 points"},
 }
+_MAY_BE_LEFT_OUT = {
+    **{6: "triangle strips", 7: "polygons", 28: "quadrilaterals with 9 points"},
+    **{30: "quadrilaterals with 6 points", 34: "triangles with 7 points"},
+    **{35: "cubic lines", 68: "Lagrange curves", 69: "Lagrange triangles"},
+    **{70: "Lagrange quadrilaterals", 75: "Bezier curves", 76: "Bezier triangles"},
+    77: "Bezier quadrilaterals",
+}
+"""Cells without a volume."""
 _SOLID_WORDS = (
     *("solid", "body", "part", "region", "domain", "block", "object", "material", "mat"),
     *("property", "pid", "gmshphysical", "cellentity", "attribute"),
@@ -54,7 +63,11 @@ _SURFACE_WORDS = ("surface", "boundary", "face", "bc")
 
 
 def read_vtk(
-    path: str | Path, unit_length: float | None, *, solids: Sequence[str] | None = None
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
 ) -> MeshModel:
     """Read the mesh of a VTK file.
 
@@ -66,6 +79,8 @@ def read_vtk(
         What the file's unit of length is.  Such files do not say.
     solids : sequence of str or None
         Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out surface cells on no solid, and flat cells of other kinds, and count them.
 
     Returns
     -------
@@ -84,7 +99,8 @@ def read_vtk(
     unit_length = require_unit(path, unit_length)
     grid = read_xml(path) if path.suffix.lower() == ".vtu" else read_legacy(path)
     _require_fitting(path, grid)
-    dimension = _dimension(path, grid)
+    left_out = _left_out(grid) if solids_only else {}
+    dimension = _dimension(path, grid, solids_only=solids_only)
     solid_array = _chosen(grid.cell_data, _SOLID_WORDS)
     surface_array = _chosen(grid.cell_data, _SURFACE_WORDS)
     flags = {
@@ -116,6 +132,8 @@ def read_vtk(
         ),
         node_sets=sets,
         faces_of_sets=True,
+        solids_only=solids_only,
+        left_out=left_out,
     )
     return mesh_model(path, raw, unit_length, solids)
 
@@ -139,15 +157,27 @@ def _require_fitting(path: Path, grid: VtkGrid) -> None:
                 refuse(f"{path}: {name}", f"{len(values)} values", f"{items}, one per {kind}")
 
 
-def _dimension(path: Path, grid: VtkGrid) -> int:
+def _left_out(grid: VtkGrid) -> dict[str, int]:
+    kinds, counts = np.unique(grid.types, return_counts=True)
+    return {
+        _MAY_BE_LEFT_OUT[kind]: count
+        for kind, count in zip(kinds.tolist(), counts.tolist(), strict=True)
+        if kind in _MAY_BE_LEFT_OUT
+    }
+
+
+def _dimension(path: Path, grid: VtkGrid, *, solids_only: bool) -> int:
     """3 for solids, 2 for a plane grid in z = 0; raise for cells that cannot be used."""
     for kind in np.unique(grid.types).tolist():
+        if solids_only and kind in _MAY_BE_LEFT_OUT:
+            continue
         if kind not in _CELLS and kind not in _PASSED_OVER:
             raise InputError(
                 f"{path}: cell {int(np.argmax(grid.types == kind)) + 1}",
-                got=_REFUSED.get(kind, f"cell type {kind}"),
+                got=(_MAY_BE_LEFT_OUT | _REFUSED).get(kind, f"cell type {kind}"),
                 expected="tetrahedra, hexahedra, wedges, and triangles or quadrilaterals on them",
-                hint="mesh with linear or quadratic elements of these shapes.",
+                hint="mesh with linear or quadratic elements of these shapes"
+                + (f"; or {ALSO_OTHERS}" if kind in _MAY_BE_LEFT_OUT else "."),
             )
     dimensions = {FAMILIES[_CELLS[k][0]].dimension for k in set(grid.types.tolist()) & set(_CELLS)}
     dimension = max(dimensions, default=0)

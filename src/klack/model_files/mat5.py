@@ -91,7 +91,7 @@ def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
     Raises
     ------
     InputError
-        For damaged files, and files of version 4 or 7.3.
+        For damaged files, and files of version 4 or 7.3, which it names.
     """
     if path.stat().st_size > largest:
         raise InputError(
@@ -127,7 +127,28 @@ def _byte_order(path: Path, head: bytes) -> str:
         return "<"
     if len(head) == 128 and head[126:128] == b"MI" and head[124:126] == b"\x01\x00":
         return ">"
+    if _is_version_4(head):
+        raise InputError(
+            str(path), got="a MATLAB file of version 4", expected="version 5 to 7.2", hint=_HINT
+        )
     raise _damaged(path, "no header of version 5")
+
+
+def _is_version_4(head: bytes) -> bool:
+    """True for the header of a variable: type, rows, columns, imaginary or not, length of the name.
+
+    The digits of the type are machine (0 to 4), 0, precision (0 to 5) and kind (0 to 2).
+    """
+    for order in "<>":
+        if len(head) < 21:
+            return False
+        kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", head[:20])
+        digits = f"{kind:04d}"
+        known = len(digits) == 4 and digits[1] == "0" and digits[2] <= "5" and digits[3] <= "2"
+        name = head[20 : 20 + length].split(b"\0")[0]
+        if known and digits[0] <= "4" and min(rows, columns) >= 0 and imaginary in (0, 1):
+            return 1 < length <= 64 and name.replace(b"_", b"a").isalnum()
+    return False
 
 
 def _unpacked(budget: _Budget, data: memoryview) -> memoryview:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from klack.errors import InputError
+from klack.input.existing_file import refuse_lfs_pointer
 from klack.model_files.abaqus_mtx import read_abaqus_mtx
 from klack.model_files.ansys_full import read_ansys_full
 from klack.model_files.calculix_storage import read_calculix_storage
@@ -90,6 +91,7 @@ def read_matrix(
     if not path.is_file():
         hint = "check the spelling and the folder."
         raise InputError(str(path), got="no such file", expected="a file of a matrix", hint=hint)
+    refuse_lfs_pointer(path)
     if path.stat().st_size > _LARGEST:
         hint = "write the matrices in a binary or sparse form."
         size = f"{path.stat().st_size / 2**30:.0f} GB"

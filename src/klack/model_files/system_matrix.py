@@ -11,7 +11,14 @@ from scipy.sparse import coo_array, csr_array
 
 from klack.errors import InputError
 
-__all__ = ["Role", "RowPlaces", "SystemMatrix", "choose_matrix", "symmetric_matrix"]
+__all__ = [
+    "Role",
+    "RowPlaces",
+    "SystemMatrix",
+    "WhichMatrixError",
+    "choose_matrix",
+    "symmetric_matrix",
+]
 
 Role = Literal["stiffness", "mass"]
 
@@ -68,6 +75,16 @@ class SystemMatrix:
     notes: tuple[str, ...] = ()
 
 
+class WhichMatrixError(InputError):
+    """A file holds several matrices, or none of the wanted name; ``names`` are those it has."""
+
+    def __init__(
+        self, names: tuple[str, ...], where: str, *, got: str, expected: str, hint: str
+    ) -> None:
+        super().__init__(where, got=got, expected=expected, hint=hint)
+        self.names = names
+
+
 def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Role | None) -> str:
     """Name of one matrix of a file: the wanted one, the only one, or the one of the usual name.
 
@@ -90,7 +107,8 @@ def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Ro
         return found[0]
     listed = ", ".join(repr(name) for name in known[:12]) + (", ..." if len(known) > 12 else "")
     key = f"{role or 'stiffness'}_name"
-    raise InputError(
+    raise WhichMatrixError(
+        tuple(known),
         where,
         got=f"no matrix '{wanted}'" if wanted else f"{len(known)} matrices",
         expected=f"one of: {listed}" if known else "a matrix",

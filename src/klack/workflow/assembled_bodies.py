@@ -149,7 +149,8 @@ def _drawn(given: CaseBody, where: str) -> tuple[Mesh, NDArray[np.int64]]:
     """Mesh in the place where its program has it, and the number of each node."""
     geometry = given.geometry
     if geometry.mesh is not None:
-        model = read_mesh_file(geometry.mesh.file, geometry.mesh.unit)
+        mesh = geometry.mesh
+        model = read_mesh_file(mesh.file, mesh.unit, solids_only=mesh.solids_only)
         return model.mesh, model.node_numbers
     if geometry.nodes is not None:
         nodes = where.removesuffix(".matrices") + ".geometry.nodes"

@@ -164,7 +164,10 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
         return node_mesh(geometry.nodes, geometry.dimension, f"bodies.{name}.geometry.nodes")[0]
     if geometry.mesh is not None:
         solids = tuple(body.material) if isinstance(body.material, dict) else None
-        mesh = read_mesh_file(geometry.mesh.file, geometry.mesh.unit, solids=solids).mesh
+        given = geometry.mesh
+        mesh = read_mesh_file(
+            given.file, given.unit, solids=solids, solids_only=given.solids_only
+        ).mesh
         _require_dimension(geometry.mesh.file, mesh, geometry.dimension)
         return mesh
     if body.mesh is None:  # refused by the schema already

@@ -8,14 +8,15 @@ import numpy as np
 from klack.case.bodies import CaseFile
 from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
-from klack.mechanics.fmu_file import FmuDescription, describe_fmu
+from klack.input.existing_file import refuse_lfs_pointer
+from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
 from klack.mesh.mesh import Mesh
 from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
 from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
-from klack.model_files.system_matrix import SystemMatrix
+from klack.model_files.system_matrix import SystemMatrix, WhichMatrixError
 from klack.reduction.reduced_body import ReducedBody
 from klack.workflow.assembled_bodies import assembled_body
 from klack.workflow.given_bodies import reduced_from_file
@@ -44,7 +45,7 @@ def inspect_file(
     unit_length : float [m] or None
         Of a mesh whose file does not name it.
     matrix : str or None
-        Name of a matrix in a file of several.
+        Name of one matrix in a file of several; all of them without.
 
     Raises
     ------
@@ -55,14 +56,15 @@ def inspect_file(
     if not path.is_file():
         hint = "check the spelling and the folder."
         raise InputError(str(path), got="no such file", expected="a file", hint=hint)
+    refuse_lfs_pointer(path)
     if ending in STEP_ENDINGS:
         return tuple(_step_rows(step_content(path)))
     if ending in MESH_FORMATS:
-        return tuple(_mesh_rows(read_mesh_file(path, unit_length)))
+        return tuple(_mesh_rows(read_mesh_file(path, unit_length, solids_only=True)))
     if ending in MATRIX_FORMATS:
-        return tuple(_matrix_rows(read_matrix(path, name=matrix)))
+        return tuple(_rows_of_matrices(path, matrix))
     if ending == ".fmu":
-        return tuple(_fmu_rows(describe_fmu(path)))
+        return tuple(_fmu_rows(inspect_fmu(path)))
     raise InputError(
         str(path),
         got=f"a file that ends in '{path.suffix}'",
@@ -91,7 +93,9 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
         elif body.geometry.mesh is not None:
             mesh = body.geometry.mesh
             solids = tuple(body.material) if isinstance(body.material, dict) else None
-            model = read_mesh_file(mesh.file, mesh.unit, solids=solids)
+            model = read_mesh_file(
+                mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
+            )
             known[name] = tuple(model.mesh.surfaces)
             yield name, tuple(_mesh_rows(model))
         elif body.geometry.step is not None:
@@ -172,6 +176,27 @@ def _mesh_rows(model: MeshModel) -> Iterator[Row]:
             name,
             f"E {given.young:.6g}, nu {given.poisson:.4g}, density {density} (units of the file)",
         )
+    for name, kind in model.foreign_materials.items():
+        yield "material", name, f"{kind}; klack computes isotropic materials only"
+    for kind, count in model.left_out.items():
+        yield "left out", kind, f"{count} elements; a case needs 'elements: solids-only' for them"
+
+
+def _rows_of_matrices(path: Path, name: str | None) -> Iterator[Row]:
+    """One matrix, or all of a file of several."""
+    try:
+        yield from _matrix_rows(read_matrix(path, name=name))
+        return
+    except WhichMatrixError as error:
+        if name is not None or len(error.names) < 2:
+            raise
+        names = error.names
+    for each in names:
+        try:
+            rows = tuple(_matrix_rows(read_matrix(path, name=each)))
+        except InputError as error:
+            rows = (("matrix", each, f"not usable: {error.got}"),)
+        yield from rows
 
 
 def _matrix_rows(found: SystemMatrix) -> Iterator[Row]:
@@ -196,7 +221,8 @@ _WAYS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}
 
 
 def _fmu_rows(fmu: FmuDescription) -> Iterator[Row]:
-    yield "FMU", fmu.identifier, f"co-simulation, FMI {fmu.version}.0"
+    kind = "model exchange only: klack cannot run it" if fmu.model_exchange else "co-simulation"
+    yield "FMU", fmu.identifier, f"{kind}, FMI {fmu.version}.0"
     for causality in ("input", "output", "parameter"):
         for name, variable in fmu.variables.items():
             if variable.causality == causality:
