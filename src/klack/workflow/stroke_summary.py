@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any
 
 from klack.simulation.network_result import ImpactEvent
+from klack.workflow.json_results import EventJson, StrokeJson, VariantJson
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 
 __all__ = [
@@ -43,7 +43,7 @@ _NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as the first one."""
 
 
-def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
+def stroke_to_json(study: StrokeStudy) -> StrokeJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -57,6 +57,7 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
     variants = {name: _numbers(variant) for name, variant in study.variants.items()}
     reference = study.reference.name
     return {
+        "schema": "klack-stroke/1",
         "case": study.case,
         "klack": study.version,
         "variant": reference,
@@ -116,7 +117,7 @@ def real_time_factor(variant: StrokeVariant) -> float:
     return variant.result.wall_time / simulated if simulated > 0.0 else float("nan")
 
 
-def _numbers(variant: StrokeVariant) -> dict[str, Any]:
+def _numbers(variant: StrokeVariant) -> VariantJson:
     result = variant.result
     return {
         "label": variant.label,
@@ -135,7 +136,7 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
     }
 
 
-def _event(event: ImpactEvent) -> dict[str, str | float | None]:
+def _event(event: ImpactEvent) -> EventJson:
     return {
         "stop": event.stop,
         "time_s": _number(event.time),
