@@ -170,12 +170,11 @@ def _words(text: str) -> str:
 
 
 def _kind(node: Node, schema: Node) -> Kind | None:
-    """Kind of quantity that a value is, known by the example that its schema gives."""
+    """Kind of quantity that a value is, as its schema says."""
     node = _resolved(node, schema)
-    for example in node.get("examples", ()):
-        for kind in KINDS:
-            if kind.example == example:
-                return kind
+    for kind in KINDS:
+        if kind.name == node.get("$comment"):
+            return kind
     found = [_kind(choice, schema) for choice in _choices(node)]
     if isinstance(node.get("items"), Mapping):
         found.append(_kind(node["items"], schema))
@@ -207,12 +206,16 @@ def _type(node: Node, schema: Node, found: Mapping[str, _Section]) -> str:
         return f"list of {_type(node.get('items', {}), schema, found)}"
     kind = _kind(node, schema)
     if kind is not None:
-        return f"{_plain(kind)}, as `{kind.example}`"
+        return f"{_plain(kind)}, as `{_example(node, kind)}`"
     if isinstance(node.get("type"), list) or node.get("type") == "string":
         return _text(node)
     return {"number": "number", "integer": "whole number", "boolean": "`true` or `false`"}.get(
         str(node.get("type")), "any"
     )
+
+
+def _example(node: Node, kind: Kind) -> str:
+    return str(next(iter(node.get("examples", ())), kind.example))
 
 
 def anchor(head: str) -> str:

@@ -24,7 +24,14 @@ sys.path.append(str(Path(__file__).parent))  # worker processes look there as we
 from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy books)
 
 # the search for examples in docstrings would run these modules a second time, under another name
-collect_ignore_glob = ["energy_ledger.py", "property_profiles.py", "rigid_valve.py", "data/*.py"]
+collect_ignore_glob = [
+    "energy_ledger.py",
+    "json_schema_check.py",
+    "mutated_cases.py",
+    "property_profiles.py",
+    "rigid_valve.py",
+    "data/*.py",
+]
 
 SOURCE = Path(__file__).parent / "data" / "spring_damper.c"
 

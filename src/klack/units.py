@@ -406,6 +406,7 @@ def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
         "type": ["string", "number"],
         "description": f"{kind.name}, e.g. {kind.example}",
         "examples": [kind.example],
+        "$comment": kind.name,
     }
     return BeforeValidator(partial(_read, kind=kind)), WithJsonSchema(schema)
 
@@ -419,10 +420,15 @@ def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
 
 def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
     """Metadata of a temperature in K; a file may also write ``20 degC``."""
-    metadata = {"type": ["string", "number"], "description": "a temperature, e.g. 20 degC"}
+    metadata = {
+        "type": ["string", "number"],
+        "description": "a temperature, e.g. 20 degC",
+    }
     return (
         BeforeValidator(partial(_read_temperature, kind=TEMPERATURE)),
-        WithJsonSchema({**metadata, "examples": ["20 degC", "293 K"]}),
+        WithJsonSchema(
+            {**metadata, "examples": ["20 degC", "293 K"], "$comment": TEMPERATURE.name}
+        ),
     )
 
 

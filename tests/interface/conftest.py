@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from json_schema_check import every_result_is_documented  # noqa: F401
 
 from klack.acoustics.comparison import compare_histories
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory

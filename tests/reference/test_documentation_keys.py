@@ -83,3 +83,9 @@ def test_five_lines_of_python():
     # the last digit may differ with the version of the mesher
     assert float(peak) == pytest.approx(float(written[1]), rel=2e-3)
     assert float(time) == pytest.approx(float(written[2]), rel=5e-3)
+
+
+def test_the_page_of_results_is_fresh():
+    stored = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
+
+    assert load("json_page").page() == stored, "run: python docs/json_page.py"

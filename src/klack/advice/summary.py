@@ -11,6 +11,7 @@ from klack.advice.ladder import REACH, Measure, score
 from klack.advice.settings import SettingValue
 from klack.input.problem import Key
 from klack.units import format_si
+from klack.workflow.json_results import AdviceJson, AdvisedSettingJson
 
 __all__ = ["ADVICE_COLUMNS", "advice_lines", "advice_rows", "advice_to_json"]
 
@@ -207,7 +208,7 @@ def _reaches(advice: Advice) -> list[str]:
     return lines
 
 
-def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> dict[str, Any]:
+def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> AdviceJson:
     """Plain numbers: errors relative (-) or in dB, settings in SI.
 
     Parameters
@@ -218,10 +219,11 @@ def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> dict[str, Any]:
     """
     names = [_json_name(measure) for measure in advice.measures]
 
-    def errors(found: NDArray[np.float64]) -> dict[str, float]:
+    def errors(found: NDArray[np.float64]) -> dict[str, float | None]:
         return {name: float(value) for name, value in zip(names, found, strict=True)}
 
     return {
+        "schema": "klack-advise/1",
         "case": advice.case,
         "level": advice.level,
         "judged_up_to_Hz": advice.up_to if np.isfinite(advice.up_to) else None,
@@ -252,7 +254,7 @@ def _json_name(measure: Measure) -> str:
     return measure.name.replace(" ", "_") + ("_dB" if measure.decibel else "")
 
 
-def _setting_json(item: Counsel, errors: Any) -> dict[str, Any]:
+def _setting_json(item: Counsel, errors: Any) -> AdvisedSettingJson:
     ladder, setting = item.measured.ladder, item.measured.setting
     return {
         "name": setting.name,

@@ -165,7 +165,7 @@ def _size(value: Any, info: ValidationInfo, kind: Kind, key: tuple[str | int, ..
 
 def _typed(kind: Kind) -> tuple[PlainValidator, WithJsonSchema]:
     """Metadata of a field that takes a value of this kind, or a distribution of it."""
-    value = {"type": ["string", "number"], "examples": [kind.example]}
+    value = {"type": ["string", "number"], "examples": [kind.example], "$comment": kind.name}
     pair = {"type": "array", "items": value, "minItems": 2, "maxItems": 2}
     choices: list[dict[str, Any]] = [value]
     for name, count in _NUMBERS.items():

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,6 +39,7 @@ __all__ = [
 _Kind = TypeVar("_Kind", bound=CaseFile)
 
 _LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
+_LARGEST_NUMBER = 1e15  # nothing with a meaning comes near, and arithmetic ends far beyond
 _NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")  # an escape such as "\\ud800" is half a letter
 
 
@@ -220,6 +222,9 @@ class _Plain:
             return self._text(str(node), key)
         for plain in (int, float):
             if isinstance(node, plain):
+                if _LARGEST_NUMBER < abs(node) != inf:
+                    hint = "check the power of ten."
+                    self._refuse(key, f"{plain(node)}"[:40], "a number below 1e15 in size", hint)
                 return plain(node)
         # a date, a set, or a value with a tag such as !!python/name
         tag = getattr(getattr(node, "tag", None), "value", None) or type(node).__name__
@@ -240,10 +245,11 @@ class _Plain:
             self._refuse(key, f"the text {ascii(text)[:80]}", "text without such signs")
         return text
 
-    def _refuse(self, key: Key, got: str, expected: str) -> None:
+    def _refuse(
+        self, key: Key, got: str, expected: str, hint: str = 'put text into quotes: "...".'
+    ) -> None:
         line = self.lines.find(key, on_key=False)
         where = f"{self.path}:{line}: {key_text(key)}"
-        hint = 'put text into quotes: "...".'
         raise InputError(where, got=got, expected=expected, hint=hint)
 
 

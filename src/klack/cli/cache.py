@@ -1,12 +1,15 @@
 """``klack cache``: results that earlier runs have left for later ones."""
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from klack.cli.options import Json
 from klack.cli.output import require_json_target, write_json
+
+if TYPE_CHECKING:
+    from klack.workflow.json_results import CacheJson
 
 __all__ = ["cache"]
 
@@ -33,7 +36,7 @@ def cache(
     if results is None:
         print("The cache is off (KLACK_CACHE, or a user without a home).", file=stream)
         if json is not None:
-            write_json(json, {"folder": None, "count": 0, "size_B": 0, "limit_B": 0})
+            write_json(json, _numbers(None, 0, 0, 0))
         return 0
     if clear:
         try:
@@ -53,7 +56,15 @@ def cache(
         file=stream,
     )
     if json is not None:
-        folder = str(results.folder)
-        numbers = {"count": there.count, "size_B": there.size, "limit_B": results.limit}
-        write_json(json, {"folder": folder, **numbers})
+        write_json(json, _numbers(str(results.folder), there.count, there.size, results.limit))
     return 0
+
+
+def _numbers(folder: str | None, count: int, size: int, limit: int) -> "CacheJson":
+    return {
+        "schema": "klack-cache/1",
+        "folder": folder,
+        "count": count,
+        "size_B": size,
+        "limit_B": limit,
+    }

@@ -1,15 +1,19 @@
 """``klack export``: models, decks and results for other programs, through one door."""
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.options import Components, Out, Quiet, Threads, imported, require_threads
-from klack.cli.output import require_folder
+from klack.cli.options import Components, Json, Out, Quiet, Threads, imported, require_threads
+from klack.cli.output import Written, require_folder, require_json_target, write_json
 from klack.cli.stored import is_result
 from klack.errors import InputError
+
+if TYPE_CHECKING:
+    from klack.workflow.json_results import ExportJson
 
 __all__ = ["export"]
 
@@ -116,10 +120,12 @@ def export(
     time_limit: _TimeLimit = None,
     component: Components = None,
     out: Out = None,
+    json: Json = None,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> int:
     """Write models, results or decks of a case for another program."""
+    require_json_target(json)
     require_threads(threads)
     _require_used(
         to,
@@ -138,7 +144,8 @@ def export(
         },
     )
     if is_result(source):
-        _export_stored(source, to, out, quiet=quiet)
+        name, made = _export_stored(source, to, out)
+        _tell(name, to, made, json, quiet=quiet)
         return 0
 
     from klack.case.shipped import find_case
@@ -147,22 +154,23 @@ def export(
     case = load_any_case(find_case(source), imported(component))
     folder = out if out is not None else Path("klack-results") / case.name
     require_folder(folder)
+    incomplete: Exception | None = None
     if to == "calculix":
         from klack.cli.export_calculix import DeckNumbers, export_calculix
 
         numbers = DeckNumbers(step, duration, penalty, time_limit)
-        export_calculix(
+        made = export_calculix(
             _impact_only(case, to), folder, numbers, run=run, threads=threads or 1, quiet=quiet
         )
     elif to in _MODELS:
         from klack.cli.export_models import ModelChoice, export_models
 
         choice = ModelChoice(to, part, body, 3 if fmi == "3" else 2, _platforms(platform))
-        export_models(case, folder, choice, threads=threads, quiet=quiet)
+        made = export_models(case, folder, choice, threads=threads, quiet=quiet)
     elif to == "vtk":
         from klack.cli.export_results import export_fields
 
-        export_fields(
+        made = export_fields(
             _impact_only(case, to),
             folder,
             level=level or "reduced",
@@ -173,8 +181,25 @@ def export(
     else:
         from klack.cli.export_results import run_and_export
 
-        run_and_export(case, to, folder, threads=threads, quiet=quiet)
+        made, incomplete = run_and_export(case, to, folder, threads=threads, quiet=quiet)
+    _tell(case.name, to, made, json, quiet=quiet)
+    if incomplete:
+        raise incomplete
     return 0
+
+
+def _tell(case: str, to: str, made: Written, json: Path | None, *, quiet: bool) -> None:
+    if not quiet:
+        print("\n".join(made.lines), file=sys.stderr if str(json) == "-" else sys.stdout)
+    if json is not None:
+        result: ExportJson = {
+            "schema": "klack-export/1",
+            "case": case,
+            "to": to,
+            "folder": str(made.folder),
+            "files": list(made.files),
+        }
+        write_json(json, result)
 
 
 def _require_used(to: str, options: Mapping[str, object]) -> None:
@@ -188,7 +213,7 @@ def _require_used(to: str, options: Mapping[str, object]) -> None:
             )
 
 
-def _export_stored(source: Path, to: str, out: Path | None, *, quiet: bool) -> None:
+def _export_stored(source: Path, to: str, out: Path | None) -> tuple[str, Written]:
     if to not in _RESULTS:
         raise InputError(
             str(source),
@@ -201,7 +226,8 @@ def _export_stored(source: Path, to: str, out: Path | None, *, quiet: bool) -> N
 
     folder = out if out is not None else source
     require_folder(folder)
-    export_result(load_stored(source), to, folder, quiet=quiet)
+    study = load_stored(source)
+    return study.case, export_result(study, to, folder)
 
 
 def _impact_only(case: Any, to: str) -> Any:

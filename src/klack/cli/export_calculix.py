@@ -1,9 +1,10 @@
 """``klack export --to calculix``: the same impact for an independent solver."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from klack.cli.output import staged_folder
+from klack.cli.output import Written, staged_folder
 from klack.cli.progress import show_progress
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class DeckNumbers:
 
 def export_calculix(
     case: "Case", folder: Path, numbers: DeckNumbers, *, run: bool, threads: int, quiet: bool
-) -> None:
+) -> Written:
     """Write the deck of an impact; with ``run``, let the installed program compute it."""
     from klack.exchange.calculix_case import calculix_impact, calculix_settings
     from klack.exchange.calculix_deck import write_deck
@@ -50,10 +51,10 @@ def export_calculix(
         progress("deck", 0.0)
         with staged_folder(folder) as stage:
             write_deck(impact, settings, stage / deck.name)
+            made = Written.of(folder, stage, _described(deck, settings))
         if not run:
-            if not quiet:
-                print(f"{_described(deck, settings)}\nRun it in its folder: ccx -i {deck.stem}")
-            return
+            then = f"Run it in its folder: ccx -i {deck.stem}"
+            return replace(made, lines=(*made.lines, then))
         done = run_calculix(
             deck,
             duration=settings.duration,
@@ -61,8 +62,8 @@ def export_calculix(
             time_limit=numbers.time_limit,
             progress=lambda fraction: progress("CalculiX", fraction),
         )
-    if not quiet:
-        print(f"{_described(deck, settings)}\nCalculiX took {done.wall_time:.0f} s: {done.data}")
+    then = f"CalculiX took {done.wall_time:.0f} s: {done.data}"
+    return replace(made, lines=(*made.lines, then))
 
 
 def _described(deck: Path, settings: "CalculixSettings") -> str:

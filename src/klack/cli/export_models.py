@@ -1,11 +1,11 @@
 """``klack export --to mat|csv|fmu|modelica``: bodies and pairs for other simulators."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from klack.cli.output import listing, staged_folder
+from klack.cli.output import Written, staged_folder
 from klack.cli.progress import show_progress
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def export_models(
     *,
     threads: int | None,
     quiet: bool,
-) -> None:
+) -> Written:
     """Reduce the bodies of a case and write them."""
     from klack.exchange.case_models import case_models
 
@@ -59,12 +59,9 @@ def export_models(
         progress(choice.to, 0.0)
         with staged_folder(folder) as stage:
             write_models(models, stage, choice)
-            made = listing(path.name for path in stage.iterdir())
+            made = Written.of(folder, stage)
         progress(choice.to, 1.0)
-    if not quiet:
-        for model in models:
-            print(described(model))
-        print(f"Written to {folder}: {made}")
+    return replace(made, lines=(*map(described, models), *made.lines))
 
 
 def chosen(models: "CaseModels", choice: ModelChoice) -> tuple["ModalModel", ...]:

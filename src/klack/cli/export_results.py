@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from klack.cli.output import listing, staged_folder
+from klack.cli.output import Written, staged_folder
 from klack.cli.progress import show_progress
 from klack.errors import InputError
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["export_fields", "export_result", "run_and_export"]
 
 
-def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
+def export_result(study: Any, to: str, folder: Path) -> Written:
     """Write the histories of a stored study."""
     from klack.exchange.results.study_table import result_table
     from klack.workflow.stroke_study import StrokeStudy
@@ -46,15 +46,13 @@ def export_result(study: Any, to: str, folder: Path, *, quiet: bool) -> None:
             from klack.exchange.results.csv_files import write_csv
 
             write_csv(table, stage)
-        made = listing(path.name for path in stage.iterdir())
-    if not quiet:
-        print(f"Written to {folder}: {made}")
+        return Written.of(folder, stage)
 
 
 def run_and_export(
     case: "Case | ValveCase", to: str, folder: Path, *, threads: int | None, quiet: bool
-) -> None:
-    """Run a case as it asks for, and write what came out."""
+) -> tuple[Written, Exception | None]:
+    """Run a case as it asks for, write what came out, and hand on why a run ended early."""
     from klack.case.schema import Case
     from klack.workflow.impact import run_impact
     from klack.workflow.stroke import run_stroke
@@ -72,9 +70,7 @@ def run_and_export(
                 study = run_stroke(case, progress=progress, threads=threads)
             except IncompleteStrokeError as error:
                 study, incomplete = error.study, error
-    export_result(study, to, folder, quiet=quiet)
-    if incomplete:
-        raise incomplete
+    return export_result(study, to, folder), incomplete
 
 
 def export_fields(
@@ -85,7 +81,7 @@ def export_fields(
     frames: int,
     threads: int | None,
     quiet: bool,
-) -> None:
+) -> Written:
     """Write displacement, velocity and stress of an impact over time, for ParaView."""
     from klack.exchange.results.vtk_series import write_impact_series
 
@@ -93,5 +89,5 @@ def export_fields(
         made = write_impact_series(
             case, stage, level=level, frames=frames, progress=progress, threads=threads
         )
-    if not quiet:
-        print(f"Written: {folder / made.relative_to(stage)}; open it in ParaView")
+        place = folder / made.relative_to(stage)
+        return Written.of(folder, stage, f"Written: {place}; open it in ParaView")

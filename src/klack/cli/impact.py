@@ -69,14 +69,15 @@ def run_case(
 
     require_json_target(json)
     require_threads(threads)
-    checked = load_case(find_case(case))
-    levels = checked.require_levels(level if level else checked.run.levels)
-    folder = out if out is not None else Path("klack-results") / checked.name
-    require_folder(folder)
+    with show_progress(quiet):
+        checked = load_case(find_case(case))
+        levels = checked.require_levels(level if level else checked.run.levels)
+        folder = out if out is not None else Path("klack-results") / checked.name
+        require_folder(folder)
 
-    from klack.workflow.impact import run_impact
-    from klack.workflow.store import save_study
-    from klack.workflow.summary import study_to_json
+        from klack.workflow.impact import run_impact
+        from klack.workflow.store import save_study
+        from klack.workflow.summary import study_to_json
 
     with show_progress(quiet) as progress:
         study = run_impact(

@@ -1,12 +1,18 @@
 """``klack inspect``: what is in the files of other programs, before anything runs."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Components, imported
+from klack.cli.options import Components, Json, Quiet, imported
+from klack.cli.output import require_json_target, write_json
 from klack.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from klack.workflow.inspection import Row
+    from klack.workflow.json_results import InspectionJson
 
 __all__ = ["inspect"]
 
@@ -32,6 +38,8 @@ def inspect(
         Parameter(name="--matrix", help="Name of one matrix in a file of several. [default: all]"),
     ] = None,
     component: Components = None,
+    json: Json = None,
+    quiet: Quiet = False,
 ) -> int:
     """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
@@ -42,13 +50,13 @@ def inspect(
     from klack.units import LENGTH, parse_quantity
     from klack.workflow.inspection import STEP_ENDINGS, inspect_case, inspect_file
 
+    require_json_target(json)
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()
     if is_case or (not file.exists() and str(file) in shipped_cases()):
         from klack.case.valve_reader import load_any_case
 
-        case = load_any_case(find_case(file), imported(component))
-        for name, rows in inspect_case(case):
-            print_table(name, _COLUMNS, rows, left=3)
+        parts = inspect_case(load_any_case(find_case(file), imported(component)))
+        _show(str(file), parts, json, quiet=quiet)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
     if unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS:
@@ -58,5 +66,24 @@ def inspect(
             expected="no --unit",
             hint="leave it out; klack shows sizes in mm.",
         )
-    print_table(file.name, _COLUMNS, inspect_file(file, length, matrix), left=3)
+    _show(str(file), [(file.name, inspect_file(file, length, matrix))], json, quiet=quiet)
     return 0
+
+
+def _show(
+    file: str,
+    parts: "Iterable[tuple[str, tuple[Row, ...]]]",
+    json: Path | None,
+    *,
+    quiet: bool,
+) -> None:
+    """Print each part as soon as it is known, and write all of them as JSON."""
+    found: InspectionJson = {"schema": "klack-inspect/1", "file": file, "parts": {}}
+    for name, rows in parts:
+        if not quiet:
+            print_table(name, _COLUMNS, rows, left=3, to_stderr=str(json) == "-")
+        found["parts"][name] = [
+            {"what": what, "name": of, "content": content} for what, of, content in rows
+        ]
+    if json is not None:
+        write_json(json, found)

@@ -18,7 +18,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
@@ -52,7 +52,7 @@ from klack.errors import (
     LeftAloneWarning,
 )
 
-__all__ = ["app", "main"]
+__all__ = ["COMMANDS", "app", "main"]
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_BUG = 0, 1, 2, 70
 
@@ -64,21 +64,27 @@ app = App(
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )
-app.command(demo.demo)
-app.command(impact.impact)
-app.command(stroke.stroke)
-app.command(shots.shots)
-app.command(noise.noise)
-app.command(reduce.reduce)
-app.command(advise.advise)
-app.command(inspect.inspect)
-app.command(report.report)
-app.command(export.export)
-app.command(compare.compare)
-app.command(calibrate.calibrate)
-app.command(verify.verify)
-app.command(schema.schema)
-app.command(cache.cache)
+COMMANDS: Mapping[Callable[..., int], str] = {
+    demo.demo: "klack demo",
+    impact.impact: "klack impact demo-valve-axisymmetric --level reduced,interface",
+    stroke.stroke: "klack stroke demo-stroke --variant wet,dry",
+    shots.shots: "klack shots demo-shots --shots 20",
+    noise.noise: "klack noise demo-valve-axisymmetric",
+    reduce.reduce: "klack reduce demo-valve-axisymmetric --json reduced.json",
+    advise.advise: "klack advise demo-valve-axisymmetric --error '2 %'",
+    inspect.inspect: "klack inspect needle.step",
+    report.report: "klack report klack-results/demo-stroke --out report",
+    export.export: "klack export demo-valve-axisymmetric --to mat --out models",
+    compare.compare: "klack compare klack-results/demo-stroke --measurement wet=strokes.csv",
+    calibrate.calibrate: "klack calibrate measured --measurement dry=dry_strokes_synthetic.csv",
+    verify.verify: "klack verify --group contact",
+    schema.schema: "klack schema --kind stroke --json valve.schema.json",
+    cache.cache: "klack cache --clear",
+}
+"""Every command, and what its help ends with."""
+
+for _command, _example in COMMANDS.items():
+    app.command(_command, help_epilogue=f"Example: {_example}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -76,10 +76,11 @@ def noise(
     folder = out if out is not None else Path("klack-results") / _folder_name(paths)
     require_folder(folder)
 
-    from klack.workflow.noise import run_noise
-    from klack.workflow.noise_sounds import write_sounds
-    from klack.workflow.noise_store import save_noise
-    from klack.workflow.noise_summary import noise_to_json
+    with show_progress(quiet):
+        from klack.workflow.noise import run_noise
+        from klack.workflow.noise_sounds import write_sounds
+        from klack.workflow.noise_store import save_noise
+        from klack.workflow.noise_summary import noise_to_json
 
     def save(study: "NoiseStudy", stage: Path) -> None:
         save_noise(study, stage)

@@ -5,8 +5,9 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from klack.errors import InputError
 from klack.held_folder import Mark
@@ -14,6 +15,7 @@ from klack.own_file import planted
 from klack.whole_file import whole_file, whole_files
 
 __all__ = [
+    "Written",
     "listing",
     "require_file_target",
     "require_folder",
@@ -23,6 +25,29 @@ __all__ = [
 ]
 
 _MOST_NAMES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Files that a command has written, and the lines that tell of them.
+
+    Parameters
+    ----------
+    folder : Path
+    files : tuple of str
+        Names in it, sorted.
+    lines : tuple of str
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    lines: tuple[str, ...]
+
+    @classmethod
+    def of(cls, folder: Path, stage: Path, *lines: str) -> Self:
+        """What stands in the stage of a folder; without lines, one that lists it."""
+        files = tuple(sorted(path.name for path in stage.iterdir()))
+        return cls(folder, files, lines or (f"Written to {folder}: {listing(files)}",))
 
 
 def require_json_target(path: Path | None) -> None:

@@ -1,14 +1,16 @@
-"""Show that long work goes on, without a word about short work."""
+"""Show that long work goes on, from its first second, without a word about short work."""
 
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 __all__ = ["Progress", "show_progress"]
 
-_PATIENCE = 2.0  # s
+_PATIENCE = 2.0  # s that a stage may take without a line
+_SOON = 0.5  # s until the bar is there
 
 
 class Progress(Protocol):
@@ -53,6 +55,7 @@ class _Lines:
 
 @contextmanager
 def _bar() -> Iterator[Progress]:
+    """Bar that shows itself, since imports, compiling and meshing report nothing for a while."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as RichProgress
@@ -65,21 +68,79 @@ def _bar() -> Iterator[Progress]:
         console=Console(stderr=True),
         transient=True,
     )
-    task = bar.add_task("", total=1.0)
-    begun, shown, current = time.perf_counter(), False, ""
+    now = "starting"
+    task = bar.add_task(now, total=1.0)
+    soon = threading.Timer(_SOON, bar.start)
+    soon.daemon = True
+    compiling = _Compiling(lambda on: bar.update(task, description=_described(now, on)))
 
     def update(stage: str, fraction: float) -> None:
-        nonlocal shown, current
-        if not shown and time.perf_counter() - begun > _PATIENCE:
-            bar.start()
-            shown = True
-        if stage != current:
-            bar.reset(task, description=stage, total=1.0)
-            current = stage
+        nonlocal now
+        compiling.watch()
+        if stage != now:
+            now = stage
+            bar.reset(task, description=_described(stage, compiling.is_on), total=1.0)
         bar.update(task, completed=min(max(fraction, 0.0), 1.0))
 
+    soon.start()
     try:
         yield update
     finally:
-        if shown:
+        compiling.forget()
+        soon.cancel()
+        soon.join()
+        if bar.live.is_started:
             bar.stop()
+
+
+def _described(stage: str, compiling: bool) -> str:
+    return f"{stage}: compiling (once)" if compiling else stage
+
+
+class _Compiling:
+    """Tells when numba compiles a function that it has not kept from an earlier run.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with True when it begins, and with False when it is over.
+    """
+
+    def __init__(self, tell: Callable[[bool], None]) -> None:
+        self._tell, self._depth = tell, 0
+        self._listener: Any = None
+
+    @property
+    def is_on(self) -> bool:
+        """Whether something is being compiled now."""
+        return self._depth > 0
+
+    def watch(self) -> None:
+        """Listen from now on, if numba is there already: its import alone takes a second."""
+        if self._listener is not None or "numba" not in sys.modules:
+            return
+        from numba.core import event
+
+        outer = self
+
+        class Listener(event.Listener):
+            def on_start(self, event: Any) -> None:
+                outer._count(1)
+
+            def on_end(self, event: Any) -> None:
+                outer._count(-1)
+
+        self._listener = Listener()
+        event.register("numba:compile", self._listener)
+
+    def forget(self) -> None:
+        """Listen no more."""
+        if self._listener is not None:
+            from numba.core import event
+
+            event.unregister("numba:compile", self._listener)
+
+    def _count(self, change: int) -> None:
+        before, self._depth = self.is_on, self._depth + change
+        if self.is_on != before:
+            self._tell(self.is_on)

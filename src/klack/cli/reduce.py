@@ -29,7 +29,8 @@ def reduce(
     folder = out if out is not None else Path("klack-results") / checked.name
     require_folder(folder)
 
-    from klack.workflow.reduce import run_reduce
+    with show_progress(quiet):
+        from klack.workflow.reduce import run_reduce
 
     with show_progress(quiet) as progress:
         study = run_reduce(checked, progress=progress, threads=threads)

@@ -1,12 +1,16 @@
 """``klack report``: the report of a stored result, of whichever kind."""
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Quiet
-from klack.cli.output import require_folder, staged_folder
+from klack.cli.options import Json, Quiet
+from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+
+if TYPE_CHECKING:
+    from klack.workflow.json_results import ReportJson
 
 __all__ = ["report"]
 
@@ -21,12 +25,14 @@ def report(
     out: Annotated[
         Path | None, Parameter(name="--out", help="Folder for the report. [default: RESULT]")
     ] = None,
+    json: Json = None,
     quiet: Quiet = False,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
     from klack.cli.reports import REPORTS, beside_result, write_reports
     from klack.cli.stored import load_stored
 
+    require_json_target(json)
     folder = out if out is not None else result
     beside = beside_result(folder) if folder.absolute() == result.absolute() else {}
     study = load_stored(result)
@@ -34,5 +40,15 @@ def report(
     with staged_folder(folder, beside) as stage:
         write_reports(study, stage)
     if not quiet:
-        print(f"Report in {folder}: {', '.join(REPORTS)}")
+        stream = sys.stderr if str(json) == "-" else sys.stdout
+        print(f"Report in {folder}: {', '.join(REPORTS)}", file=stream)
+    if json is not None:
+        made: ReportJson = {
+            "schema": "klack-report/1",
+            "case": study.case,
+            "result": str(result),
+            "folder": str(folder),
+            "files": list(REPORTS),
+        }
+        write_json(json, made)
     return 0

@@ -13,11 +13,12 @@ __all__ = ["schema"]
 def schema(
     *,
     kind: Annotated[
-        Literal["impact", "stroke"],
+        Literal["impact", "stroke", "result"],
         Parameter(
             name="--kind",
             help="impact: two bodies that hit each other (klack impact, klack reduce); stroke: a "
-            "whole valve with all components of its network (klack stroke).",
+            "whole valve with all components of its network (klack stroke); result: what every "
+            "command writes with --json.",
         ),
     ] = "impact",
     json: Annotated[
@@ -29,7 +30,7 @@ def schema(
         ),
     ] = Path("-"),
 ) -> int:
-    """Print the JSON schema of case files, for editors that check while one types."""
+    """Print the JSON schema of case files, for editors that check while one types, or results."""
     require_json_target(json)
     write_json(json, _schema_of(kind))
     return 0
@@ -41,6 +42,11 @@ def _schema_of(kind: str) -> dict[str, Any]:
         from klack.case.valve_reader import valve_case_schema
 
         return valve_case_schema()
+
+    if kind == "result":
+        from klack.workflow.json_results import result_schema
+
+        return result_schema()
 
     from klack.case import case_schema
 

@@ -72,10 +72,11 @@ def shots(
     folder = out if out is not None else Path("klack-results") / checked.name
     require_folder(folder)
 
-    from klack.workflow.shots import run_shots
-    from klack.workflow.shots_log import SHOT_LOG
-    from klack.workflow.shots_store import save_shots
-    from klack.workflow.shots_summary import shots_to_json
+    with show_progress(quiet):
+        from klack.workflow.shots import run_shots
+        from klack.workflow.shots_log import SHOT_LOG
+        from klack.workflow.shots_store import save_shots
+        from klack.workflow.shots_summary import shots_to_json
 
     with show_progress(quiet) as progress:
         try:

@@ -77,19 +77,21 @@ def stroke(
 
     require_json_target(json)
     require_threads(threads)
-    checked = _checked_case(find_case(case), duration, step, imported(component))
+    with show_progress(quiet):
+        checked = _checked_case(find_case(case), duration, step, imported(component))
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
     folder = out if out is not None else Path("klack-results") / checked.name
     require_folder(folder)
 
-    from klack.workflow.stroke import run_stroke
-    from klack.workflow.stroke_store import load_stroke, save_stroke
-    from klack.workflow.stroke_study import IncompleteStrokeError
-    from klack.workflow.stroke_summary import stroke_to_json
+    with show_progress(quiet):
+        from klack.workflow.stroke import run_stroke
+        from klack.workflow.stroke_store import load_stroke, save_stroke
+        from klack.workflow.stroke_study import IncompleteStrokeError
+        from klack.workflow.stroke_summary import stroke_to_json
 
-    after = load_stroke(continued) if continued is not None else None
+        after = load_stroke(continued) if continued is not None else None
     with show_progress(quiet) as progress:
         incomplete: Exception | None = None
         try:

@@ -1,7 +1,7 @@
 """``klack verify``: klack against exact and published results."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -13,6 +13,7 @@ from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:
     from klack.verification import Check
+    from klack.workflow.json_results import CheckJson, VerificationJson
 
 __all__ = ["verify"]
 
@@ -66,11 +67,16 @@ def verify(
             print(f"Page in {html}")
     if json is not None:
         about = run_conditions().words()
-        write_json(json, {"about": about, "checks": [_numbers(check) for check in checks]})
+        result: VerificationJson = {
+            "schema": "klack-verify/1",
+            "about": about,
+            "checks": [_numbers(check) for check in checks],
+        }
+        write_json(json, result)
     return 0 if all(check.passed for check in checks) else 1
 
 
-def _numbers(check: "Check") -> dict[str, Any]:
+def _numbers(check: "Check") -> "CheckJson":
     def finite(value: float) -> float | None:
         return value if abs(value) < float("inf") else None
 

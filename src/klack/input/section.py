@@ -9,9 +9,8 @@ from klack.input.problem import CaseProblem, nearest, one_of
 
 __all__ = ["Count", "Name", "Number", "Section", "Text"]
 
-# bounds that no meaningful value comes near, far from the ends of the arithmetic
-Number = Annotated[float, Strict(), Field(ge=-1e15, le=1e15)]
-Count = Annotated[int, Strict(), Field(ge=1, le=2_000_000_000)]
+Number = Annotated[float, Strict()]
+Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict()]
 Name = Annotated[str, Strict(), StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
 

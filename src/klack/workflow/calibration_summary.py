@@ -1,17 +1,17 @@
 """The few numbers of a calibration that a script or a terminal wants."""
 
 from math import isfinite
-from typing import Any
 
 from klack.units import format_si
 from klack.workflow.calibration_study import CalibratedParameter, CalibrationStudy
+from klack.workflow.json_results import CalibratedJson, CalibrationJson
 
 __all__ = ["PARAMETER_COLUMNS", "calibration_to_json", "parameter_rows"]
 
 PARAMETER_COLUMNS = ("parameter", "value", "standard error", "95 % interval", "start", "bounds")
 
 
-def calibration_to_json(study: CalibrationStudy) -> dict[str, Any]:
+def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
     """Plain numbers in SI, the unit in the key or beside the value.
 
     Returns
@@ -23,9 +23,9 @@ def calibration_to_json(study: CalibrationStudy) -> dict[str, Any]:
         do not exist (infinite, nan) are None.
     """
     profiles = {profile.name: profile for profile in study.profiles}
-    parameters = {}
+    parameters: dict[str, CalibratedJson] = {}
     for item in study.parameters:
-        numbers: dict[str, Any] = {
+        numbers: CalibratedJson = {
             "value": item.value,
             "standard_error": _number(item.standard_error),
             "unit": item.unit,
@@ -39,6 +39,7 @@ def calibration_to_json(study: CalibrationStudy) -> dict[str, Any]:
             numbers["profile_upper_95"] = _number(profiles[item.name].upper)
         parameters[item.name] = numbers
     return {
+        "schema": "klack-calibrate/1",
         "case": study.case,
         "klack": study.version,
         "own_components": dict(study.own_components),

@@ -1,13 +1,12 @@
 """A stored impact beside that of another program: the numbers of both, and how far apart."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from klack.acoustics.comparison import compare_histories
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
+from klack.workflow.json_results import CalculixJson, ProgramJson
 from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = [
@@ -219,17 +218,21 @@ def _lost(ledger: EnergyLedger) -> float:
     return (ledger.contact_dissipation + ledger.damping) / turned_over if turned_over else 0.0
 
 
-def comparison_to_json(comparison: Comparison) -> Mapping[str, Any]:
+def comparison_to_json(comparison: Comparison) -> CalculixJson:
     """Plain numbers in SI, the unit in the key; what is not known is None."""
     level, other = comparison.level, comparison.other
     d = comparison.deviation
     return {
+        "schema": "klack-compare-calculix/1",
         "case": comparison.case,
         "level": level.level,
         "program": other.program,
         "klack": _numbers(level.measures, level.history, level.steps, comparison.wall_time),
-        "other": _numbers(comparison.measures, other.history, other.steps, other.wall_time)
-        | {"iterations": other.iterations, "energy_swing": other.energy_swing},
+        "other": {
+            **_numbers(comparison.measures, other.history, other.steps, other.wall_time),
+            "iterations": other.iterations,
+            "energy_swing": other.energy_swing,
+        },
         "deviation": {
             "peak_force": _finite(d.peak_force),
             "contact_time": _finite(d.contact_time),
@@ -245,7 +248,7 @@ def comparison_to_json(comparison: Comparison) -> Mapping[str, Any]:
 
 def _numbers(
     measures: ImpactMeasures, history: ImpactHistory, steps: int, wall_time: float | None
-) -> dict[str, float | int | None]:
+) -> ProgramJson:
     return {
         "peak_force_N": _finite(measures.peak_force),
         "contact_time_s": _finite(measures.contact_time),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from klack.units import format_si
+from klack.workflow.json_results import DropsJson
 from klack.workflow.measured_shots_study import MeasuredDistribution, MeasuredShotsStudy
 
 __all__ = [
@@ -72,7 +73,7 @@ def drop_rows(study: MeasuredShotsStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def measured_shots_to_json(study: MeasuredShotsStudy) -> dict[str, Any]:
+def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -84,6 +85,7 @@ def measured_shots_to_json(study: MeasuredShotsStudy) -> dict[str, Any]:
         None.
     """
     return {
+        "schema": "klack-compare-shots/1",
         "case": study.case,
         "klack": study.version,
         "drops": len(study.names),

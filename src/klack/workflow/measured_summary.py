@@ -1,8 +1,9 @@
 """The few numbers of a comparison with a measurement that a script or a terminal wants."""
 
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
+from klack.workflow.json_results import ComparedVariantJson, HighestStrokeJson, StrokesJson
 from klack.workflow.measured_study import (
     IMPACT_MEASURES,
     Compared,
@@ -168,7 +169,7 @@ def _text(value: float, form: str) -> str:
 # --------------------------------------------------------------------------- JSON
 
 
-def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
+def measured_to_json(study: MeasuredStrokeStudy) -> StrokesJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -185,6 +186,7 @@ def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
     variants = {name: _variant(study, variant) for name, variant in study.variants.items()}
     first = next(iter(variants))
     return {
+        "schema": "klack-compare-strokes/1",
         "case": study.case,
         "klack": study.version,
         "variant": first,
@@ -194,8 +196,8 @@ def measured_to_json(study: MeasuredStrokeStudy) -> dict[str, Any]:
     }
 
 
-def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> dict[str, Any]:
-    return {
+def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> ComparedVariantJson:
+    numbers = {
         "agreement": agreement(study, variant),
         "verdict": verdict(study, variant),
         "strokes": variant.count,
@@ -209,9 +211,10 @@ def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> dict[str, 
         "impacts": [_impact(impact) for impact in variant.impacts],
         "highest_rebound": [_highest(shot) for shot in variant.highest],
     }
+    return cast(ComparedVariantJson, numbers)
 
 
-def _highest(shot: HighestShot) -> dict[str, Any]:
+def _highest(shot: HighestShot) -> HighestStrokeJson:
     return {
         "stop": shot.stop,
         "stroke": shot.stroke,

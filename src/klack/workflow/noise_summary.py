@@ -1,11 +1,18 @@
 """The few numbers of a noise study that a script or a terminal wants."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
+from klack.workflow.json_results import (
+    BandJson,
+    BodyNoiseJson,
+    ClickJson,
+    DesignNoiseJson,
+    NoiseJson,
+)
 from klack.workflow.noise_study import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
 
 __all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json"]
@@ -111,7 +118,7 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if np.isfinite(value) else "–"
 
 
-def noise_to_json(study: NoiseStudy) -> dict[str, Any]:
+def noise_to_json(study: NoiseStudy) -> NoiseJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -122,10 +129,15 @@ def noise_to_json(study: NoiseStudy) -> dict[str, Any]:
         the same for every design by name.  Numbers that do not exist are None.
     """
     designs = {design.name: _design(design) for design in study.designs}
-    return {"case": study.case, **designs[study.reference.name], "designs": designs}
+    return {
+        "schema": "klack-noise/1",
+        "case": study.case,
+        **designs[study.reference.name],
+        "designs": designs,
+    }
 
 
-def _design(design: NoiseDesign) -> dict[str, Any]:
+def _design(design: NoiseDesign) -> DesignNoiseJson:
     bands = design.stops[0].bands
     return {
         "kind": design.kind,
@@ -152,7 +164,7 @@ def _design(design: NoiseDesign) -> dict[str, Any]:
     }
 
 
-def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[dict[str, Any]]:
+def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[BandJson]:
     return [
         {
             "center_Hz": float(middle),
@@ -163,7 +175,7 @@ def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[di
     ]
 
 
-def _body(body: BodyNoise) -> dict[str, Any]:
+def _body(body: BodyNoise) -> BodyNoiseJson:
     radiated = body.radiated.sum(axis=1)
     return {
         "highest_mode_Hz": _finite(body.highest_frequency),
@@ -174,9 +186,9 @@ def _body(body: BodyNoise) -> dict[str, Any]:
     }
 
 
-def _sound(sound: ClickSound | None) -> dict[str, float | None]:
+def _sound(sound: ClickSound | None) -> ClickJson:
     if sound is None:
-        return dict.fromkeys(_SOUND_KEYS)
+        return cast(ClickJson, dict.fromkeys(_SOUND_KEYS))
     one, pattern = sound.statistics, sound.pattern
     values = (
         sound.loudness.maximum,
@@ -189,7 +201,8 @@ def _sound(sound: ClickSound | None) -> dict[str, float | None]:
         one.peak_level,
         pattern.equivalent_level_A,
     )
-    return {key: _finite(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
+    numbers = {key: _finite(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
+    return cast(ClickJson, numbers)
 
 
 _SOUND_KEYS = (

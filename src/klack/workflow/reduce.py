@@ -3,7 +3,7 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from klack.case.schema import Case
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
 from klack.workflow.given_pair import build_given_pair
+from klack.workflow.json_results import ReducedBodyJson, ReductionJson
 from klack.workflow.levels import elastic_count, first_stiffness, mode_pools, own_pair
 from klack.workflow.problem import build_problem
 from klack.workflow.progress import Progress, silent
@@ -58,9 +59,10 @@ class ReductionStudy:
             for body in self.bodies
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> ReductionJson:
         """Plain numbers in SI, the unit in the key."""
         return {
+            "schema": "klack-reduce/1",
             "case": self.case,
             "bodies": {body.name: _body_json(body) for body in self.bodies},
             "transfer": {
@@ -100,7 +102,7 @@ def _highest(body: ReducedBody) -> float:
     return float(kept[-1]) if len(kept) else 0.0
 
 
-def _body_json(body: ReducedBody) -> dict[str, Any]:
+def _body_json(body: ReducedBody) -> ReducedBodyJson:
     elastic = slice(body.rigid_count, None)
     return {
         "mass_kg": body.mass if np.isfinite(body.mass) else None,

@@ -1,11 +1,12 @@
 """The few numbers of a study of shots that a script or a terminal wants."""
 
 from math import isfinite
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from klack.units import format_si
+from klack.workflow.json_results import ShotJson, ShotsJson
 from klack.workflow.shots_study import MEASURES, ShotColumns, ShotsStudy
 
 __all__ = ["DISTRIBUTION_COLUMNS", "QUANTILES", "distribution_rows", "shots_to_json"]
@@ -47,7 +48,7 @@ _KEYS = {
 _WHOLE = ("sub_contacts", "impacts")
 
 
-def shots_to_json(study: ShotsStudy) -> dict[str, Any]:
+def shots_to_json(study: ShotsStudy) -> ShotsJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -60,6 +61,7 @@ def shots_to_json(study: ShotsStudy) -> dict[str, Any]:
     """
     rule = study.rule
     return {
+        "schema": "klack-shots/1",
         "case": study.case,
         "klack": study.version,
         "seed": study.seed,
@@ -103,11 +105,12 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def _row(columns: ShotColumns, index: int) -> dict[str, float | int | None]:
+def _row(columns: ShotColumns, index: int) -> ShotJson:
     row = columns.row(index)
-    return {
+    numbers = {
         key: int(row[name]) if name in _WHOLE else _number(row[name]) for name, key in _KEYS.items()
     }
+    return cast(ShotJson, numbers)
 
 
 def _distribution(values: np.ndarray) -> dict[str, float | None]:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any
 
 from klack.simulation.network_result import ImpactEvent
+from klack.workflow.json_results import EventJson, PassageJson, StrokeJson, TimesJson, VariantJson
 from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 from klack.workflow.stroke_times import LiftTimes, Passage
@@ -60,27 +60,12 @@ _NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as the first one."""
 
 
-def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
-    """Plain numbers in SI, the unit in the key.
-
-    Returns
-    -------
-    dict
-        ``case``, ``own_components`` (with the first digits of the SHA-256 of their code),
-        ``variant`` (the reference) and its numbers: ``events``, ``opening_time_s``,
-        ``closing_time_s`` (the touches of both stops), ``opening`` and ``closing`` (the stop, its
-        ``touch_s``, and ``at_10_percent_s``, ``at_50_percent_s``, ``at_90_percent_s`` of the
-        lift), ``starts`` (closed or open: which of both comes first), ``lift_m``, ``bodies`` (the
-        same of every other body between stops), ``energy_residual`` (share of the throughput),
-        ``steps``, ``wall_time_s`` (of the time loop), ...; ``complete`` and ``failure`` (why the
-        run ended early, at ``end_time_s``); ``fine_record_ends_s`` (end stops whose force in fine
-        steps is known up to there only; empty if all are); ``variants``: the same of every
-        variant by its name.  Times that are not reached in the run, and numbers that do not
-        exist, are None.
-    """
+def stroke_to_json(study: StrokeStudy) -> StrokeJson:
+    """Plain numbers in SI, the unit in the key: see :class:`StrokeJson`."""
     variants = {name: _numbers(variant) for name, variant in study.variants.items()}
     reference = study.reference.name
     return {
+        "schema": "klack-stroke/1",
         "case": study.case,
         "klack": study.version,
         "own_components": dict(study.own_components),
@@ -172,7 +157,7 @@ def real_time_factor(variant: StrokeVariant) -> float:
     return variant.result.wall_time / simulated if simulated > 0.0 else float("nan")
 
 
-def _numbers(variant: StrokeVariant) -> dict[str, Any]:
+def _numbers(variant: StrokeVariant) -> VariantJson:
     result = variant.result
     return {
         "label": variant.label,
@@ -197,7 +182,7 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
     }
 
 
-def _times(times: LiftTimes) -> dict[str, Any]:
+def _times(times: LiftTimes) -> TimesJson:
     return {
         "starts": times.starts,
         "lift_m": times.lift,
@@ -207,7 +192,7 @@ def _times(times: LiftTimes) -> dict[str, Any]:
     }
 
 
-def _passage(passage: Passage) -> dict[str, str | float | None]:
+def _passage(passage: Passage) -> PassageJson:
     return {
         "at_10_percent_s": passage.at_10,
         "at_50_percent_s": passage.at_50,
@@ -217,7 +202,7 @@ def _passage(passage: Passage) -> dict[str, str | float | None]:
     }
 
 
-def _event(event: ImpactEvent) -> dict[str, str | float | None]:
+def _event(event: ImpactEvent) -> EventJson:
     return {
         "stop": event.stop,
         "time_s": _number(event.time),

@@ -1,8 +1,7 @@
 """The few numbers of a study that a script or a terminal wants."""
 
-from typing import Any
-
 from klack.contact.restitution import Deviation
+from klack.workflow.json_results import DeviationJson, ImpactJson, LevelJson
 from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = ["SUMMARY_COLUMNS", "estimate_lines", "study_to_json", "summary_rows"]
@@ -19,7 +18,7 @@ SUMMARY_COLUMNS = (
 )
 
 
-def study_to_json(study: ImpactStudy) -> dict[str, Any]:
+def study_to_json(study: ImpactStudy) -> ImpactJson:
     """Plain numbers in SI, the unit in the key.
 
     Returns
@@ -33,6 +32,7 @@ def study_to_json(study: ImpactStudy) -> dict[str, Any]:
     """
     deviations = {name: _deviation(item) for name, item in study.deviations.items()}
     return {
+        "schema": "klack-impact/1",
         "case": study.case,
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
@@ -90,7 +90,7 @@ def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _level(result: LevelResult) -> dict[str, float | int | None]:
+def _level(result: LevelResult) -> LevelJson:
     measures = result.measures
     return {
         "peak_force_N": _number(measures.peak_force),
@@ -105,7 +105,7 @@ def _level(result: LevelResult) -> dict[str, float | int | None]:
     }
 
 
-def _deviation(deviation: Deviation) -> dict[str, float | None]:
+def _deviation(deviation: Deviation) -> DeviationJson:
     return {
         "peak_force": _number(deviation.peak_force),
         "contact_time": _number(deviation.contact_time),

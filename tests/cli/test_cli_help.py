@@ -1,0 +1,24 @@
+"""The help of every command ends with an example; truth: the parser, and the cases that exist."""
+
+import shlex
+
+import pytest
+
+from klack.case import find_case
+from klack.cli.main import COMMANDS, app, main
+
+
+@pytest.mark.parametrize(("command", "example"), COMMANDS.items(), ids=lambda item: str(item))
+def test_the_example_can_be_typed(command, example, capsys):
+    name = command.__name__
+    assert main([name, "--help"]) == 0
+    last = capsys.readouterr().out.split("Example:")[-1]
+    assert " ".join(last.split()) == example
+
+    first, *words = shlex.split(example)
+    found, bound, _ = app.parse_args(words, print_error=False, exit_on_error=False)
+
+    assert (first, words[0]) == ("klack", name)
+    assert found is command
+    if "case" in bound.arguments:
+        assert find_case(bound.arguments["case"]).is_file()

@@ -1,0 +1,83 @@
+"""A terminal shows from the first second on what goes on; truth: what a pseudo-terminal gets."""
+
+import os
+import select
+import sys
+import time
+
+import pytest
+
+pty = pytest.importorskip("pty")
+
+from klack.cli.progress import show_progress  # noqa: E402
+
+
+class Screen:
+    """A terminal whose text can be waited for."""
+
+    def __init__(self) -> None:
+        self.ours, theirs = pty.openpty()
+        self.stream = os.fdopen(theirs, "w")
+        self.text = ""
+
+    def shows(self, words: str, patience: float = 20.0) -> bool:
+        """Wait until the words are there."""
+        end = time.monotonic() + patience
+        while words not in self.text and time.monotonic() < end:
+            if select.select([self.ours], [], [], 0.1)[0]:
+                self.text += os.read(self.ours, 65536).decode(errors="ignore")
+        return words in self.text
+
+    def close(self) -> None:
+        self.stream.close()
+        os.close(self.ours)
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    screen = Screen()
+    monkeypatch.setenv("TERM", "xterm")
+    yield screen
+    screen.close()
+
+
+def shown_on(screen: Screen, monkeypatch: pytest.MonkeyPatch, **options: bool):
+    monkeypatch.setattr(sys, "stderr", screen.stream)  # not in the fixture: pytest has its own
+    return show_progress(**options)
+
+
+def test_it_shows_before_anything_reports(screen, monkeypatch):
+    with shown_on(screen, monkeypatch):
+        assert screen.shows("starting")  # nobody has called it
+
+
+def test_a_stage_is_shown_when_it_begins(screen, monkeypatch):
+    with shown_on(screen, monkeypatch) as progress:
+        assert screen.shows("starting")
+        progress("mesh", 0.0)
+        assert screen.shows("mesh")  # and nothing more is called: it is meshing
+
+
+def test_compiling_is_called_so(screen, monkeypatch):
+    from numba.core import event
+
+    with shown_on(screen, monkeypatch) as progress:
+        assert screen.shows("starting")
+        progress("run", 0.0)
+        with event.trigger_event("numba:compile"):
+            assert screen.shows("run: compiling (once)")
+        progress("run", 0.5)
+        assert screen.shows("50 %")
+        assert "compiling" not in screen.text.rsplit("50 %", 1)[0].rsplit("run", 1)[-1]
+
+
+def test_a_short_command_leaves_the_screen_alone(screen, monkeypatch):
+    with shown_on(screen, monkeypatch) as progress:
+        progress("mesh", 1.0)
+    assert not screen.shows("mesh", patience=0.3)
+
+
+def test_quiet_shows_nothing(screen, monkeypatch):
+    with shown_on(screen, monkeypatch, quiet=True) as progress:
+        progress("mesh", 1.0)
+        assert not screen.shows("mesh", patience=0.7)
