@@ -4,7 +4,7 @@ Handles are plain integers: of a mechanical port (a degree of freedom along +z o
 a hydraulic node (one pressure).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -97,7 +97,9 @@ class BodyRow:
 class ElementRow:
     """Something that pushes ports; see :mod:`klack.network.step_function`.
 
-    ``names`` are what the component calls its ports.
+    ``names`` are what the component calls its ports.  ``at_rest`` gives the first states that the
+    element has at the start once its ports rest at given displacements [m]; without it the states
+    at the start are ``state`` wherever the ports are.
     """
 
     component: str
@@ -110,11 +112,16 @@ class ElementRow:
     books: tuple[Book, ...]
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
+    at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BranchRow:
-    """Flow between two hydraulic nodes, perhaps pushing mechanical ports."""
+    """Flow between two hydraulic nodes, perhaps pushing mechanical ports.
+
+    ``column`` [J s/kg^2] belongs to a column of fluid whose mass flow is its first state: its
+    friction, ``g_a - g_b = column * mdot`` once the flow is steady.
+    """
 
     component: str
     label: str
@@ -127,6 +134,7 @@ class BranchRow:
     books: tuple[Book, ...]
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
+    column: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -134,13 +142,15 @@ class NodeRow:
     """One pressure: a volume with compliance, or a prescribed pressure over time.
 
     ``volume`` [m^3] at zero displacements; 0 for a prescribed pressure, whose ``time`` [s] and
-    ``pressure`` [Pa] are a table (constant beyond its ends).
+    ``pressure`` [Pa] are a table (constant beyond its ends).  A volume whose pressure is not
+    ``stated`` starts at that of steady flow.
     """
 
     component: str
     volume: float
     time: NDArray[np.float64]
     pressure: NDArray[np.float64]
+    stated: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -276,6 +286,7 @@ class Rows:
         channels: Sequence[Channel] = (),
         failures: Mapping[int, str] | None = None,
         label: str = "",
+        at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
         self.elements.append(
@@ -290,6 +301,7 @@ class Rows:
                 books=tuple(books),
                 channels=tuple(channels),
                 failures=failures or {},
+                at_rest=at_rest,
             )
         )
 
@@ -316,6 +328,7 @@ class Rows:
         channels: Sequence[Channel] = (),
         failures: Mapping[int, str] | None = None,
         label: str = "",
+        column: float | None = None,
     ) -> None:
         """Add a flow between the nodes ``a`` and ``b``; its mass flow is recorded."""
         self.branches.append(
@@ -331,13 +344,19 @@ class Rows:
                 books=tuple(books),
                 channels=tuple(channels),
                 failures=failures or {},
+                column=column,
             )
         )
 
-    def chamber(self, node: int, *, volume: float, pressure: float) -> None:
-        """Make a node a volume [m^3] with a start pressure [Pa]; adds to a volume already there."""
+    def chamber(self, node: int, *, volume: float, pressure: float | None) -> None:
+        """Make a node a volume [m^3]; adds to a volume already there.
+
+        ``pressure`` [Pa] is that at the start; None for that of steady flow.
+        """
         before = self.nodes.get(node)
-        if before is not None and before.pressure[0] != pressure:
+        if before is not None and before.stated:
+            pressure = before.pressure[0] if pressure is None else pressure
+        if before is not None and before.stated and before.pressure[0] != pressure:
             raise InputError(
                 f"components.{self.component}",
                 got=f"{pressure:g} Pa at the start where '{before.component}' has"
@@ -349,7 +368,8 @@ class Rows:
             component=self.component,
             volume=volume + (before.volume if before else 0.0),
             time=np.zeros(1),
-            pressure=np.array([pressure]),
+            pressure=np.array([self.ambient.pressure if pressure is None else pressure]),
+            stated=pressure is not None,
         )
 
     def pressure(self, node: int, *, time: ArrayLike, pressure: ArrayLike) -> None:

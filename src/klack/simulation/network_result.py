@@ -6,7 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ChannelData", "EnergyBooks", "ImpactEvent", "InterfaceRecord", "NetworkResult"]
+__all__ = [
+    "ChannelData",
+    "EnergyBooks",
+    "ImpactEvent",
+    "InterfaceRecord",
+    "NetworkResult",
+    "StaticStart",
+]
 
 BODY_STORE = "kinetic and strain"  # what a body holds; its component stands before it
 
@@ -152,6 +159,34 @@ class EnergyBooks:
         return max(self.throughput, *moving, 1e-3 * stored)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StaticStart:
+    """Where a run began: the equilibrium at time zero.
+
+    Parameters
+    ----------
+    displacement : mapping of str to float [m]
+        By ``"<body>.<port>"``.
+    pressure : mapping of str to float [Pa]
+        Of each volume, absolute.
+    stated : mapping of str to bool
+        Whether the case states that pressure; else it is that of steady flow.
+    flow : mapping of str to float [kg/s]
+        Of each branch and line.
+    residual : mapping of str to float [N]
+        Force that is left on each free body.
+    notes : tuple of str
+        What has no steady state, and how it starts instead.
+    """
+
+    displacement: Mapping[str, float]
+    pressure: Mapping[str, float]
+    stated: Mapping[str, bool]
+    flow: Mapping[str, float]
+    residual: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:
     """Everything that a run of a network leaves behind.
@@ -176,6 +211,8 @@ class NetworkResult:
         Of the time loop.
     state : mapping of str to array
         Everything needed to go on: the run continues to the same bits.
+    start : StaticStart or None
+        The equilibrium from which it began; None for a run that goes on or began free.
     """
 
     time: NDArray[np.float64]
@@ -188,3 +225,4 @@ class NetworkResult:
     coarse_steps: int
     wall_time: float
     state: Mapping[str, NDArray[np.generic]]
+    start: StaticStart | None = None

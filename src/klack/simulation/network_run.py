@@ -1,8 +1,6 @@
 """Run a network: static start, time loop, channels, impacts, energy books."""
 
-import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from time import perf_counter
 from typing import Literal
 
@@ -10,27 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import energy_balance
-from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import impact_events
-from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
-    BEFORE,
-    ELEMENTS_BEFORE,
-    LAST,
     PORTS,
-    SEEN,
     WORK,
-    Y0,
     Recording,
     Scratch,
     scratch_memory,
 )
 from klack.simulation.network_compile import (
     CompiledNetwork,
-    compile_bodies,
     compile_network,
-    interface_compliance,
 )
 from klack.simulation.network_kernel import (
     STATUS_BRANCH,
@@ -43,7 +33,7 @@ from klack.simulation.network_kernel import (
 from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import NetworkResult
-from klack.simulation.rest import resting_dissipation
+from klack.simulation.static_start import start_at_rest
 from klack.units import format_si
 
 __all__ = ["simulate_network"]
@@ -53,12 +43,6 @@ State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
-_SETTLE_SHARE = 0.02  # of the longest time to rest is a step of the static start
-_SETTLE_STEP = 1e-6  # [s] the same where nothing can rest on anything
-_SETTLE_STEPS = 1000  # between two looks at whether the ports still move
-_SETTLE_LOOKS = 100
-_SETTLED = 1e-9  # way of a port between two looks over the largest way of any since the beginning
-_UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
 
 
@@ -127,11 +111,11 @@ def simulate_network(
     records = max(1, int(np.ceil(duration / (per_record * block * step) - 1e-9)))
     recorder = Recorder(network, records)
     clock = np.array([0, -1, 0, 0], dtype=np.int64)
+    begun = None
     if state is not None:
         _restore(network, clock, state)
     elif start == "rest":
-        large = _SETTLE_SHARE * float(np.max(network.interfaces.rest, initial=0.0)) or _SETTLE_STEP
-        _settle(network, recorder.recording, step * max(1, round(large / step)))
+        begun = start_at_rest(network, step)
     first_step, done_before = int(clock[0]), clock[2:4].copy()
     reset_books(network)
     _read_stores(network)
@@ -177,6 +161,7 @@ def simulate_network(
         coarse_steps=int(clock[3] - done_before[1]),
         wall_time=wall_time,
         state=_save(network, clock),
+        start=begun,
     )
 
 
@@ -190,8 +175,6 @@ def _advance(
     step: float,
     block: int,
     allow_coarse: bool,
-    *,
-    settle: bool = False,
 ) -> None:
     report = np.zeros(3)
     status = run_network(
@@ -202,7 +185,7 @@ def _advance(
         block,
         step,
         allow_coarse,
-        settle,
+        False,
         network.bodies,
         network.elements,
         network.branches,
@@ -229,59 +212,6 @@ def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
         ends=len(network.nodes.end_node),
         sums=recording.means.shape[1],
     )
-
-
-def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None:
-    """Find the static start: large steps, all velocities taken out after each, until nothing moves.
-
-    Warns
-    -----
-    AccuracyWarning
-        When the ports still move.
-    """
-    bodies, _ = compile_bodies(network.rows.bodies, (step, step))
-    own = interface_compliance(bodies, network.interfaces.upper, network.interfaces.lower)
-    interfaces = network.interfaces._replace(G=own)
-    still = replace(network, bodies=bodies, interfaces=interfaces)
-    ports = slice(Y0, Y0 + bodies.first.size - 1)
-    for look in range(_SETTLE_LOOKS + 1):
-        before = bodies.at[ports].copy()
-        clock = np.array([0, -1, 0, 0], dtype=np.int64)
-        _advance(still, recording, clock, _SETTLE_STEPS, 1, 0, step, 1, False, settle=True)
-        way = float(np.max(np.abs(bodies.at[ports] - before), initial=0.0))
-        if way <= _SETTLED * float(np.max(np.abs(bodies.at[ports]), initial=0.0)):
-            break
-        if look == _SETTLE_LOOKS:
-            warnings.warn(
-                f"the static start was not found: ports still move by {format_si(way, 'm', 2)} in "
-                f"{_SETTLE_STEPS} steps of {format_si(step, 's', 2)}. Try: look for a body that "
-                "nothing holds, or a very soft spring; in Python, start='free' leaves it out.",
-                AccuracyWarning,
-                stacklevel=3,
-            )
-    real = network.bodies
-    for k in range(len(real.modes)):
-        begin = real.start[k]
-        real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
-    rows = ((Y0, Y0), (SEEN, Y0), (LAST, LAST), (BEFORE, LAST), (ELEMENTS_BEFORE, ELEMENTS_BEFORE))
-    for row, source in rows:
-        real.at[row : row + PORTS] = bodies.at[source : source + PORTS]
-    nodes = network.nodes
-    for w in range(len(nodes.wall_node)):
-        i = nodes.wall_node[w]
-        if i < nodes.volumes:
-            nodes.held[i] += nodes.wall_area[w] * real.at[Y0 + nodes.wall_port[w]]
-    nodes.mass[:] *= nodes.held / nodes.volume
-    interfaces.rate[:] = 0.0
-    interfaces.e[:] = interfaces.series * interfaces.force  # in equilibrium with the contacts
-    closed = interfaces.gap + interfaces.e < 0.0
-    interfaces.since[closed] = -np.inf
-    owner = {handle: row for row in network.rows.bodies for handle in row.ports}
-    for c, touching in enumerate(network.rows.interfaces):
-        pair = (owner.get(touching.upper), owner.get(touching.lower))
-        chi = resting_dissipation(touching, pair, -float(interfaces.gap[c] + interfaces.e[c]))
-        # 0 would be for "not touched yet"
-        interfaces.chi[c] = chi or (_UNDAMPED if closed[c] and interfaces.alpha[c] > 0.0 else 0.0)
 
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
