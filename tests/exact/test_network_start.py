@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from klack.contact.laws import gonthier_coefficient
-from klack.errors import AccuracyWarning
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.rigid_mass import RigidMass
-from klack.network.checks import LooseBodyWarning
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.simulation.network_result import NetworkResult
@@ -64,15 +62,3 @@ def test_a_resting_contact_has_half_of_its_factor_as_damping_ratio(restitution, 
     expected = np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2))
     # the law is not linear: its damping falls with the indentation, 1e-3 of it here
     assert beyond == pytest.approx(expected, abs=3e-3)
-
-
-def test_a_body_that_nothing_holds_is_told():
-    parts: dict[str, Component] = {
-        "needle": RigidMass(mass=MASS, points=("tip",)),
-        "force": ForceOverTime(time=(0.0, 1.0), force=(-FORCE, -FORCE)),
-    }
-    with pytest.warns(LooseBodyWarning):
-        rows = Network(parts, [["needle.tip", "force.end"]]).rows()
-
-    with pytest.warns(AccuracyWarning, match="static start was not found: ports still move"):
-        simulate_network(rows, duration=10e-6)

@@ -35,11 +35,12 @@ class Chamber(Component):
 
     volume: Volume = Field(gt=0, description="With all faces where they start.")
     pressure: Pressure | None = Field(
-        default=None, gt=0, description="Absolute, at the start; ambient by default."
+        default=None,
+        gt=0,
+        description="Absolute, at the start; by default that of steady flow, or ambient.",
     )
 
     def add_rows(self, rows: Rows) -> None:
         """Make the node a chamber."""
         network_fluid(rows)
-        start = rows.ambient.pressure if self.pressure is None else self.pressure
-        rows.chamber(rows.port("fluid"), volume=self.volume, pressure=start)
+        rows.chamber(rows.port("fluid"), volume=self.volume, pressure=self.pressure)

@@ -101,4 +101,5 @@ class Inertance(Component):
             state=(0.0, 0.0, 0.0),
             books=(Book("kinetic", "store"),),
             channels=(Channel("mass flow", "kg/s", 0),),
+            column=friction,
         )

@@ -50,6 +50,7 @@ from klack.magnetics.map_kernel import (
     map_step,
 )
 from klack.magnetics.quiet_step import DIODE, FRONT, quiet_step
+from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
 
@@ -406,10 +407,16 @@ def flux_numbers(
     return np.concatenate((head, numbers, program))
 
 
-def flux_state(parameters: NDArray[np.float64], fluxes: ArrayLike = ()) -> NDArray[np.float64]:
-    """State at the start: the driver in its first state, the coil open, loop fluxes [Wb] if any."""
+def flux_state(
+    parameters: NDArray[np.float64], fluxes: ArrayLike = (), current: float = 0.0
+) -> NDArray[np.float64]:
+    """State at the start: the driver in its first state, the coil open if it carries no current.
+
+    ``fluxes`` are those of the loops [Wb], ``current`` that of the coil [A].
+    """
     state = np.zeros(int(parameters[6]))
-    state[3] = 1.0
+    state[3] = 1.0 if current == 0.0 else 0.0
+    state[4] = current
     phi = np.array(fluxes, dtype=float).ravel()
     state[_FRONT : _FRONT + phi.size] = phi
     return state
@@ -425,7 +432,7 @@ def flux_rows(
     closing: bool = True,
     armature: int,
     base: int,
-    fluxes: ArrayLike = (),
+    current: float = 0.0,
     gap_range: GapRange | None = None,
 ) -> None:
     """Add a solenoid to the rows of a network.
@@ -445,8 +452,9 @@ def flux_rows(
         Whether the gap closes as the armature moves along +z (away from the base).
     armature, base : int
         Mechanical ports, perhaps :data:`klack.network.rows.GROUND`.
-    fluxes : array, shape (n_loops,) [Wb]
-        Loop fluxes at the start, at zero current: remanence.
+    current : float [A]
+        At the start; the fluxes are those that belong to it at the gap at which the armature rests,
+        with remanence.
     gap_range : GapRange, optional
         That of the tables of the plant by default.
 
@@ -456,11 +464,18 @@ def flux_rows(
         If the circuit has no leakage path without eddy currents, or too many different fluxes.
     """
     parameters = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap, closing=closing)
+
+    def at_rest(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        x = gap + float(parameters[3]) * float(displacement[0] - displacement[1])
+        return flux_state(parameters, steady_fluxes(plant, current=current, gap=x), current)
+
+    state = at_rest(np.zeros(2))
     rows.element(
         magnet_step,
         ports=(armature, base),
         parameters=parameters,
-        state=flux_state(parameters, fluxes),
+        state=state,
+        at_rest=at_rest if np.any(state[_FRONT:]) else None,
         books=BOOKS,
         channels=CHANNELS,
         failures=FAILURES,

@@ -61,6 +61,9 @@ class ForceMapSolenoid(Component):
     force: tuple[tuple[Force, ...], ...] | None = Field(
         default=None, description="Force, negative where it closes the gap; compared only."
     )
+    start_current: Current = Field(
+        default=0.0, ge=0, description="At the start, constant for long before it: holding."
+    )
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
@@ -98,6 +101,7 @@ class ForceMapSolenoid(Component):
             closing=self.closes == "upward",
             armature=rows.port("armature"),
             base=rows.port("base"),
+            current=self.start_current,
         )
         most = max(self.current)
         rows.limits.append(

@@ -14,13 +14,12 @@ from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
-from klack.magnetics.static import static_state
 from klack.magnetics.tabulation import hermite_grid
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import Rows
-from klack.units import Flux, Length, Permeance, Ratio, Resistance, Temperature
+from klack.units import Current, Flux, Length, Permeance, Ratio, Resistance, Temperature
 
 __all__ = ["Solenoid"]
 
@@ -98,6 +97,9 @@ class Solenoid(Component):
     residual_flux: Flux = Field(
         default=0.0, ge=0, description="Main flux that remains without current, gap closed."
     )
+    start_current: Current = Field(
+        default=0.0, ge=0, description="At the start, constant for long before it: holding."
+    )
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
@@ -142,7 +144,7 @@ class Solenoid(Component):
             closing=self.closes == "upward",
             armature=rows.port("armature"),
             base=rows.port("base"),
-            fluxes=static_state(circuit, current=0.0, gap=self.gap).loop_fluxes,
+            current=self.start_current,
             gap_range=self.gap_range(),
         )
 

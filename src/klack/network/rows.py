@@ -99,7 +99,9 @@ class BodyRow:
 class ElementRow:
     """Something that pushes ports; see :mod:`klack.network.step_function`.
 
-    ``names`` are what the component calls its ports.
+    ``names`` are what the component calls its ports.  ``at_rest`` gives the first states that the
+    element has at the start once its ports rest at given displacements [m]; without it the states
+    at the start are ``state`` wherever the ports are.
     """
 
     component: str
@@ -112,11 +114,16 @@ class ElementRow:
     books: tuple[Book, ...]
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
+    at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BranchRow:
-    """Flow between two hydraulic nodes, perhaps pushing mechanical ports."""
+    """Flow between two hydraulic nodes, perhaps pushing mechanical ports.
+
+    ``column`` [J s/kg^2] belongs to a column of fluid whose mass flow is its first state: its
+    friction, ``g_a - g_b = column * mdot`` once the flow is steady.
+    """
 
     component: str
     label: str
@@ -129,6 +136,7 @@ class BranchRow:
     books: tuple[Book, ...]
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
+    column: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,13 +144,15 @@ class NodeRow:
     """One pressure: a volume with compliance, or a prescribed pressure over time.
 
     ``volume`` [m^3] at zero displacements; 0 for a prescribed pressure, whose ``time`` [s] and
-    ``pressure`` [Pa] are a table (constant beyond its ends).
+    ``pressure`` [Pa] are a table (constant beyond its ends).  A volume whose pressure is not
+    ``stated`` starts at that of steady flow.
     """
 
     component: str
     volume: float
     time: NDArray[np.float64]
     pressure: NDArray[np.float64]
+    stated: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -335,6 +345,7 @@ class Rows:
         channels: Sequence[Channel] = (),
         failures: Mapping[int, str] | None = None,
         label: str = "",
+        at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
         self.elements.append(
@@ -349,6 +360,7 @@ class Rows:
                 books=tuple(books),
                 channels=tuple(channels),
                 failures=failures or {},
+                at_rest=at_rest,
             )
         )
 
@@ -375,6 +387,7 @@ class Rows:
         channels: Sequence[Channel] = (),
         failures: Mapping[int, str] | None = None,
         label: str = "",
+        column: float | None = None,
     ) -> None:
         """Add a flow between the nodes ``a`` and ``b``; its mass flow is recorded."""
         self.branches.append(
@@ -390,13 +403,19 @@ class Rows:
                 books=tuple(books),
                 channels=tuple(channels),
                 failures=failures or {},
+                column=column,
             )
         )
 
-    def chamber(self, node: int, *, volume: float, pressure: float) -> None:
-        """Make a node a volume [m^3] with a start pressure [Pa]; adds to a volume already there."""
+    def chamber(self, node: int, *, volume: float, pressure: float | None) -> None:
+        """Make a node a volume [m^3]; adds to a volume already there.
+
+        ``pressure`` [Pa] is that at the start; None for that of steady flow.
+        """
         before = self.nodes.get(node)
-        if before is not None and before.pressure[0] != pressure:
+        if before is not None and before.stated:
+            pressure = before.pressure[0] if pressure is None else pressure
+        if before is not None and before.stated and before.pressure[0] != pressure:
             raise InputError(
                 f"components.{self.component}",
                 got=f"{pressure:g} Pa at the start where '{before.component}' has"
@@ -408,7 +427,8 @@ class Rows:
             component=self.component,
             volume=volume + (before.volume if before else 0.0),
             time=np.zeros(1),
-            pressure=np.array([pressure]),
+            pressure=np.array([self.ambient.pressure if pressure is None else pressure]),
+            stated=pressure is not None,
         )
 
     def pressure(self, node: int, *, time: ArrayLike, pressure: ArrayLike) -> None:

@@ -76,6 +76,7 @@ _FEW_SWEEPS = 8  # are enough, unless what still changes is round-off
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
 _MOST_NEWTON = 80
+_FULL_NEWTON = 15  # of them with whole steps
 _PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
@@ -614,9 +615,14 @@ def run_network(
                                 new, node_hint[i] = pressure_at(node_fluid, target, node_hint[i])
                                 r[i] = new - p[i]
                             worst = max(worst, abs(r[i]) / max(p[i], node_ambient))
-                            p[i] += r[i]
                         if worst < _PRESSURE_LEFT:
+                            for i in range(volumes):
+                                p[i] += r[i]
                             break
+                        # a root-like law about no drop lets Newton's method swing across for ever
+                        share = 1.0 if iteration < _FULL_NEWTON else 0.5
+                        for i in range(volumes):
+                            p[i] += share * r[i]
                         if iteration == _MOST_NEWTON - 1 or not worst < np.inf:
                             report[0], report[2] = 0.0, t
                             for i in range(volumes):

@@ -15,6 +15,7 @@ __all__ = [
     "IncompleteRunError",
     "InterfaceRecord",
     "NetworkResult",
+    "StaticStart",
 ]
 
 BODY_STORE = "kinetic and strain"  # what a body holds; its component stands before it
@@ -162,6 +163,34 @@ class EnergyBooks:
         return max(self.throughput, *moving, 1e-3 * stored)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StaticStart:
+    """Where a run began: the equilibrium at time zero.
+
+    Parameters
+    ----------
+    displacement : mapping of str to float [m]
+        By ``"<body>.<port>"``.
+    pressure : mapping of str to float [Pa]
+        Of each volume, absolute.
+    stated : mapping of str to bool
+        Whether the case states that pressure; else it is that of steady flow.
+    flow : mapping of str to float [kg/s]
+        Of each branch and line.
+    residual : mapping of str to float [N]
+        Force that is left on each free body.
+    notes : tuple of str
+        What has no steady state, and how it starts instead.
+    """
+
+    displacement: Mapping[str, float]
+    pressure: Mapping[str, float]
+    stated: Mapping[str, bool]
+    flow: Mapping[str, float]
+    residual: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:
     """Everything that a run of a network leaves behind.
@@ -189,6 +218,8 @@ class NetworkResult:
         is reported again, whole, by the run that goes on, with the same stop and time.
     failure : str
         Why the run ended before its time, all else is the record up to there; empty if it did not.
+    start : StaticStart or None
+        The equilibrium from which it began; None for a run that goes on or began free.
     """
 
     time: NDArray[np.float64]
@@ -202,6 +233,7 @@ class NetworkResult:
     wall_time: float
     state: Mapping[str, NDArray[np.generic]]
     failure: str = ""
+    start: StaticStart | None = None
 
 
 class IncompleteRunError(ConvergenceError):

@@ -1,8 +1,7 @@
 """Run a network: static start, time loop, channels, impacts, energy books."""
 
-import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Literal
 
@@ -10,19 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import energy_balance
-from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError, require_positive
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
-from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
-    BEFORE,
-    ELEMENTS_BEFORE,
-    LAST,
     PORTS,
-    SEEN,
     WORK,
-    Y0,
     Y1,
     Recording,
     Scratch,
@@ -30,9 +23,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_compile import (
     CompiledNetwork,
-    compile_bodies,
     compile_network,
-    interface_compliance,
     modal_state,
 )
 from klack.simulation.network_kernel import (
@@ -46,7 +37,7 @@ from klack.simulation.network_kernel import (
 from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
-from klack.simulation.rest import resting_dissipation
+from klack.simulation.static_start import start_at_rest
 from klack.units import format_si
 
 __all__ = ["simulate_network"]
@@ -56,12 +47,6 @@ State = Mapping[str, NDArray[np.generic]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
-_SETTLE_SHARE = 0.02  # of the longest time to rest is a step of the static start
-_SETTLE_STEP = 1e-6  # [s] the same where nothing can rest on anything
-_SETTLE_STEPS = 1000  # between two looks at whether the ports still move
-_SETTLE_LOOKS = 100
-_SETTLED = 1e-9  # way of a port between two looks over the largest way of any since the beginning
-_UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _CHUNK = 250_000  # fine steps of a chunk: about 0.1 s
 _PYTHON_CHUNK = 2_500  # the same with step functions in Python, some of which cannot step back
 _LOOK = 1.5e-6  # [s] longest time between two looks of the search for impacts
@@ -140,11 +125,11 @@ def simulate_network(
         fine=max(chunk, grid.look_steps),
     )
     clock = np.array([0, -1, 0, 0], dtype=np.int64)
+    begun = None
     if state is not None:
         _restore(network, clock, state)
     elif start == "rest":
-        large = _SETTLE_SHARE * float(np.max(network.interfaces.rest, initial=0.0)) or _SETTLE_STEP
-        _settle(network, recorder.recording, step * max(1, round(large / step)))
+        begun = start_at_rest(network, step)
     first_step, done_before = int(clock[0]), clock[2:4].copy()
     finder = ImpactFinder(rows, step * first_step)
     fresh = state is None or _IMPACTS not in state  # of an earlier version
@@ -178,6 +163,7 @@ def simulate_network(
         wall_time=wall_time,
         state=_save(network, clock) | {_IMPACTS: finder.state},
         failure="" if failure is None else str(failure),
+        start=begun,
     )
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
@@ -325,10 +311,8 @@ def _advance(
     block: int,
     allow_coarse: bool,
     *,
-    settle: bool = False,
-    report: Vector | None = None,
+    report: Vector,
 ) -> None:
-    report = np.zeros(3) if report is None else report
     status = run_network(
         macros,
         per_record,
@@ -337,7 +321,7 @@ def _advance(
         block,
         step,
         allow_coarse,
-        settle,
+        False,
         network.bodies,
         network.elements,
         network.branches,
@@ -364,59 +348,6 @@ def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
         ends=len(network.nodes.end_node),
         sums=recording.means.shape[1],
     )
-
-
-def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None:
-    """Find the static start: large steps, all velocities taken out after each, until nothing moves.
-
-    Warns
-    -----
-    AccuracyWarning
-        When the ports still move.
-    """
-    bodies, _ = compile_bodies(network.rows.bodies, (step, step))
-    own = interface_compliance(bodies, network.interfaces.upper, network.interfaces.lower)
-    interfaces = network.interfaces._replace(G=own)
-    still = replace(network, bodies=bodies, interfaces=interfaces)
-    ports = slice(Y0, Y0 + bodies.first.size - 1)
-    for look in range(_SETTLE_LOOKS + 1):
-        before = bodies.at[ports].copy()
-        clock = np.array([0, -1, 0, 0], dtype=np.int64)
-        _advance(still, recording, clock, _SETTLE_STEPS, 1, 0, step, 1, False, settle=True)
-        way = float(np.max(np.abs(bodies.at[ports] - before), initial=0.0))
-        if way <= _SETTLED * float(np.max(np.abs(bodies.at[ports]), initial=0.0)):
-            break
-        if look == _SETTLE_LOOKS:
-            warnings.warn(
-                f"the static start was not found: ports still move by {format_si(way, 'm', 2)} in "
-                f"{_SETTLE_STEPS} steps of {format_si(step, 's', 2)}. Try: look for a body that "
-                "nothing holds, or a very soft spring; in Python, start='free' leaves it out.",
-                AccuracyWarning,
-                stacklevel=3,
-            )
-    real = network.bodies
-    for k in range(len(real.modes)):
-        begin = real.start[k]
-        real.fine[begin : begin + ROW] = bodies.coarse[begin : begin + ROW]
-    rows = ((Y0, Y0), (SEEN, Y0), (LAST, LAST), (BEFORE, LAST), (ELEMENTS_BEFORE, ELEMENTS_BEFORE))
-    for row, source in rows:
-        real.at[row : row + PORTS] = bodies.at[source : source + PORTS]
-    nodes = network.nodes
-    for w in range(len(nodes.wall_node)):
-        i = nodes.wall_node[w]
-        if i < nodes.volumes:
-            nodes.held[i] += nodes.wall_area[w] * real.at[Y0 + nodes.wall_port[w]]
-    nodes.mass[:] *= nodes.held / nodes.volume
-    interfaces.rate[:] = 0.0
-    interfaces.e[:] = interfaces.series * interfaces.force  # in equilibrium with the contacts
-    closed = interfaces.gap + interfaces.e < 0.0
-    interfaces.since[closed] = -np.inf
-    owner = {handle: row for row in network.rows.bodies for handle in row.ports}
-    for c, touching in enumerate(network.rows.interfaces):
-        pair = (owner.get(touching.upper), owner.get(touching.lower))
-        chi = resting_dissipation(touching, pair, -float(interfaces.gap[c] + interfaces.e[c]))
-        # 0 would be for "not touched yet"
-        interfaces.chi[c] = chi or (_UNDAMPED if closed[c] and interfaces.alpha[c] > 0.0 else 0.0)
 
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:

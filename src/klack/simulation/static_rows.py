@@ -1,0 +1,178 @@
+"""Forces and flows of all rows of a network at rest, and how they answer to small changes."""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from klack.hydraulics.fluid_table import fluid_at
+from klack.network.step_function import call, pointer
+from klack.simulation.network_arrays import Nodes, StepRows
+
+__all__ = ["at_rest", "slopes_at_rest"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_PRESS = 1e-9  # change of a pressure to see what follows from it, over the pressure
+
+
+@njit(cache=True)
+def _call_all(
+    rows: StepRows, head: int, h: float, y: Vector, p: Vector, rho: Vector, report: Index
+) -> bool:
+    """Call every row over a short step up to the time zero in which nothing moves."""
+    for k in range(rows.function.size):
+        i0 = rows.input0[k]
+        rows.inputs[i0], rows.inputs[i0 + 1] = -h, h
+        first = 2
+        if head > 0:
+            a, b = rows.a[k], rows.b[k]
+            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
+            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
+            first = 6
+        q0 = rows.port0[k]
+        for j in range(q0, rows.port0[k + 1]):
+            for end in range(2):
+                rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
+        status = call(
+            rows.function[k],
+            pointer(rows.parameters, rows.parameter0[k]),
+            pointer(rows.state, rows.state0[k]),
+            pointer(rows.inputs, i0),
+            pointer(rows.outputs, rows.output0[k]),
+        )
+        if status != 0:
+            report[0], report[1], report[2] = head, k, status
+            return False
+    return True
+
+
+@njit(cache=True)
+def at_rest(
+    elements: StepRows,
+    branches: StepRows,
+    nodes: Nodes,
+    column: Index,
+    h: float,
+    y: Vector,
+    p: Vector,
+    force: Vector,
+    inflow: Vector,
+    size: Vector,
+    report: Index,
+) -> bool:
+    """Sum what pushes each port and what flows into each node while all ports are at rest.
+
+    Parameters
+    ----------
+    column : array of int, shape (branches,)
+        1 for a branch whose flow is a state: an unknown of its own, which is left out here.
+    h : float [s]
+        Length of the step before time zero that sources and states are asked for.
+    y : array [m]
+        Displacement of every port; the last one is the ground.
+    p : array [Pa]
+        Of every node.
+    force : array [N]
+        Out: of elements, walls and branches, without the interfaces.
+    inflow : array [kg/s]
+        Out.
+    size : array [N], then [kg/s]
+        Out: the same sums of absolute values, forces first: what their round-off belongs to.
+    report : array of int, shape (3,)
+        Out: 0 for an element or 3 for a branch, its row, its status.
+
+    Returns
+    -------
+    bool
+        False if a row failed.
+    """
+    rho = np.ones(p.size)
+    for i in range(p.size):
+        rho[i] = fluid_at(nodes.fluid, p[i], nodes.hint[i])[0]
+    force[:] = 0.0
+    inflow[:] = 0.0
+    size[:] = 0.0
+    ports = force.size
+    if not _call_all(elements, 0, h, y, p, rho, report):
+        return False
+    for k in range(elements.function.size):
+        q0 = elements.port0[k]
+        for j in range(q0, elements.port0[k + 1]):
+            push = elements.outputs[elements.output0[k] + j - q0]
+            force[elements.ports[j]] += push
+            size[elements.ports[j]] += abs(push)
+    if not _call_all(branches, 3, h, y, p, rho, report):
+        return False
+    for k in range(branches.function.size):
+        o0, q0 = branches.output0[k], branches.port0[k]
+        for j in range(q0, branches.port0[k + 1]):
+            push = branches.outputs[o0 + 3 + j - q0]
+            force[branches.ports[j]] += push
+            size[branches.ports[j]] += abs(push)
+        if column[k] == 0:
+            a, b, flow = branches.a[k], branches.b[k], branches.outputs[o0]
+            inflow[a] -= flow
+            inflow[b] += flow
+            size[ports + a] += abs(flow)
+            size[ports + b] += abs(flow)
+    for w in range(nodes.wall_node.size):
+        pressure = p[nodes.wall_node[w]]
+        force[nodes.wall_port[w]] += nodes.wall_area[w] * (pressure - nodes.ambient)
+        size[nodes.wall_port[w]] += abs(nodes.wall_area[w]) * (pressure + nodes.ambient)
+    force[ports - 1] = 0.0  # of the ground
+    return True
+
+
+@njit(cache=True)
+def slopes_at_rest(
+    elements: StepRows,
+    branches: StepRows,
+    nodes: Nodes,
+    column: Index,
+    h: float,
+    move: float,
+    y: Vector,
+    p: Vector,
+    free: Index,
+    force: Vector,
+    inflow: Vector,
+    size: Vector,
+    by_port: Any,
+    by_pressure: Any,
+    report: Index,
+) -> bool:
+    """Fill :func:`at_rest` and its change with every port and with the pressures of ``free``.
+
+    Ports are moved by ``move`` [m].  ``by_port[:, j]`` holds forces, then inflows, per metre of
+    port ``j``; ``by_pressure`` the same per pascal, one column for each free node.
+    """
+    if not at_rest(elements, branches, nodes, column, h, y, p, force, inflow, size, report):
+        return False
+    ports = force.size
+    force1, inflow1, size1 = np.zeros(ports), np.zeros(inflow.size), np.zeros(size.size)
+    for j in range(y.size - 1):
+        keep = y[j]
+        y[j] = keep + move
+        moved = y[j] - keep
+        found = at_rest(elements, branches, nodes, column, h, y, p, force1, inflow1, size1, report)
+        y[j] = keep
+        if not found:
+            return False
+        by_port[:ports, j] = (force1 - force) / moved
+        by_port[ports:, j] = (inflow1 - inflow) / moved
+    for j in range(free.size):
+        keep = p[free[j]]
+        p[free[j]] = keep * (1.0 + _PRESS)
+        pressed = p[free[j]] - keep
+        found = at_rest(elements, branches, nodes, column, h, y, p, force1, inflow1, size1, report)
+        p[free[j]] = keep
+        if not found:
+            return False
+        by_pressure[:ports, j] = (force1 - force) / pressed
+        by_pressure[ports:, j] = (inflow1 - inflow) / pressed
+    # what the rows gave out last belongs to the state itself
+    return at_rest(elements, branches, nodes, column, h, y, p, force, inflow, size, report)

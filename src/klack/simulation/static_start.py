@@ -1,0 +1,717 @@
+r"""The static start: the equilibrium of bodies, pressures and flows at time zero.
+
+Unknown are the rigid coordinates :math:`z` of the bodies, the displacements :math:`y` of their
+ports, the pressures :math:`p` that the case does not state, and the flows :math:`\dot m` of
+columns of fluid (lines, inertances):
+
+.. math::
+
+    y = \Phi_r^T z + C F(y, p), \qquad \Phi_r F(y, p) = 0, \qquad
+    \sum \dot m_i(y, p) = 0, \qquad g_a - g_b = r\,\dot m
+
+with the static compliance :math:`C = \Phi_e^T \Omega^{-2} \Phi_e` of the elastic modes and the
+forces :math:`F` of everything that acts, contacts with their full laws.
+
+Newton's method finds a root from nearby.  To get near, and to the root that the valve itself would
+come to rest in, the same equations are first led through pseudo-time (Kelley & Keyes, SIAM J.
+Numer. Anal. 35 (1998) 508): implicit Euler steps in which a body creeps with
+:math:`\Delta z = \tfrac12 \tau^2 \Phi_r F` and a volume fills with
+:math:`V \varrho' \Delta p = \tau \sum \dot m`.  Steps :math:`\tau` grow from microseconds until
+they are so long that nothing but the equilibrium is left; a step whose Newton iteration fails is
+shortened.  What moves ever on has no equilibrium.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.hydraulics.fluid_table import fluid_at
+from klack.simulation.contact_step import mean_force
+from klack.simulation.delay_line import start_lines
+from klack.simulation.interface_step import NO_LAW
+from klack.simulation.modal_step import ROW, ROW_Q
+from klack.simulation.network_arrays import (
+    BEFORE,
+    ELEMENTS_BEFORE,
+    LAST,
+    SEEN,
+    Y0,
+)
+from klack.simulation.network_compile import CompiledNetwork
+from klack.simulation.network_result import StaticStart
+from klack.simulation.rest import resting_dissipation
+from klack.simulation.static_rows import at_rest, slopes_at_rest
+from klack.units import format_si
+
+__all__ = ["start_at_rest"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
+_GROWTH = 8.0  # from one to the next
+_MOST_NEWTON = 60
+_HALVINGS = 12  # of a Newton step that leads where a part knows no answer
+_FALL = 0.1  # least share of a pressure that a Newton step leaves
+_SHARE_OF_STEP = 1e-6  # of the step: sources are asked for over so short a time
+_FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
+_STUCK = 1e-8  # the same, where round-off lets it fall no more
+_LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this covers in a step
+_MOVE = 0.02  # [m/s] the same for the way by which a port is moved to see what changes
+_FAR = 2e9  # [m/s] ... and for what a body that nothing holds has gone
+_HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
+_EMPTY = 1e-3  # [Pa] ... so low gets nothing
+_UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
+_ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
+_NEARLY = 1e-9  # the same where they come no closer
+
+
+@dataclass(slots=True)
+class _State:
+    """Unknowns, and what belongs to them."""
+
+    z: Vector  # rigid coordinates of all bodies
+    y: Vector  # ports, the ground last
+    p: Vector  # all nodes
+    m: Vector  # columns
+
+    def copy(self) -> "_State":
+        return _State(self.z.copy(), self.y.copy(), self.p.copy(), self.m.copy())
+
+
+class _RunawayError(Exception):
+    """The bodies that go far, or the volumes whose pressure has no end."""
+
+    def __init__(self, bodies: list[int], volumes: list[int]) -> None:
+        self.bodies, self.volumes = bodies, volumes
+        super().__init__()
+
+
+def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
+    """Find the static start and put the network there, in place.
+
+    Bodies with a speed at the start do not rest: they stay where they are.  Volumes with a stated
+    pressure keep it; where nothing flows in or out, so do those without, at ambient pressure.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+    step : float [s]
+        Fine step of the run.
+
+    Raises
+    ------
+    InputError
+        If a body has no equilibrium, with its name.
+    ConvergenceError
+        If none is found.
+
+    Warns
+    -----
+    AccuracyWarning
+        For a volume whose pressure has no steady state; it starts from ambient pressure.
+    """
+    held: set[int] = set()
+    notes: list[str] = []
+    enclosed = False
+    while True:
+        problem = _Balance(network, step, held, enclosed=enclosed)
+        try:
+            state = _march(problem)
+            break
+        except _RunawayError as away:
+            if away.volumes:
+                held.update(away.volumes)
+                notes += [_no_pressure(network, i) for i in away.volumes]
+            elif not enclosed and problem.can_enclose(away.bodies):
+                enclosed = True
+            else:
+                raise _unheld(network, away.bodies) from None
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+    return problem.put(state, tuple(notes))
+
+
+def _march(problem: "_Balance") -> _State:
+    """Lead the start through pseudo-time to the equilibrium.
+
+    A body that is held by nothing and on which nothing acts stays: in a long step it would drift.
+    """
+    state, step = problem.first(), problem.step
+    tau, longest = _FIRST * step, _LONGEST * step
+    while tau >= _SHORTEST * step:
+        open_modes = problem.unbalanced(state)
+        if open_modes is None:
+            return state
+        after = problem.advance(state, min(tau, longest), open_modes)
+        if after is None:
+            tau = min(tau, longest) / _GROWTH**1.5
+            continue
+        problem.check(after)
+        if tau > _GROWTH**4 * longest and problem.unbalanced(after, _NEARLY) is None:
+            return after
+        if tau > _GROWTH**8 * longest:
+            break
+        state, tau = after, tau * _GROWTH
+    raise problem.not_found(state)
+
+
+class _Balance:
+    """Residuals and slopes of the equations above, for one network."""
+
+    def __init__(
+        self, network: CompiledNetwork, step: float, held: set[int], *, enclosed: bool
+    ) -> None:
+        self.network, self.step, self.enclosed = network, step, enclosed
+        self.h, self.move = _SHARE_OF_STEP * step, _MOVE * step
+        rows, nodes = network.rows, network.nodes
+        count = network.bodies.first.size - 1
+        self.ports = count
+        rigid = [row.body.rigid_count for row in rows.bodies]
+        self.of_body = np.repeat(np.arange(len(rigid)), rigid)
+        self.shapes = np.zeros((sum(rigid), count))
+        self.compliance = np.zeros((count, count))
+        self.moves = np.array([row.speed == 0.0 for row in rows.bodies])[self.of_body]
+        begin, mode = 0, 0
+        for row in rows.bodies:
+            body, here = row.body, slice(begin, begin + len(row.ports))
+            shapes = np.asarray(body.port_shapes)
+            r = body.rigid_count
+            self.shapes[mode : mode + r, here] = shapes[:r]
+            elastic = shapes[r:] / body.omega[r:, None]
+            self.compliance[here, here] = elastic.T @ elastic
+            begin, mode = here.stop, mode + r
+        self.body_of_port = np.repeat(
+            np.arange(len(rows.bodies)), [len(b.ports) for b in rows.bodies]
+        )
+        stated = [rows.nodes[handle].stated for handle in network.node_order]
+        self.stated = np.array(stated, dtype=bool)
+        self.given = [i in held or bool(self.stated[i]) for i in range(nodes.volumes)]
+        walls = set(nodes.wall_node.tolist())
+        free = [i for i in range(nodes.volumes) if not self.given[i] or (enclosed and i in walls)]
+        self.free = np.array(free, np.int64)
+        self.shut = np.array([self.given[i] for i in free], dtype=bool)
+        self._columns()
+        self.kept = [
+            (k, row.at_rest) for k, row in enumerate(rows.elements) if row.at_rest is not None
+        ]
+        self._rows = (network.elements, network.branches, nodes, self.column_rows)
+        self.force, self.inflow = np.zeros(count + 1), np.zeros(nodes.p.size)
+        self.elements = self.force
+        self.size = np.zeros(count + 1 + nodes.p.size)
+        self.by_port = np.zeros((self.size.size, count))
+        self.by_pressure = np.zeros((self.size.size, self.free.size))
+        self.contact_force = np.zeros(len(rows.interfaces))
+        length = _LENGTH * step  # in these units no unknown has a size of its own
+        largest = np.max(np.abs(self.shapes), axis=1, initial=0.0)
+        self.units = np.concatenate(
+            [
+                np.full(count, length),
+                length / np.where(largest > 0.0, largest, 1.0),
+                np.ones(self.free.size),
+                np.full(len(self.ends), nodes.density * length**2),
+            ]
+        )
+        self.code = np.zeros(3, np.int64)
+
+    def _columns(self) -> None:
+        """Lines and inertances with a free volume at one end carry an unknown flow."""
+        network = self.network
+        density, order = network.nodes.density, network.node_order
+        place = {handle: i for i, handle in enumerate(order)}
+        free = set(self.free.tolist())
+        self.column_rows = np.zeros(len(network.rows.branches), np.int64)
+        ends: list[tuple[int, int]] = []
+        friction: list[float] = []
+        self.column_branch: list[int] = []
+        self.column_line: list[int] = []
+        for k, branch in enumerate(network.rows.branches):
+            if branch.column is not None:
+                self.column_rows[k] = 1
+                a, b = place[branch.a], place[branch.b]
+                if a in free or b in free:
+                    ends.append((a, b))
+                    friction.append(branch.column)
+                    self.column_branch.append(k)
+        for k, line in enumerate(network.rows.lines):
+            a, b = place[line.a], place[line.b]
+            if a in free or b in free:
+                ends.append((a, b))
+                friction.append(line.resistance / density**2)
+                self.column_line.append(k)
+        self.ends = np.array(ends, np.int64).reshape(-1, 2)
+        self.friction = np.array(friction, dtype=float)
+
+    def can_enclose(self, bodies: list[int]) -> bool:
+        """Whether fluid in a volume may hold one of these bodies like a spring."""
+        nodes = self.network.nodes
+        walls = zip(nodes.wall_node, nodes.wall_port, strict=True)
+        return any(i < nodes.volumes and self.body_of_port[port] in bodies for i, port in walls)
+
+    def first(self) -> _State:
+        """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
+        nodes = self.network.nodes
+        p = nodes.p.copy()
+        for i in range(nodes.volumes, p.size):  # sources at time zero
+            here = slice(*nodes.table0[i - nodes.volumes : i - nodes.volumes + 2])
+            p[i] = np.interp(0.0, nodes.time[here], nodes.pressure[here])
+        z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
+        return _State(z, y, p, np.zeros(len(self.ends)))
+
+    def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
+        """Rigid modes that are free to creep; None if all is in equilibrium.
+
+        One on which nothing but round-off acts, and which no force answers, is not.
+        """
+        if not self.evaluate(state):
+            raise self.failed()
+        ports, y = self.ports + 1, np.abs(state.y[:-1])
+        known = self.size + np.abs(self.by_port) @ y
+        known += np.abs(self.by_pressure) @ state.p[self.free]
+        left = np.abs(self.shapes @ self.force[:-1])
+        pushed = left > share * (np.abs(self.shapes) @ known[: ports - 1])
+        bent = self._bent(state)
+        stretch = y + np.abs(self.compliance) @ known[: ports - 1]
+        settled = bool(np.all(np.abs(bent) <= share * stretch) and not np.any(pushed & self.moves))
+        net, flows = self._net(state), known[ports:].copy()
+        for (a, b), m in zip(self.ends, state.m, strict=True):
+            flows[a] += abs(m)
+            flows[b] += abs(m)
+        if settled and bool(np.all(np.abs(net) <= share * flows[self.free])):
+            rest, scale = self._columns_left(state)
+            if np.all(np.abs(rest) <= share * scale):
+                return None
+        answers = np.any(self.shapes @ self.by_port[: ports - 1] != 0.0, axis=1)
+        return (pushed | answers) & self.moves
+
+    def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
+        """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
+        state, before = start.copy(), np.inf
+        creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
+        mass = self._masses(start)[0]
+        for _ in range(_MOST_NEWTON):
+            if not self.evaluate(state):
+                return None
+            change = self._newton(state, start, creep, mass, tau)
+            if not np.all(np.isfinite(change)):
+                return None
+            n, r, f = self.ports, self.of_body.size, self.free.size
+            dy, dp = change[:n], change[n + r : n + r + f]
+            share = 1.0
+            fall = np.min((1.0 + dp / state.p[self.free]), initial=1.0)
+            if fall < _FALL:
+                share = (1.0 - _FALL) / (1.0 - fall)
+            for _halving in range(_HALVINGS):
+                tried = self._moved(state, share * change)
+                if self.answers(tried):
+                    break
+                share *= 0.5
+            else:
+                return None
+            state = tried
+            longest = max(float(np.max(np.abs(state.y))), _LENGTH * self.step)
+            last = float(np.max(np.abs(dy), initial=0.0)) / longest
+            last = max(last, float(np.max(np.abs(dp) / state.p[self.free], initial=0.0)))
+            if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
+                return state
+            if np.any(state.p[self.free] < _EMPTY):
+                raise _RunawayError([], self._unstated(state.p < _EMPTY))
+            before = last
+        return None
+
+    def check(self, state: _State) -> None:
+        """Raise :class:`_RunawayError` for what has gone where nothing real goes."""
+        volumes = self._unstated(state.p > _HIGH)
+        far = np.flatnonzero(np.abs(state.y[:-1]) > _FAR * self.step)
+        bodies = sorted({int(self.body_of_port[port]) for port in far})
+        if volumes or bodies:
+            raise _RunawayError(bodies, volumes)
+
+    def _unstated(self, which: NDArray[np.bool_]) -> list[int]:
+        return [int(i) for i in self.free if which[i] and not self.given[i]]
+
+    def answers(self, state: _State) -> bool:
+        """Whether every part knows its force or flow in this state."""
+        return self._keep_states(state.y) and bool(
+            at_rest(
+                *self._rows, self.h, state.y, state.p, self.force, self.inflow, self.size, self.code
+            )
+        )
+
+    def evaluate(self, state: _State) -> bool:
+        """Forces and flows with their slopes, contacts included; False if a part fails."""
+        found = self._keep_states(state.y) and slopes_at_rest(
+            *self._rows,
+            self.h,
+            self.move,
+            state.y,
+            state.p,
+            self.free,
+            self.force,
+            self.inflow,
+            self.size,
+            self.by_port,
+            self.by_pressure,
+            self.code,
+        )
+        if not found:
+            return False
+        self._slopes_of_kept_states(state)
+        self.elements = self.force.copy()
+        for c, (force, slope) in enumerate(self.contacts(state.y)):
+            u, low = self.network.interfaces.upper[c], self.network.interfaces.lower[c]
+            self.contact_force[c] = force
+            for port, sign in ((u, 1.0), (low, -1.0)):
+                if port < self.ports:
+                    self.force[port] += sign * force
+                    self.size[port] += force
+                    for other, side in ((u, 1.0), (low, -1.0)):
+                        if other < self.ports:
+                            self.by_port[port, other] += sign * side * slope
+        return True
+
+    def contacts(self, y: Vector) -> list[tuple[float, float]]:
+        """Force of every contact [N] and its change with the gap [N/m]."""
+        interfaces = self.network.interfaces
+        gap = interfaces.gap0 + y[interfaces.upper] - y[interfaces.lower]
+        kinds = zip(interfaces.kind, interfaces.law0, interfaces.series, gap, strict=True)
+        return [
+            _contact(int(kind), interfaces.law, int(first), float(series), float(g))
+            for kind, first, series, g in kinds
+        ]
+
+    def _keep_states(self, y: Vector) -> bool:
+        """Give every element that says so the state in which it stays; False if it has none."""
+        elements = self.network.elements
+        for k, state_at in self.kept:
+            ports = elements.ports[elements.port0[k] : elements.port0[k + 1]]
+            try:
+                state = state_at(y[ports])
+            except (ConvergenceError, np.linalg.LinAlgError):
+                self.code[:] = 0, k, 1
+                return False
+            elements.state[elements.state0[k] : elements.state0[k] + len(state)] = state
+        return True
+
+    def _slopes_of_kept_states(self, state: _State) -> None:
+        """Repeat the slopes with those ports whose motion changes such a state."""
+        elements = self.network.elements
+        force, inflow = self.force.copy(), self.inflow.copy()
+        size = self.size.copy()
+        for k, _ in self.kept:
+            for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
+                if port == self.ports:
+                    continue
+                moved = state.copy()
+                moved.y[port] += self.move
+                if self.answers(moved):
+                    self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
+                    self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
+        if self.kept:
+            self._keep_states(state.y)
+        self.force[:], self.inflow[:], self.size[:] = force, inflow, size
+
+    def _moved(self, state: _State, change: Vector) -> _State:
+        n, r, f = self.ports, self.of_body.size, self.free.size
+        after = state.copy()
+        after.y[:n] += change[:n]
+        after.z += change[n : n + r]
+        after.p[self.free] += change[n + r : n + r + f]
+        after.m += change[n + r + f :]
+        return after
+
+    def _bent(self, state: _State) -> Vector:
+        bent = state.y[:-1] - self.shapes.T @ state.z - self.compliance @ self.force[:-1]
+        return np.asarray(bent)
+
+    def _net(self, state: _State) -> Vector:
+        """Mass that flows into each free volume [kg/s]; an enclosed one lets none through."""
+        inflow = self.inflow.copy()
+        np.add.at(inflow, self.ends[:, 0], -state.m)
+        np.add.at(inflow, self.ends[:, 1], state.m)
+        return np.where(self.shut, 0.0, inflow[self.free])
+
+    def _columns_left(self, state: _State) -> tuple[Vector, Vector]:
+        """What accelerates each column [J/kg], and the sum of what it is the difference of."""
+        g = [self._fluid(state.p[i])[2] for pair in self.ends for i in pair]
+        pair = np.array(g).reshape(-1, 2)
+        drop = self.friction * state.m
+        return drop - (pair[:, 0] - pair[:, 1]), np.abs(drop) + np.abs(pair).sum(axis=1)
+
+    def _fluid(self, p: float) -> tuple[float, float, float]:
+        rho, slope, g, _ = fluid_at(self.network.nodes.fluid, p, 0)
+        return rho, slope, g
+
+    def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
+        """Mass in each free volume [kg], its change with the pressure, and the density."""
+        volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
+        fluid = np.array([self._fluid(state.p[i])[:2] for i in self.free]).reshape(-1, 2)
+        return volume * fluid[:, 0], volume * fluid[:, 1], fluid[:, 0]
+
+    def volumes(self, y: Vector) -> Vector:
+        """Volume of every node [m^3] with the walls at these displacements."""
+        nodes = self.network.nodes
+        volume = np.zeros(nodes.p.size)
+        volume[: nodes.volumes] = nodes.volume
+        np.add.at(volume, nodes.wall_node, nodes.wall_area * y[nodes.wall_port])
+        return volume
+
+    def _newton(
+        self, state: _State, start: _State, creep: Vector, mass: Vector, tau: float
+    ) -> Vector:
+        """Change of all unknowns by one Newton step."""
+        n, r, f, c = self.ports, self.of_body.size, self.free.size, len(self.ends)
+        force_y, flow_y = self.by_port[:n], self.by_port[n + 1 :][self.free]
+        force_p, flow_p = self.by_pressure[:n, :f], self.by_pressure[n + 1 :, :f][self.free]
+        through = np.where(self.shut, 0.0, tau)[:, None]
+        A, left = np.zeros((n + r + f + c, n + r + f + c)), np.zeros(n + r + f + c)
+        Y, Z, P = slice(0, n), slice(n, n + r), slice(n + r, n + r + f)
+        M = slice(n + r + f, n + r + f + c)
+        A[Y, Y] = np.eye(n) - self.compliance @ force_y
+        A[Y, Z] = -self.shapes.T
+        A[Y, P] = -self.compliance @ force_p
+        left[Y] = self._bent(state)
+        A[Z, Y] = -creep[:, None] * (self.shapes @ force_y)
+        A[Z, Z] = np.eye(r)
+        A[Z, P] = -creep[:, None] * (self.shapes @ force_p)
+        left[Z] = state.z - start.z - creep * (self.shapes @ self.force[:-1])
+        now, by_p, density = self._masses(state)
+        A[P, Y] = -through * flow_y
+        if self.enclosed:
+            nodes = self.network.nodes
+            for i, port, area in zip(
+                nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True
+            ):
+                for j in np.flatnonzero(self.free == i):
+                    if port < n:
+                        A[n + r + j, port] += area * density[j]
+        A[P, P] = np.diag(by_p) - through * flow_p
+        left[P] = now - mass - through[:, 0] * self._net(state)
+        for k, pair in enumerate(self.ends):
+            for sign, i in zip((1.0, -1.0), pair, strict=True):
+                for j in np.flatnonzero(self.free == i):
+                    A[n + r + j, M.start + k] += sign * through[j, 0]
+                    A[M.start + k, n + r + j] -= sign / self._fluid(state.p[i])[0]
+            A[M.start + k, M.start + k] = self.friction[k]
+        left[M] = self._columns_left(state)[0]
+        A *= self.units
+        scale = np.max(np.abs(A), axis=1)
+        scale[scale == 0.0] = 1.0
+        A /= scale[:, None]
+        try:
+            change = np.linalg.solve(A, -left / scale)
+        except np.linalg.LinAlgError:
+            change = np.linalg.lstsq(A, -left / scale, rcond=None)[0]
+        return np.asarray(change * self.units)
+
+    def failed(self) -> ConvergenceError:
+        """Error of the part that knows no answer at the start."""
+        head, k, status = (int(value) for value in self.code)
+        rows = self.network.rows
+        failed = rows.branches[k] if head else rows.elements[k]
+        errors = getattr(failed.step, "errors", [])
+        if errors:
+            raise errors.pop(0)
+        words = failed.failures.get(status, f"status {status} of its step function")
+        return ConvergenceError(
+            f"static start: {failed.component}: {words}.\n"
+            "Try: look whether its parameters and start values make sense."
+        )
+
+    def left_on_bodies(self) -> dict[str, float]:
+        """Force that is left on each free body [N]."""
+        left = self.shapes @ self.force[:-1]
+        result = {}
+        for b, row in enumerate(self.network.rows.bodies):
+            mine = left[self.of_body == b]
+            if mine.size:
+                result[row.component] = float(mine @ row.body.rigid_axial)
+        return result
+
+    def not_found(self, state: _State) -> ConvergenceError:
+        """Error of a network that comes to no end."""
+        if not self.evaluate(state):
+            return self.failed()
+        left = self.left_on_bodies()
+        name = max(left, key=lambda key: abs(left[key])) if left else "the network"
+        force = format_si(abs(left.get(name, 0.0)), "N", 3)
+        return ConvergenceError(
+            f"static start: no equilibrium was found; {force} are left on '{name}' at a "
+            f"displacement of {format_si(float(np.max(np.abs(state.y))), 'm', 3)}.\n"
+            "Try: look for a body that nothing holds in the direction of its force, a magnet that "
+            "is stronger than what holds against it, or a gap outside its map; in Python, "
+            "start='free' leaves the static start out."
+        )
+
+    def put(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+        """Put the network into this state, and say where that is."""
+        if not self.evaluate(state):
+            raise self.failed()
+        self._put_bodies(state)
+        if state.p.size:
+            self._put_fluid(state)
+        self._put_interfaces(state)
+        return self._told(state, notes)
+
+    def _put_bodies(self, state: _State) -> None:
+        network = self.network
+        bodies = network.bodies
+        at, ports = bodies.at, self.ports
+        for row in (Y0, SEEN):
+            at[row : row + ports] = state.y[:-1]
+        for row in (LAST, BEFORE):
+            at[row : row + ports] = self.force[:-1]
+        at[ELEMENTS_BEFORE : ELEMENTS_BEFORE + ports] = self.elements[:-1]
+        begin, mode = 0, 0
+        for b, body_row in enumerate(network.rows.bodies):
+            body, r = body_row.body, body_row.body.rigid_count
+            here = slice(begin, begin + len(body_row.ports))
+            q = np.asarray(body.port_shapes) @ self.force[:-1][here]
+            q[r:] /= body.omega[r:] ** 2
+            q[:r] = state.z[mode : mode + r]
+            for k in range(network.body_blocks[b], network.body_blocks[b + 1]):
+                part = q[ROW * (k - network.body_blocks[b]) :][:ROW]
+                place = bodies.start[k] + ROW * ROW_Q
+                bodies.fine[place : place + part.size] = part
+            begin, mode = here.stop, mode + r
+
+    def _put_fluid(self, state: _State) -> None:
+        network = self.network
+        nodes, branches = network.nodes, network.branches
+        for i, p in enumerate(state.p):
+            nodes.p[i] = nodes.before[i] = p
+            rho, _, nodes.g[i], nodes.hint[i] = fluid_at(nodes.fluid, p, 0)
+            if i < nodes.volumes:
+                held = nodes.held[i] = self.volumes(state.y)[i]
+                if held <= 0.0:
+                    raise _emptied(network, i, float(held))
+                nodes.mass[i] = rho * held
+        for k in range(branches.function.size):
+            count = branches.states[k]
+            after = branches.output0[k] + 3 + branches.port0[k + 1] - branches.port0[k]
+            if self.column_rows[k] == 0:
+                begin = branches.state0[k]
+                branches.state[begin : begin + count] = branches.outputs[after : after + count]
+        lines = np.zeros(len(network.rows.lines))
+        for place, m in enumerate(state.m):
+            if place < len(self.column_branch):
+                branches.state[branches.state0[self.column_branch[place]]] = m
+            else:
+                line = self.column_line[place - len(self.column_branch)]
+                lines[line] = m / nodes.density
+        if lines.size:
+            pressure = nodes.density * nodes.g[nodes.end_node]
+            start_lines(network.lines, network.line_state, pressure, lines)
+
+    def _put_interfaces(self, state: _State) -> None:
+        network = self.network
+        interfaces, rows = network.interfaces, network.rows
+        interfaces.force[:] = self.contact_force
+        interfaces.gap[:] = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
+        interfaces.rate[:] = 0.0
+        interfaces.e[:] = interfaces.series * interfaces.force  # in equilibrium with the contacts
+        closed = interfaces.gap + interfaces.e < 0.0
+        interfaces.since[closed] = -np.inf
+        owner = {handle: row for row in rows.bodies for handle in row.ports}
+        for c, touching in enumerate(rows.interfaces):
+            pair = (owner.get(touching.upper), owner.get(touching.lower))
+            chi = resting_dissipation(touching, pair, -float(interfaces.gap[c] + interfaces.e[c]))
+            damped = bool(closed[c]) and interfaces.alpha[c] > 0.0
+            # 0 would be for "not touched yet"
+            interfaces.chi[c] = chi or (_UNDAMPED if damped else 0.0)
+
+    def _told(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+        network = self.network
+        nodes, rows = network.nodes, network.rows
+        names = [rows.nodes[handle].component for handle in network.node_order]
+        flow = {
+            " ".join(filter(None, (row.component, row.label))): float(
+                network.branches.outputs[network.branches.output0[k]]
+            )
+            for k, row in enumerate(rows.branches)
+            if self.column_rows[k] == 0
+        }
+        columns = [rows.branches[k].component for k in self.column_branch]
+        columns += [rows.lines[k].component for k in self.column_line]
+        flow |= {name: float(m) for name, m in zip(columns, state.m, strict=True)}
+        return StaticStart(
+            displacement={
+                f"{name.component}.{name.port}": float(y)
+                for name, y in zip(network.ports, state.y[:-1], strict=True)
+            },
+            pressure={names[i]: float(state.p[i]) for i in range(nodes.volumes)},
+            stated={names[i]: bool(self.stated[i]) for i in range(nodes.volumes)},
+            flow=flow,
+            residual=self.left_on_bodies(),
+            notes=(*notes, *self._closed(names)),
+        )
+
+    def _closed(self, names: list[str]) -> tuple[str, ...]:
+        """Words for volumes without a stated pressure that nothing fills or empties."""
+        first = self.ports + 1
+        told = []
+        for j, i in enumerate(self.free):
+            column = self.by_pressure[first + i, j] != 0.0 or bool(np.any(self.ends == i))
+            if not column and not self.given[i]:
+                told.append(
+                    f"'{names[i]}' is closed at the start: it begins at ambient pressure; "
+                    "state its 'pressure' if it holds another."
+                )
+        return tuple(told)
+
+
+def _contact(kind: int, law: Vector, first: int, series: float, gap: float) -> tuple[float, float]:
+    """Force of a contact at rest [N] and its change with the gap [N/m]."""
+    if kind == NO_LAW or gap >= 0.0:
+        return 0.0, 0.0
+    low, high, d = 0.0, -gap, -gap
+    force = stiffness = 0.0
+    for _ in range(_MOST_NEWTON):
+        force, half, _interval = mean_force(kind, law, first, d, d, 0)
+        stiffness = 2.0 * half
+        excess = d + series * force + gap
+        if excess > 0.0:
+            high = d
+        else:
+            low = d
+        after = d - excess / (1.0 + series * stiffness)
+        if not low <= after <= high:
+            after = 0.5 * (low + high)
+        if after == d or series == 0.0:
+            break
+        d = after
+    return force, -stiffness / (1.0 + series * stiffness)
+
+
+def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
+    names = [f"'{network.rows.bodies[b].component}'" for b in bodies]
+    return InputError(
+        "static start",
+        got=f"{' and '.join(names)}, which nothing holds against the forces at time zero",
+        expected="a spring, a stop or enclosed fluid in the direction of the force",
+        hint="look at the signs of preloads and forces (positive opens; the preload of a spring "
+        "closes), add a stop, let the force begin later, or give the body a 'speed': then it "
+        "starts in flight.",
+    )
+
+
+def _no_pressure(network: CompiledNetwork, node: int) -> str:
+    name = network.rows.nodes[network.node_order[node]].component
+    return (
+        f"'{name}' has no steady pressure: what flows there at time zero cannot flow on. It starts "
+        "at ambient pressure; state its 'pressure' if it holds another."
+    )
+
+
+def _emptied(network: CompiledNetwork, node: int, volume: float) -> InputError:
+    name = network.rows.nodes[network.node_order[node]].component
+    return InputError(
+        f"components.{name}.volume",
+        got=f"{format_si(volume, 'm^3', 3)} with its walls where they start",
+        expected="more than 0 m^3",
+        hint="enlarge it: it is the volume while all faces are at displacement 0.",
+    )
