@@ -105,6 +105,25 @@ def test_the_page_of_the_how_to_prints_the_right_number():
         assert line.strip() in ("...", "") or line in case
 
 
+def test_the_page_of_the_how_to_shows_the_times_of_the_json(numbers):
+    text = (HOW_TO / "stroke.md").read_text(encoding="utf-8")
+    wet = numbers["variants"]["wet"]
+    shown = json.loads("{" + re.findall(r"```json\n(.*?)```", text, re.DOTALL)[0] + "}")
+
+    for key in ("starts", "lift_between_stops", "bodies"):
+        assert shown[key] == wet[key]
+    assert (shown["lift_m"], shown["opening_time_s"]) == pytest.approx(
+        (wet["lift_m"], wet["opening_time_s"]), rel=5e-3
+    )
+    for way in ("opening", "closing"):
+        row = re.search(rf"needle +{way} +([\d. ]+) +\w+\n", text)[1].split()
+        keys = ("at_10_percent_s", "at_50_percent_s", "at_90_percent_s", "touch_s")
+        assert wet[way]["stop"] == shown[way]["stop"]
+        for key, value in zip(keys, row, strict=True):
+            assert float(value) == pytest.approx(1e3 * wet[way][key], abs=2e-4)
+            assert shown[way][key] == pytest.approx(wet[way][key], rel=1e-2)
+
+
 def test_what_does_not_exist_is_null(capsys):
     # the needle is still on its way
     words = ["--duration", "100 us", "--variant", "dry", "--json", "-", "--no-report"]
@@ -115,6 +134,8 @@ def test_what_does_not_exist_is_null(capsys):
     assert (found["opening_time_s"], found["closing_time_s"], found["events"]) == (None, None, [])
     assert list(found["variants"]) == ["dry"]
     assert "no impacts" in err
+    assert found["closing"]["touch_s"] is None
+    assert "not reached" in err
     assert "klack-results/small_valve: result.zarr\n" in err
 
 

@@ -135,7 +135,7 @@ run: {duration: 8 ms, step: 200 ns, record: 2 us, variants: [dry], lift: needle.
 def chain():
     case = read_valve_case(CHAIN, Path("chain.yaml"))
     rows = case.network.network().rows()
-    result = simulate_network(rows, duration=8e-3, step=200e-9, record=2e-6)
+    result = simulate_network(rows, duration=8e-3, step=50e-9, record=2e-6)
     return case, result, all_lift_times(result, rows, "needle", "tip")
 
 

@@ -28,6 +28,7 @@ from klack.workflow.stroke_study import (
     StrokeStudy,
     StrokeVariant,
 )
+from klack.workflow.stroke_times import LiftTimes, Passage
 from klack.workflow.study import BodySummary
 
 
@@ -79,7 +80,22 @@ def result() -> NetworkResult:
 
 @pytest.fixture
 def study() -> StrokeStudy:
-    variant = fill(StrokeVariant, name="wet", result=result(), opening_time=float("nan"))
+    times = LiftTimes(
+        body="needle",
+        starts="closed",
+        lift=1e-4,
+        between_stops=True,
+        opening=Passage(at_10=1e-4, at_50=1.5e-4, stop="opening"),
+        closing=Passage(at_50=5e-4, at_10=5.5e-4, stop="seat", touch=6e-4),
+    )
+    variant = fill(
+        StrokeVariant,
+        name="wet",
+        result=result(),
+        opening_time=None,
+        closing_time=6e-4,
+        times=(times, replace(times, body="piston", lift=None)),
+    )
     return fill(
         StrokeStudy,
         versions={"numpy": "2.0"},

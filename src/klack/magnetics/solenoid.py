@@ -151,14 +151,14 @@ class Solenoid(Component):
     def gap_range(self) -> GapRange:
         """Gaps [m] from touching poles to where a pole is no wider than its gap.
 
-        A contact that gives way closes some of the residual gap as well: warned of from a tenth,
+        A contact that gives way closes some of the residual gap as well: warned of from a quarter,
         at half of it the run stops.
         """
         widest = max(pole.outer_radius for pole in self.poles)
         end = max(widest, 2.0 * self.gap + self.residual_gap)
         return GapRange(
             valid=(0.0, end),
-            slack=0.1 * self.residual_gap,
+            slack=0.25 * self.residual_gap,
             usable=(-0.5 * self.residual_gap, 2.0 * end),
         )
 
