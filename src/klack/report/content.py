@@ -304,7 +304,7 @@ def _computed(study: ImpactStudy) -> Section:
     contact, law = study.contact, study.law
     facts = [
         ("surfaces", contact.surfaces),
-        ("closing speed", f"{study.speed:.4g} m/s"),
+        ("speed at the start", f"{study.speed:.4g} m/s"),
         ("gap at the start", quantity(study.gap, "m", 3)),
     ]
     if contact.points:  # none where bodies meet at ports

@@ -296,7 +296,9 @@ def _certificate(
 def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> None:
     """Take the run behind the estimates among the levels, where it puts the best of them right."""
     level, best = certificate.level, best_level(results)
-    if level is None or level.doubts or certificate.spread > SETTLED or best not in ("reduced",):
+    if level is None or level.doubts or certificate.spread > SETTLED:
+        return
+    if best not in certificate.estimates:
         return
     if disagreement(certificate.estimates[best]) > DISAGREEMENT:
         results["interface"] = replace(level, label=f"{level.label}, run for the estimate")

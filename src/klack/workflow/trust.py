@@ -48,9 +48,10 @@ def best_level(results: Mapping[str, LevelResult]) -> str:
     results : mapping of str to LevelResult
         Not empty.  The lumped model and variants of the reduced one are never better than another.
     """
-    known = [name for name in _BEST if name in results]
-    sound = [name for name in known if not results[name].doubts]
-    return next(iter([*sound, *known, *results]))
+    variants = [name for name in results if name.startswith("reduced")]
+    known = [name for name in (*_BEST, *variants, *results) if name in results]
+    sound = [name for name in known if not results[name].doubts and name != "lumped"]
+    return next(iter([*sound, *known]))
 
 
 def disagreement(deviation: Deviation) -> float:
@@ -89,8 +90,14 @@ def trust_notes(
         notes.append(
             f"the answer is that of level '{answer}'; {_named(finer)} is no reference, see above."
         )
-    for name in _ALTERNATIVES:
-        if name in deviations and disagreement(deviations[name]) > DISAGREEMENT:
+    others = {name: result for name, result in results.items() if name != answer}
+    second = best_level(others) if others else answer
+    for name in dict.fromkeys((*_ALTERNATIVES, second)):
+        if (
+            name in deviations
+            and name != "lumped"
+            and disagreement(deviations[name]) > DISAGREEMENT
+        ):
             notes.append(_verdict(name, deviations[name], answer, results[answer]))
     return tuple(notes)
 
