@@ -66,7 +66,10 @@ def test_the_run_behind_the_estimate_is_the_answer_where_it_is_better():
     assert study.reference == "interface"
     assert study.ordered[0].level == "interface"
     assert abs(study.deviations["reduced"].peak_force) > 0.1
-    assert any("do not rely on level 'reduced'" in note for note in study.warnings)
+    assert any(
+        "The answer is that of level 'interface', not that of level 'reduced'" in note
+        for note in study.warnings
+    )
     found = study.levels["interface"].measures
     truth = both().levels["full"].measures
     assert found.peak_force == pytest.approx(truth.peak_force, rel=0.005)

@@ -115,7 +115,7 @@ def _verdict(name: str, apart: Deviation, answer: str, best: LevelResult) -> str
         f"level '{name}' is off by {100 * apart.peak_force:+.1f} % in peak force, "
         f"{100 * apart.contact_time:+.1f} % in contact time and {apart.restitution:+.4f} in "
         f"restitution from level '{answer}' ({best.label}). The answer is that of level "
-        f"'{answer}'; do not rely on level '{name}' for this impact."
+        f"'{answer}', not that of level '{name}'."
     )
 
 
