@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from klack.cli.notes import ends_in_contact
+from klack.report.content import report_content
 from klack.report.wording import answer, listed, quantity, share, signed, signed_share
 from klack.workflow.study import ImpactStudy
-from klack.workflow.summary import SUMMARY_COLUMNS, study_to_json, summary_rows
+from klack.workflow.summary import SUMMARY_COLUMNS, answer_line, study_to_json, summary_rows
 
 
 def plain(text: str) -> str:
@@ -77,8 +77,46 @@ def test_a_rebound_that_loses_little_is_not_rounded_to_none(lonely_study: Impact
     assert "rebounds with 99.97\N{NO-BREAK SPACE}% of its speed" in said
 
 
-def test_a_run_that_ends_in_the_contact_says_so(lonely_study: ImpactStudy) -> None:
-    assert ends_in_contact(with_restitution(lonely_study, 0.9).levels) == ()
-    (note,) = ends_in_contact(with_restitution(lonely_study, float("nan")).levels)
-    assert note.startswith("reduced: the run ends before the bodies have parted.")
-    assert "run.duration" in note
+def test_a_run_that_ends_in_the_contact_says_so_everywhere(lonely_study: ImpactStudy) -> None:
+    """Terminal, report, JSON: no peak, contact time or impulse that was not reached."""
+    study = with_restitution(lonely_study, float("nan"))
+    row = summary_rows(study)[0]
+    assert all(cell.endswith(" (cut off)") for cell in row[1:4])
+    assert "cut off in contact" in answer_line(study)
+    assert "still in contact when the record ends" in answer(study)
+
+    numbers = json.loads(json.dumps(study_to_json(study), allow_nan=False))["levels"]["reduced"]
+    assert numbers["cut_off"] is True
+    cut = ("peak_force_N", "contact_time_s", "impulse_Ns", "restitution", "total_contact_time_s")
+    assert all(numbers[key] is None for key in cut)
+    assert numbers["highest_force_N"] > 0.0
+
+    table = report_content(study).numbers
+    cells = {row[0]: row[1] for row in table.rows}
+    assert all("(cut off)" in cells[key] for key in ("peak force", "contact time", "impulse"))
+    assert "cut off" in table.columns[1]
+
+
+def test_peak_and_contact_time_of_several_contacts_are_told_apart(
+    lonely_study: ImpactStudy,
+) -> None:
+    level = lonely_study.levels["reduced"]
+    measures = replace(level.measures, sub_contacts=3, strongest=2)
+    study = replace(lonely_study, levels={"reduced": replace(level, measures=measures)})
+    row = summary_rows(study)[0]
+    assert row[1].endswith("(contact 2 of 3)")
+    assert row[2].endswith("(contact 1 of 3)")
+    assert study_to_json(study)["levels"]["reduced"]["strongest_contact"] == 2
+    assert "(contact 2 of 3 in quick succession)" in answer(study)
+    assert "(contact 1 of 3 in quick succession)" in answer(study)
+
+
+def test_restitution_refers_to_the_speed_at_first_touch(lonely_study: ImpactStudy) -> None:
+    """A preload has made 0.8 m/s out of 0.5 m/s on the way."""
+    level = lonely_study.levels["reduced"]
+    measures = replace(level.measures, approach_speed=0.8)
+    study = replace(lonely_study, levels={"reduced": replace(level, measures=measures)})
+    assert "0.8 m/s at first touch" in answer_line(study)
+    assert "0.8 m/s at first touch, 0.5 m/s at the start" in answer(study)
+    assert "at the start" not in answer(lonely_study)
+    assert study_to_json(study)["levels"]["reduced"]["approach_speed_m_s"] == 0.8

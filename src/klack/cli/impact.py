@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import ends_in_contact, print_notes
+from klack.cli.notes import print_notes
 from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
 from klack.cli.output import require_folder, require_json_target, write_json
 from klack.cli.progress import show_progress
@@ -88,7 +88,7 @@ def run_case(
         made = report and failure is None
         _print_study(study, folder, made, to_stderr=str(json) == "-")
     else:
-        print_notes((*study.warnings, *ends_in_contact(study.levels)), to_stderr=True)
+        print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, study_to_json(study))
     if failure:
@@ -98,13 +98,18 @@ def run_case(
 
 def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
     from klack.workflow.stages import stages_with_cached
-    from klack.workflow.summary import SUMMARY_COLUMNS, estimate_lines, summary_rows
+    from klack.workflow.summary import (
+        SUMMARY_COLUMNS,
+        answer_line,
+        estimate_lines,
+        summary_rows,
+    )
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for line in estimate_lines(study):
+    for line in (answer_line(study), *estimate_lines(study)):
         print(line, file=stream)
-    print_notes((*study.warnings, *ends_in_contact(study.levels)), to_stderr=to_stderr)
+    print_notes(study.warnings, to_stderr=to_stderr)
     if cached := stages_with_cached(study.stage_times):
         print(f"With cached results (klack cache): {', '.join(cached)}", file=stream)
     made = ["result.zarr", *(REPORTS if report else ())]

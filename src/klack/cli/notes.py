@@ -1,26 +1,9 @@
 """Notes of a study: printed below its tables, and by a quiet command as well."""
 
 import sys
-from collections.abc import Iterable, Mapping
-from math import isnan
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
-if TYPE_CHECKING:
-    from klack.workflow.study import LevelResult
-
-__all__ = ["ends_in_contact", "print_notes"]
-
-
-def ends_in_contact(levels: Mapping[str, "LevelResult"]) -> tuple[str, ...]:
-    """Say which runs ended before the bodies had parted: their restitution is nan."""
-    names = [name for name, result in levels.items() if isnan(result.measures.restitution)]
-    if not names:
-        return ()
-    return (
-        f"{', '.join(names)}: the run ends before the bodies have parted. Contact time and impulse "
-        "are cut off, and there is no restitution. Try: a longer run.duration, two to three times "
-        "the contact time.",
-    )
+__all__ = ["print_notes"]
 
 
 def print_notes(notes: Iterable[str], *, to_stderr: bool) -> None:

@@ -70,6 +70,8 @@ class ImpactMeasures:
         Largest force of any integration step.
     peak_time : float [s]
         Counted from first touch.
+    strongest : int
+        Which contact of the cluster has the peak force, counted from 1.
     first_touch : float [s]
     contact_time : float [s]
         First touch to the end of the first contact.
@@ -110,6 +112,15 @@ class ImpactMeasures:
     dissipated_share: float
     vibration_share: float
     impacts: int
+    strongest: int = 1
+
+    @property
+    def cut_off(self) -> bool:
+        """Tell whether the record ends before the bodies have parted.
+
+        Peak force, contact time and impulse are then those of the part that was recorded.
+        """
+        return self.restitution != self.restitution
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,6 +235,7 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> Impact
         dissipated_share=lost / approach_energy,
         vibration_share=1.0 - e**2 - lost / approach_energy,
         impacts=len(clusters),
+        strongest=cluster.index(strongest) + 1,
     )
 
 

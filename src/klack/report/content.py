@@ -19,8 +19,19 @@ from klack.report.pressure_figure import pressure_figure
 from klack.report.pressure_view import study_views
 from klack.report.pressure_wording import pressure_rows
 from klack.report.section_figure import section_figure
-from klack.report.wording import answer, count, listed, quantity, share, signed, signed_share
+from klack.report.wording import (
+    answer,
+    count,
+    listed,
+    quantity,
+    sentence,
+    share,
+    signed,
+    signed_share,
+    which_contact,
+)
 from klack.workflow.study import BodySummary, ImpactStudy, LevelResult
+from klack.workflow.summary import no_estimate
 
 __all__ = [
     "Content",
@@ -196,10 +207,33 @@ def _number_table(study: ImpactStudy) -> Table:
         rows.append((title, *cells))
     rows += _comparison_rows(study, names)
     heads = [
-        result.label + ("\n(reference)" if name == study.reference and len(names) > 1 else "")
-        for name, result in zip(names, results, strict=True)
+        result.label + _standing(study, name) for name, result in zip(names, results, strict=True)
     ]
     return Table(columns=("", *heads), rows=tuple(rows))
+
+
+def _standing(study: ImpactStudy, name: str) -> str:
+    """What a level is for the others, below its name."""
+    result = study.levels[name]
+    if result.measures.cut_off:
+        return "\n(cut off)"
+    if result.doubts:
+        return "\n(no reference, see warnings)"
+    return "\n(reference)" if name == study.reference and len(study.levels) > 1 else ""
+
+
+def _peak_cell(result: LevelResult) -> str:
+    m = result.measures
+    return quantity(m.peak_force, "N") + which_contact(m, m.strongest) + _cut(result)
+
+
+def _time_cell(result: LevelResult) -> str:
+    m = result.measures
+    return quantity(m.contact_time, "s") + which_contact(m, 1) + _cut(result)
+
+
+def _cut(result: LevelResult) -> str:
+    return " (cut off)" if result.measures.cut_off else ""
 
 
 _ROUND_OFF = 1e-12
@@ -215,20 +249,25 @@ _KEY_NUMBERS: tuple[
 ] = (
     (
         "peak force",
-        lambda r: quantity(r.measures.peak_force, "N"),
+        _peak_cell,
         ("peak_force", signed_share),
     ),
     (
         "contact time",
-        lambda r: quantity(r.measures.contact_time, "s"),
+        _time_cell,
         ("contact_time", signed_share),
     ),
-    ("impulse", lambda r: quantity(r.measures.impulse, "N s"), ("impulse", signed_share)),
+    (
+        "impulse",
+        lambda r: quantity(r.measures.impulse, "N s") + _cut(r),
+        ("impulse", signed_share),
+    ),
     (
         "restitution",
         lambda r: f"{r.measures.restitution:.4f}" if np.isfinite(r.measures.restitution) else "–",
         ("restitution", lambda value: signed(value, 4)),
     ),
+    ("speed at first touch", lambda r: quantity(r.measures.approach_speed, "m/s"), None),
     ("rebound speed", lambda r: quantity(r.measures.rebound_speed, "m/s"), None),
     ("vibration left behind", lambda r: share(r.measures.vibration_share), None),
     ("contacts in the impact", lambda r: str(r.measures.sub_contacts), None),
@@ -265,7 +304,7 @@ def _computed(study: ImpactStudy) -> Section:
     contact, law = study.contact, study.law
     facts = [
         ("surfaces", contact.surfaces),
-        ("closing speed", f"{study.speed:.4g} m/s"),
+        ("speed at the start", f"{study.speed:.4g} m/s"),
         ("gap at the start", quantity(study.gap, "m", 3)),
     ]
     if contact.points:  # none where bodies meet at ports
@@ -286,6 +325,8 @@ def _computed(study: ImpactStudy) -> Section:
 
 def _estimates(study: ImpactStudy) -> Section:
     title = "How good is the reduced level?"
+    if reason := no_estimate(study):
+        return Section(title=title, paragraphs=(sentence(reason),))
     if not study.estimates:
         return Section(title=title)
     return Section(

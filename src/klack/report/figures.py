@@ -106,7 +106,7 @@ def _since_touch(result: LevelResult, time: Floats) -> Floats:
 
 
 def force_chart(study: ImpactStudy) -> Chart:
-    """Contact force of all levels, and their difference from the reference below."""
+    """Contact force of all levels; below, the difference of those that are compared."""
     results = study.ordered
     longest = max(result.measures.total_contact_time for result in results)
     limits = (-0.08e6 * longest, 1.25e6 * longest)
@@ -117,7 +117,7 @@ def force_chart(study: ImpactStudy) -> Chart:
         time = _since_touch(result, result.history.time)
         seen = (time >= limits[0]) & (time <= limits[1])
         curves.append(_level_curve(time[seen], result.history.force[seen], result))
-        if result is not reference:
+        if result is not reference and result.level in study.deviations:
             expected = np.interp(
                 time[seen], _since_touch(reference, reference.history.time), reference.history.force
             )

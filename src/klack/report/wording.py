@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import floor, isfinite, log10
 
-from klack.contact.restitution import Deviation
+from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = [
@@ -17,10 +17,14 @@ __all__ = [
     "signed",
     "signed_share",
     "verdict",
+    "which_contact",
 ]
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
+_SAME_SPEED = 5e-4
+"""Relative change of the approach speed that three digits do not show."""
+
 _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
 
@@ -121,19 +125,24 @@ def answer(study: ImpactStudy) -> str:
     numbers = reference.measures
     text = (
         f"The {needle.name} ({quantity(1e3 * needle.mass, 'g', 3)}, "
-        f"{study.speed:.3g} m/s) hits the {partner.name} with a peak force of "
-        f"{quantity(numbers.peak_force, 'N', 3)}, stays in contact for "
-        f"{quantity(numbers.contact_time, 's', 3)}"
+        f"{numbers.approach_speed:.3g} m/s at first touch{_started(study, numbers)}) hits the "
+        f"{partner.name} "
     )
-    if numbers.sub_contacts > 1:
-        text += f" (the first of {numbers.sub_contacts} contacts in quick succession)"
-    if isfinite(numbers.restitution):
+    if numbers.cut_off:
         text += (
-            f" and rebounds with {share(numbers.restitution, 2)} of its speed; "
-            f"{share(numbers.vibration_share)} of the impact energy is left behind as vibration. "
+            "and is still in contact when the record ends, "
+            f"{quantity(numbers.contact_time, 's', 3)} after first touch: the force has reached "
+            f"{quantity(numbers.peak_force, 'N', 3)} by then, and peak force, contact time, "
+            "impulse and restitution are cut off. "
         )
     else:
-        text += "; the record ends before it has left. "
+        text += (
+            f"with a peak force of {quantity(numbers.peak_force, 'N', 3)}"
+            f"{which_contact(numbers, numbers.strongest)}, stays in contact for "
+            f"{quantity(numbers.contact_time, 's', 3)}{which_contact(numbers, 1)} and rebounds "
+            f"with {share(numbers.restitution, 2)} of its speed at first touch; "
+            f"{share(numbers.vibration_share)} of the impact energy is left behind as vibration. "
+        )
     text += f"These numbers come from the {_called(study.reference)} run"
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
@@ -142,9 +151,23 @@ def answer(study: ImpactStudy) -> str:
     text += "."
     if "reduced" in study.deviations:
         text += f" {verdict(study.levels['reduced'], study.deviations['reduced'])}"
-    elif study.reference == "reduced" and "reduced" in study.estimates:
+    elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:
         text += f" {_estimated(study.estimates['reduced'])}"
     return text
+
+
+def which_contact(numbers: ImpactMeasures, number: int) -> str:
+    """Which contact of several in one impact a number belongs to, in brackets; empty for one."""
+    if numbers.sub_contacts < 2:
+        return ""
+    return f" (contact {number} of {numbers.sub_contacts} in quick succession)"
+
+
+def _started(study: ImpactStudy, numbers: ImpactMeasures) -> str:
+    """Speed at the start, where forces have changed it on the way."""
+    if abs(numbers.approach_speed / study.speed - 1.0) < _SAME_SPEED:
+        return ""
+    return f", {study.speed:.3g} m/s at the start"
 
 
 def verdict(result: LevelResult, deviation: Deviation) -> str:

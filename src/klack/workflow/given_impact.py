@@ -26,6 +26,7 @@ from klack.workflow.levels import deviations, elastic_count, level_result, lumpe
 from klack.workflow.progress import Progress
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.study import ContactSummary, ImpactStudy, LawSummary, LevelResult
+from klack.workflow.trust import best_level, trust_notes
 
 __all__ = ["run_given_impact"]
 
@@ -66,7 +67,8 @@ def run_given_impact(
             else:
                 results[level] = _reduced(case, pair, clock.spent(("bodies",)))
         clock("reduced", 1.0)
-    reference = "reduced" if "reduced" in results else next(iter(results))
+    reference = best_level(results)
+    compared = deviations(results, reference)
     peak = results[reference].measures.peak_force
     return ImpactStudy(
         case=case.name,
@@ -85,8 +87,8 @@ def run_given_impact(
         law=_law(pair, peak),
         levels=results,
         reference=reference,
-        deviations=deviations(results, reference),
-        warnings=tuple(notes),
+        deviations=compared,
+        warnings=(*notes, *trust_notes(results, reference, compared)),
     )
 
 

@@ -1,7 +1,7 @@
 """``klack impact``: one dry impact at the levels asked for, laid over each other."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from time import perf_counter
@@ -21,6 +21,7 @@ from klack.errors import InputError
 from klack.reduction.reduce import Correction
 from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
+from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.given_impact import run_given_impact
 from klack.workflow.interface_level import (
@@ -51,9 +52,16 @@ from klack.workflow.levels import (
 from klack.workflow.problem import ContactProblem, build_problem
 from klack.workflow.progress import Progress, silent
 from klack.workflow.section import section_picture
-from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings, warnings_of
+from klack.workflow.stages import (
+    LIBRARIES,
+    StageClock,
+    collected_warnings,
+    for_comparison,
+    warnings_of,
+)
 from klack.workflow.structures import impact_structures
 from klack.workflow.study import (
+    SETTLED,
     BodySummary,
     ContactSummary,
     ImpactStudy,
@@ -62,6 +70,7 @@ from klack.workflow.study import (
     SectionPicture,
 )
 from klack.workflow.transfer import TRANSFER_MODES, compare_transfer
+from klack.workflow.trust import DISAGREEMENT, best_level, disagreement, trust_notes
 
 __all__ = ["run_impact"]
 
@@ -105,12 +114,14 @@ def run_impact(
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
-    _require_time_to_touch(case)
+    _require_time_to_touch(case, case.contact.gap)
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
     clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
+        _require_time_to_touch(case, problem.case.contact.gap)
+        case = problem.case
         needed = [1]
         if case.run.transfer is not None:
             needed.append(TRANSFER_MODES)
@@ -124,10 +135,13 @@ def run_impact(
         with warnings_of("modes of the case"):
             preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
-        classical = classical_stiffness(problem, peak)
-        own = preview
-        if isinstance(case.contact.local_law, SubmodelLocalLaw):  # no other law asks for it
+        own, classical = preview, None
+        if isinstance(case.contact.local_law, SubmodelLocalLaw):
+            classical = classical_stiffness(problem, peak)
             own = own_pair(problem, pools, stiffness=classical.stiffness)
+        else:
+            what = "the stiffness of the contact zone alone"
+            classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
         results: dict[str, LevelResult] = {}
         for level in wanted:
             if level == "lumped":
@@ -141,10 +155,20 @@ def run_impact(
         if "interface" in wanted:
             with warnings_of("level 'interface'"):
                 results["interface"] = _run_interface(problem, pools, own, clock)
-        certificate = _certificate(problem, pools, results if certify else {}, clock)
+        certificate = None
+        if certify and reduced:
+            certificate = for_comparison(
+                "the estimate of the error",
+                lambda: _certificate(problem, pools, results, clock),
+            )
+        certificate = certificate or _Certificate()
         transfer: tuple[TransferComparison, ...] = ()
         if case.run.transfer is not None:
-            transfer = compare_transfer(problem, pools, own.ports, progress=clock)
+            found = for_comparison(
+                "the comparison of transfer functions",
+                lambda: compare_transfer(problem, pools, own.ports, progress=clock),
+            )
+            transfer = found or ()
         clock("radiating surfaces", 0.0)
         structures = impact_structures(problem, pools, own)
         clock("radiating surfaces", 1.0)
@@ -161,9 +185,9 @@ def run_impact(
                     threads=threads,
                 )
             sections = _sections(problem, run)
-    # the best of what was run; the lumped model is nobody's reference
-    best = (name for name in ("full", "interface", "reduced") if name in results)
-    reference = next(best, next(iter(results)))
+    _take_better(results, certificate)
+    reference = best_level(results)
+    compared = deviations(results, reference)
     return ImpactStudy(
         case=case.name,
         title=case.title,
@@ -181,25 +205,32 @@ def run_impact(
         law=_law_summary(own, classical, peak),
         levels=results,
         reference=reference,
-        deviations=deviations(results, reference),
+        deviations=compared,
         transfer=transfer,
         sections=sections,
-        warnings=tuple(notes),
+        warnings=(*notes, *trust_notes(results, reference, compared)),
         estimates=certificate.estimates,
         estimate_basis=certificate.basis,
         estimate_spread=certificate.spread,
+        estimate_doubt=certificate.doubt,
         structures=structures,
     )
 
 
-def _require_time_to_touch(case: Case) -> None:
-    flight = (case.contact.gap or 0.0) / case.motion.speed
-    if flight >= case.run.duration:
+def _require_time_to_touch(case: Case, gap: float | None) -> None:
+    flight = (gap or 0.0) / case.motion.speed
+    if not flight < case.run.duration:
+        drawn = case.contact.gap is None
+        at = f"{format_si(case.run.duration, 's')}, but first touch at {format_si(flight, 's')}"
+        if drawn:
+            at += f": the parts are drawn {format_si(gap or 0.0, 'm')} apart, without contact.gap"
         raise InputError(
             f"{case.path or 'case'}: run.duration",
-            got=f"{case.run.duration * 1e6:.4g} us, but first touch at {flight * 1e6:.4g} us",
+            got=at,
             expected="a time that holds the impact",
-            hint="enlarge run.duration or make contact.gap smaller.",
+            hint="give contact.gap (for example 0 um): the upper body is then moved there."
+            if drawn
+            else "enlarge run.duration or make contact.gap smaller.",
         )
 
 
@@ -217,11 +248,13 @@ def _run_interface(
 
 @dataclass(frozen=True, kw_only=True)
 class _Certificate:
-    """Estimated errors, what they refer to, and how far that has settled itself."""
+    """Estimated errors, the run that they refer to, and how far that has settled itself."""
 
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     basis: str = ""
     spread: float = 0.0
+    doubt: str = ""
+    level: LevelResult | None = None
 
 
 def _certificate(
@@ -234,14 +267,16 @@ def _certificate(
 
     The same run with half as many modes tells whether it can serve as a reference.
     """
-    reduced = [name for name in results if name.startswith("reduced")]
-    if not reduced:
-        return _Certificate()
     clock("estimate of the error", 0.0)
+    whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
+    if not whole:
+        return _Certificate(doubt="the reduced level is cut off by the end of the run")
     count = certificate_modes(problem.case)
     model = build_interface(problem, pools, count=count)
     with warnings_of(f"estimate of the error, {count} modes"):
-        history = simulate_case(problem.case, model).history
+        setup = clock.spent((*_SET_UP[:-1], "estimate of the error"))
+        level = run_interface(problem, model, None, setup_time=setup)
+    history = level.history
     clock("estimate of the error", 0.5)
     half = build_interface(problem, pools, count=count // 2)
     with warnings_of(f"estimate of the error, {count // 2} modes"):
@@ -250,10 +285,23 @@ def _certificate(
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("estimate of the error", 1.0)
     return _Certificate(
-        estimates={name: compare_histories(history, results[name].history) for name in reduced},
+        estimates={name: compare_histories(history, results[name].history) for name in whole},
         basis=f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points",
         spread=compare_histories(history, fewer).history_l2,
+        doubt=next(iter(level.doubts), ""),
+        level=level,
     )
+
+
+def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> None:
+    """Take the run behind the estimates among the levels, where it puts the best of them right."""
+    level, best = certificate.level, best_level(results)
+    if level is None or level.doubts or certificate.spread > SETTLED:
+        return
+    if best not in certificate.estimates:
+        return
+    if disagreement(certificate.estimates[best]) > DISAGREEMENT:
+        results["interface"] = replace(level, label=f"{level.label}, run for the estimate")
 
 
 def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) -> ReducedPair:
@@ -325,7 +373,7 @@ def _contact_summary(problem: ContactProblem, peak: float, ratio: float) -> Cont
     )
 
 
-def _law_summary(pair: ReducedPair, classical: LocalStiffness, peak: float) -> LawSummary:
+def _law_summary(pair: ReducedPair, classical: LocalStiffness | None, peak: float) -> LawSummary:
     indentation, force = static_curve(pair)
     fit_range = (0.5 * peak, peak)
     load = np.linspace(*fit_range, 50)
@@ -338,6 +386,6 @@ def _law_summary(pair: ReducedPair, classical: LocalStiffness, peak: float) -> L
         share=share,
         linear_stiffness=float(slope),
         fit_range=fit_range,
-        classical_stiffness=classical.stiffness,
-        classical_size=classical.size,
+        classical_stiffness=np.nan if classical is None else classical.stiffness,
+        classical_size=np.nan if classical is None else classical.size,
     )

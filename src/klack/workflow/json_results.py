@@ -53,8 +53,15 @@ class LevelJson(TypedDict):
     peak_force_N: Real
     contact_time_s: Annotated[Real, Field(description="From first touch to last separation.")]
     impulse_Ns: Real
-    restitution: Annotated[Real, Field(description="Speed after over speed before.")]
+    restitution: Annotated[Real, Field(description="Speed after over speed at first touch.")]
+    approach_speed_m_s: Annotated[Real, Field(description="At first touch.")]
+    rebound_speed_m_s: Real
     sub_contacts: Annotated[int, Field(description="Times that the bodies touch.")]
+    strongest_contact: Annotated[int, Field(description="Which of them has the peak force.")]
+    total_contact_time_s: Real
+    cut_off: Annotated[bool, Field(description="The run ends while the bodies touch.")]
+    highest_force_N: Annotated[Real, Field(description="So far, also where it is cut off.")]
+    doubts: Annotated[list[str], Field(description="Why the level may be wrong.")]
     energy_residual: Annotated[Real, Field(description="Of the energy balance, relative.")]
     degrees_of_freedom: int
     steps: int
@@ -66,6 +73,7 @@ class ImpactJson(TypedDict):
 
     schema: Literal["klack-impact/1"]
     case: str
+    answer: Annotated[str, Field(description="Name of the best level.")]
     levels: Annotated[dict[str, LevelJson], Field(description="By the name of the level.")]
     deviation: Annotated[
         DeviationJson | None, Field(description="Of the level reduced from the reference.")

@@ -47,6 +47,7 @@ from klack.workflow.problem import ContactProblem
 from klack.workflow.progress import Progress
 from klack.workflow.stages import show, trial
 from klack.workflow.study import LevelResult, ModalEnergy, PressureRecord
+from klack.workflow.trust import doubts_of
 
 __all__ = [
     "PARTICIPATION_POOL",
@@ -576,7 +577,7 @@ def level_result(
 ) -> LevelResult:
     """Measures and energies of one computed impact."""
     ledger = history.ledger
-    return LevelResult(
+    result = LevelResult(
         level=level,
         label=label,
         history=history,
@@ -595,6 +596,7 @@ def level_result(
         ),
         pressure=pressure,
     )
+    return replace(result, doubts=doubts_of(result))
 
 
 def _steps(history: ImpactHistory, step: float) -> int:
@@ -610,11 +612,13 @@ def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
 
 
 def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
-    """Lay every level over the reference."""
+    """Compare every level with the reference: none where that has doubts, none that is cut off."""
+    if results[reference].doubts:
+        return {}
     return {
         name: compare_histories(results[reference].history, result.history)
         for name, result in results.items()
-        if name != reference
+        if name != reference and not result.measures.cut_off
     }
 
 

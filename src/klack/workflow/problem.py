@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.contact.mortar import ContactSpace
+from klack.contact.pairing import axial_distance
 from klack.contact.statics import StaticContact
 from klack.elasticity.statics import Flexibility
 from klack.workflow.bodies import BodyPair, build_bodies
@@ -22,6 +23,7 @@ class ContactProblem:
     Parameters
     ----------
     case : Case
+        With its gap, also where that is only drawn.
     pair : BodyPair
     space : ContactSpace
     flexibility_upper, flexibility_lower : Flexibility
@@ -56,8 +58,11 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
     the static curve gives the force and the approach at which that much is stored.  The candidate
     points reach further than that.
+
+    A case without ``contact.gap`` gets the one that is drawn, so that every level starts there.
     """
     pair = build_bodies(case, progress)
+    case = _with_drawn_gap(case, pair)
     progress("factorise", 0.0)
     cache = result_cache()
     upper = Flexibility(pair.upper, threads=threads, cache=cache)
@@ -82,3 +87,12 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
         static=static,
         opposite=build_opposite(case, pair, upper, progress, threads=threads),
     )
+
+
+def _with_drawn_gap(case: Case, pair: BodyPair) -> Case:
+    if case.contact.gap is not None:
+        return case
+    upper, lower = pair.upper.mesh, pair.lower.mesh
+    drawn = axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
+    contact = case.contact.model_copy(update={"gap": drawn})
+    return case.model_copy(update={"contact": contact})

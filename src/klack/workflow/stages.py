@@ -1,19 +1,25 @@
 """Watching a long run: how long each stage takes, and what it warns of."""
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
 
 from klack.cache.result_cache import ResultCache
-from klack.errors import AccuracyWarning
+from klack.errors import AccuracyWarning, InputError, KlackError
 from klack.workflow.progress import Progress
+
+Found = TypeVar("Found")
 
 __all__ = [
     "LIBRARIES",
     "WITH_CACHED",
     "StageClock",
     "collected_warnings",
+    "for_comparison",
     "show",
     "stages_with_cached",
     "trial",
@@ -111,6 +117,29 @@ def show(caught: Iterable[warnings.WarningMessage]) -> None:
     """Show warnings that a :func:`trial` has kept."""
     for item in caught:
         warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
+    """Compute what nobody asked for but to compare with: its failure warns and gives None.
+
+    Parameters
+    ----------
+    what : str
+        What is left out then, begin of a sentence.
+    compute : callable
+    """
+    try:
+        return compute()
+    except InputError as error:
+        reason = error.got  # not where: a key that the case may not have
+    except (KlackError, np.linalg.LinAlgError, MemoryError) as error:
+        reason = str(error) or type(error).__name__
+    warnings.warn(
+        f"{what} was left out, which is for comparison only: {reason}",
+        AccuracyWarning,
+        stacklevel=2,
+    )
+    return None
 
 
 @contextmanager

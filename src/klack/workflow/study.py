@@ -173,6 +173,8 @@ class LevelResult:
     modal_energy : tuple of ModalEnergy
     pressure : PressureRecord or None
         Of levels that resolve the contact point by point.
+    doubts : tuple of str
+        Why this level can be no reference for others (:mod:`klack.workflow.trust`).
     """
 
     level: str
@@ -188,6 +190,7 @@ class LevelResult:
     energy_residual: float
     modal_energy: tuple[ModalEnergy, ...] = ()
     pressure: PressureRecord | None = None
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -238,8 +241,9 @@ class ImpactStudy:
     stage_times : mapping of str to float [s]
     levels : mapping of str to LevelResult
     reference : str
-        Level that the deviations refer to (``"full"`` when it was run).
+        Level whose numbers are the answer: the finest one that nothing speaks against.
     deviations : mapping of level to Deviation
+        From the reference; none where that has doubts itself.
     estimates : mapping of level to Deviation
         Estimated error of reduced levels: their deviation from one interface-level run.
     estimate_basis : str
@@ -247,6 +251,8 @@ class ImpactStudy:
     estimate_spread : float [-]
         Difference of its force history (as ``history_l2``) from a run with half as many modes.
         Above :data:`SETTLED` the run is no reference, and the estimates say little.
+    estimate_doubt : str
+        Why there is no estimate, although one was asked for.
     structures : tuple of Structure
         Held bodies as sources of sound; their stop is called ``"contact"``.
     transfer : tuple of TransferComparison
@@ -278,11 +284,12 @@ class ImpactStudy:
     estimate_basis: str = ""
     estimate_spread: float = 0.0
     structures: tuple[Structure, ...] = ()
+    estimate_doubt: str = ""
 
     @property
     def estimates_settled(self) -> bool:
         """Tell whether the estimates can be trusted."""
-        return self.estimate_spread <= SETTLED
+        return self.estimate_spread <= SETTLED and not self.estimate_doubt
 
     @property
     def ordered(self) -> tuple[LevelResult, ...]:

@@ -1,10 +1,17 @@
 """The few numbers of a study that a script or a terminal wants."""
 
-from klack.contact.restitution import Deviation
+from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.workflow.json_results import DeviationJson, ImpactJson, LevelJson
 from klack.workflow.study import ImpactStudy, LevelResult
 
-__all__ = ["SUMMARY_COLUMNS", "estimate_lines", "study_to_json", "summary_rows"]
+__all__ = [
+    "SUMMARY_COLUMNS",
+    "answer_line",
+    "estimate_lines",
+    "no_estimate",
+    "study_to_json",
+    "summary_rows",
+]
 
 SUMMARY_COLUMNS = (
     "level",
@@ -24,16 +31,19 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
     Returns
     -------
     dict
-        ``case``; ``levels``: per level the numbers of the impact; ``deviation``: of ``reduced``
+        ``case``; ``answer``: the level whose numbers to take; ``levels``: per level the numbers of
+        the impact, with ``doubts`` that make it no reference; ``deviation``: of ``reduced``
         against the reference, None when there is nothing to compare; ``deviations``: of every level
         that is not the reference; ``estimated_error``: of every reduced level, by an
-        interface-level run, None where that is no reference.  Numbers that do not exist (nan) are
-        None.
+        interface-level run, None where that is no reference; ``warnings``.  Numbers that do not
+        exist (nan) are None, and so are peak force, contact time and impulse of a run that ends in
+        contact (``cut_off``): ``highest_force_N`` is what it had reached.
     """
     deviations = {name: _deviation(item) for name, item in study.deviations.items()}
     return {
         "schema": "klack-impact/1",
         "case": study.case,
+        "answer": study.reference,
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
         "deviations": deviations,
@@ -41,17 +51,45 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
             name: _deviation(item) if study.estimates_settled else None
             for name, item in study.estimates.items()
         },
+        "warnings": list(study.warnings),
     }
 
 
-def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
-    """Say how good every reduced level is, one line each."""
+def answer_line(study: ImpactStudy) -> str:
+    """Say in one line which level is the answer, and what it says."""
+    m = study.levels[study.reference].measures
+    begin = f"Answer (level '{study.reference}'): "
+    touch = f"{m.approach_speed:.4g} m/s at first touch"
+    if m.cut_off:
+        return (
+            f"{begin}{touch}; the run is cut off in contact, at {m.peak_force:.2f} N so far: "
+            "no peak force, no contact time, no restitution."
+        )
+    contacts = f", {m.sub_contacts} contacts" if m.sub_contacts > 1 else ""
+    peak, time = _peak(m, m.peak_force, " N"), _first(m, 1e6 * m.contact_time, " us")
+    return (
+        f"{begin}peak force {peak}, contact time {time}{contacts}; {touch}, "
+        f"{100 * m.restitution:.2f} % of it after the impact."
+    )
+
+
+def no_estimate(study: ImpactStudy) -> str:
+    """Why the error of reduced levels was not estimated; empty where it was, or not asked for."""
+    if study.estimate_doubt:
+        return f"No estimate of the error: {study.estimate_doubt}"
     if study.estimates and not study.estimates_settled:
         return (
             "No estimate of the error: the interface level itself has not settled (its force "
             f"history changes by {100 * study.estimate_spread:.0f} % when the modes are doubled), "
-            "as when flat faces meet all at once. Compare with --level full.",
+            "as when flat faces meet all at once. Compare with --level full."
         )
+    return ""
+
+
+def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
+    """Say how good every reduced level is, one line each."""
+    if reason := no_estimate(study):
+        return (reason,)
     return tuple(
         f"Estimated error of '{name}': peak force {_percent(item.peak_force)}, contact time "
         f"{_percent(item.contact_time)}, impulse {_percent(item.impulse)}, restitution "
@@ -78,9 +116,9 @@ def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
             name,
-            f"{result.measures.peak_force:.2f}",
-            f"{1e6 * result.measures.contact_time:.3f}",
-            f"{1e3 * result.measures.impulse:.4f}",
+            _peak(result.measures, result.measures.peak_force),
+            _first(result.measures, 1e6 * result.measures.contact_time),
+            f"{1e3 * result.measures.impulse:.4f}{_cut(result.measures)}",
             f"{result.measures.restitution:.4f}",
             f"{result.energy_residual:.1e}",
             f"{result.degrees_of_freedom}",
@@ -90,14 +128,38 @@ def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
     )
 
 
+def _peak(measures: ImpactMeasures, value: float, unit: str = "") -> str:
+    """Peak force, and in which contact of several it is."""
+    which = f" (contact {measures.strongest} of {measures.sub_contacts})"
+    return f"{value:.2f}{unit}{which if measures.sub_contacts > 1 else ''}{_cut(measures)}"
+
+
+def _first(measures: ImpactMeasures, value: float, unit: str = "") -> str:
+    """Contact time, which is that of the first contact of several."""
+    which = f" (contact 1 of {measures.sub_contacts})" if measures.sub_contacts > 1 else ""
+    return f"{value:.3f}{unit}{which}{_cut(measures)}"
+
+
+def _cut(measures: ImpactMeasures) -> str:
+    return " (cut off)" if measures.cut_off else ""
+
+
 def _level(result: LevelResult) -> LevelJson:
     measures = result.measures
+    whole = not measures.cut_off
     return {
-        "peak_force_N": _number(measures.peak_force),
-        "contact_time_s": _number(measures.contact_time),
-        "impulse_Ns": _number(measures.impulse),
+        "peak_force_N": _number(measures.peak_force) if whole else None,
+        "contact_time_s": _number(measures.contact_time) if whole else None,
+        "impulse_Ns": _number(measures.impulse) if whole else None,
         "restitution": _number(measures.restitution),
+        "approach_speed_m_s": _number(measures.approach_speed),
+        "rebound_speed_m_s": _number(measures.rebound_speed),
         "sub_contacts": int(measures.sub_contacts),
+        "strongest_contact": int(measures.strongest),
+        "total_contact_time_s": _number(measures.total_contact_time) if whole else None,
+        "cut_off": measures.cut_off,
+        "highest_force_N": _number(measures.peak_force),
+        "doubts": list(result.doubts),
         "energy_residual": _number(result.energy_residual),
         "degrees_of_freedom": int(result.degrees_of_freedom),
         "steps": int(result.steps),

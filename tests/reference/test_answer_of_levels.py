@@ -1,0 +1,144 @@
+"""Which level of a case is the answer, and what never stops a run; truth: the full order.
+
+A ball on a damped block, on meshes that take seconds.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from klack.case.reader import load_case, read_case
+from klack.case.schema import Case, LinearLocalLaw
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.workflow import impact
+from klack.workflow.impact import run_impact
+from klack.workflow.stages import for_comparison
+from klack.workflow.study import ImpactStudy
+from klack.workflow.summary import answer_line, estimate_lines, study_to_json
+
+CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
+
+
+def changed(**run: object) -> Case:
+    case = load_case(CASE)
+    return case.model_copy(update={"run": case.run.model_copy(update=run)})
+
+
+def with_contact(**contact: object) -> Case:
+    case = load_case(CASE)
+    return case.model_copy(update={"contact": case.contact.model_copy(update=contact)})
+
+
+@cache
+def both() -> ImpactStudy:
+    return run_impact(load_case(CASE), levels=("reduced", "interface", "full"))
+
+
+def test_damping_is_that_of_the_case_at_every_level():
+    """The deviation is that of the reduced model: the full order ignored damping."""
+    study = both()
+    assert study.reference == "full"
+    for level in ("reduced", "interface"):
+        assert abs(study.deviations[level].peak_force) < 0.005
+        assert abs(study.deviations[level].restitution) < 0.002
+    full = study.levels["full"]
+    assert full.energies["modal damping"] > 0.01 * full.energies["initial kinetic"]
+    assert abs(full.energy_residual) < 1e-9
+
+
+def test_a_full_order_in_coarse_steps_is_no_reference():
+    study = run_impact(changed(full_step=1e-6), levels=("reduced", "full"), certify=False)
+    assert study.reference == "reduced"
+    assert "reduced" not in study.deviations
+    assert any("steps of 1 us in a contact" in note for note in study.warnings)
+    assert "Answer (level 'reduced')" in answer_line(study)
+    data = study_to_json(study)
+    assert data["answer"] == "reduced"
+    assert data["deviation"] is None
+    assert data["levels"]["full"]["doubts"]
+
+
+def test_the_run_behind_the_estimate_is_the_answer_where_it_is_better():
+    """A law far too soft; the interface level needs no law."""
+    soft = with_contact(local_law=LinearLocalLaw(kind="linear", stiffness=1.2e7))
+    study = run_impact(soft, levels=("reduced",))
+    assert study.reference == "interface"
+    assert study.ordered[0].level == "interface"
+    assert abs(study.deviations["reduced"].peak_force) > 0.1
+    assert any(
+        "The answer is that of level 'interface', not that of level 'reduced'" in note
+        for note in study.warnings
+    )
+    found = study.levels["interface"].measures
+    truth = both().levels["full"].measures
+    assert found.peak_force == pytest.approx(truth.peak_force, rel=0.005)
+
+
+def test_without_disagreement_the_answer_stays_the_level_asked_for():
+    assert both().estimates
+    assert list(both().levels) == ["reduced", "interface", "full"]
+    assert both().levels["interface"].label.endswith("contact points")
+    assert both().warnings == ()
+
+
+def test_a_run_that_ends_in_contact_has_no_estimate():
+    study = run_impact(changed(duration=4e-6), levels=("reduced",))
+    assert study.estimates == {}
+    assert estimate_lines(study)[0].startswith("No estimate of the error: ")
+    assert "cut off" in estimate_lines(study)[0]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("contact submodel: size", got="a zone of no node", expected="-", hint="-"),
+        ConvergenceError("the ladder did not settle"),
+        MemoryError(),
+    ],
+    ids=["input", "convergence", "memory"],
+)
+def test_a_comparison_that_fails_is_a_note(error):
+    def refuse() -> None:
+        raise error
+
+    with pytest.warns(AccuracyWarning, match="a number was left out, which is for comparison only"):
+        assert for_comparison("a number", refuse) is None
+    assert for_comparison("a number", lambda: 3.0) == 3.0
+
+
+def test_what_is_only_for_comparison_never_stops_a_run(monkeypatch):
+    def refuse(*args: object, **how: object) -> None:
+        raise InputError("contact submodel: size", got="a zone of no node", expected="-", hint="-")
+
+    for name in ("classical_stiffness", "_certificate"):
+        monkeypatch.setattr(impact, name, refuse)
+    study = run_impact(load_case(CASE), levels=("reduced",))
+    assert study.levels["reduced"].measures == both().levels["reduced"].measures
+    assert study.estimates == {}
+    assert len([note for note in study.warnings if "for comparison only" in note]) == 2
+    assert not any("contact submodel: size" in note for note in study.warnings)
+
+
+def lifted(distance: float) -> Case:
+    """The ball drawn above the block, without contact.gap."""
+    text = CASE.read_text(encoding="utf-8")
+    for height in ("[0, 0]\n            edges:\n              - {arc", "[2, 2]", "[0, 4]"):
+        r, z = height.split("]")[0].strip("[").split(", ")
+        moved = height.replace(f"[{r}, {z}]", f"[{r}, {float(z) + distance}]")
+        text = text.replace(height, moved)
+    text = text.replace("centre: [0, 2]", f"centre: [0, {2 + distance}]")
+    return read_case(text.replace(", gap: 0 um", ""), CASE)
+
+
+def test_a_gap_that_is_only_drawn_is_flown_at_every_level():
+    """0.5 um at 0.5 m/s take 1 us."""
+    study: ImpactStudy = run_impact(lifted(0.0005), levels=("reduced", "interface"), certify=False)
+    touches = [level.measures.first_touch for level in study.levels.values()]
+    assert touches == pytest.approx([1e-6, 1e-6], rel=0.05)  # the meshes bend the ball
+    assert study.gap == pytest.approx(0.5e-6, rel=0.05)
+
+
+def test_parts_drawn_far_apart_are_the_reason_that_is_named():
+    with pytest.raises(InputError, match=r"drawn 1\.09\d* mm apart, without contact\.gap"):
+        run_impact(lifted(1.09), levels=("reduced",))
