@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from klack.contact.mortar import check_initial_gap, contact_space, touching_shift
-from klack.contact.statics import check_resolution, static_contact
+from klack.contact.statics import COARSE, size_over_half_width, static_contact
 from klack.contact.submodel import local_stiffness
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import InputError
 from klack.mesh.mesh import Surface
 from klack.verification.indentation import half_spaces, parabola, sphere_on_cone
 
@@ -95,13 +95,12 @@ def test_automatic_reach_holds_the_contact():
     assert problem.space.count < space.count <= 400
 
 
-def test_coarse_contact_is_warned_of():
+def test_elements_over_half_width_tell_a_coarse_contact():
     problem = sphere(cells=(3, 2))
     C = problem.compliance()
 
-    assert check_resolution(static_contact(problem.space, C, 3.8)) < 1.0
-    with pytest.warns(AccuracyWarning, match="doubtful above"):
-        check_resolution(static_contact(problem.space, C, 0.05))
+    assert size_over_half_width(static_contact(problem.space, C, 3.8)) < 1.0
+    assert size_over_half_width(static_contact(problem.space, C, 0.05)) > COARSE
 
 
 def test_restricted_space_gives_the_same_contact():

@@ -68,6 +68,15 @@ def test_the_largest_error_decides(impact_study: ImpactStudy, error: Deviation, 
     assert words in estimate_sentence(certified(impact_study, error))
 
 
+def test_nothing_is_good_while_the_contact_is_in_doubt(impact_study: ImpactStudy) -> None:
+    """Two levels that share one row of elements agree with each other, whatever is true."""
+    doubtful = replace(impact_study.contact, doubts=("it lies on a sharp edge",))
+    study = certified(replace(impact_study, contact=doubtful), deviation(0.0001))
+
+    assert "good enough" not in estimate_sentence(study)
+    assert "cannot be relied on, because it lies on a sharp edge" in estimate_sentence(study)
+
+
 def test_the_report_answers_first(impact_study: ImpactStudy) -> None:
     content = report_content(certified(impact_study, deviation(0.0031)))
 

@@ -40,7 +40,7 @@ from klack.advice.target import (
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
-from klack.contact.statics import check_resolution
+from klack.contact.statics import size_over_half_width
 from klack.elasticity.eigen import Modes
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
@@ -186,7 +186,7 @@ def advise_impact(
         measured = [*meshes, *measured]
         touching = {n: case.bodies[n] for n in (case.contact.moving.body, case.contact.stop.body)}
         peak = measure_impact(base.now).peak_force
-        ratio = check_resolution(base.problem.static, peak)
+        ratio = size_over_half_width(base.problem.static, peak)
         log.notes += unmeshed_notes(touching, ratio)
         if not unmeshed(touching):
             log.notes += coarse_contact_notes(ratio)

@@ -622,6 +622,7 @@ def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
         raise _not_facing(surface_a, surface_b)
     along = np.zeros(mesh_a.dimension)
     slave: Literal["a", "b"] | None = None
+    slope, before, moved = 1.0, 0.0, 0.0
     for _ in range(30):
         along[-1] = shift
         space = contact_space(mesh_a.moved(along), surface_a, mesh_b, surface_b, slave=slave)
@@ -631,7 +632,11 @@ def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
                 surface_a = _part(surface_a, _faces_at(surface_a, space.nodes))
             else:
                 surface_b = _part(surface_b, _faces_at(surface_b, space.nodes))
-        shift -= space.touch
+        elif moved:
+            # between surfaces at an angle the gaps close faster than a rigid move along z tells
+            slope = min(max((space.touch - before) / moved, 0.5), 100.0)
+        before, moved = space.touch, -space.touch / slope
+        shift += moved
         if abs(space.touch) <= 1e-12:
             return shift
     raise ConvergenceError(

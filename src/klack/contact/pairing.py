@@ -33,6 +33,7 @@ __all__ = [
     "curved_faces",
     "face_gaps",
     "face_geometry",
+    "face_lattice",
     "face_thickness",
     "project_to_surface",
 ]
@@ -129,6 +130,18 @@ def _normals(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.cross(tangents[..., 0, :], tangents[..., 1, :])
     along = tangents[..., 0, :]
     return np.stack([along[..., 1], -along[..., 0]], axis=-1)
+
+
+def face_lattice(family: str, count: int) -> NDArray[np.float64]:
+    """Reference points spread evenly over a face, ``count`` along a side, borders left out."""
+    s = (np.arange(count) + 0.5) / count
+    if family.startswith("line"):
+        return 2.0 * s[:, None] - 1.0
+    u, v = (x.ravel() for x in np.meshgrid(s, s))
+    if family.startswith("tri"):
+        inside = u + v < 1.0
+        return np.column_stack([u[inside], v[inside]])
+    return np.column_stack([2.0 * u - 1.0, 2.0 * v - 1.0])
 
 
 def face_thickness(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:

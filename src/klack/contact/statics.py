@@ -14,7 +14,6 @@ with the axial weights *a* of the contact space.  For a free body the approach i
 of mass, as in a modal model with the rigid mode as one coordinate.
 """
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -26,17 +25,19 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
-from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError, require_positive
 from klack.memory import require_memory
 
 __all__ = [
     "COARSE",
     "ReachError",
     "StaticContact",
-    "check_resolution",
     "check_rim",
     "contact_compliance",
     "extended_compliance",
+    "points_across",
+    "ring_radius",
+    "size_over_half_width",
     "static_contact",
 ]
 
@@ -44,7 +45,7 @@ _CHUNK = 64
 """Right-hand sides solved at once."""
 
 COARSE = 1.5
-"""Element size over half width of a contact above which :func:`check_resolution` warns."""
+"""Element size over half width of a contact that is too coarse to be judged."""
 
 _RING = 0.25
 """Spread of the pressure over its mean radius below which the contact is a ring.
@@ -341,13 +342,18 @@ def _half_width(space: ContactSpace, lam: NDArray[np.float64]) -> float:
         return 0.0
     weight = lam / total
     floor = float(weight @ space.size) / np.sqrt(6.0)
-    spread, mean = min(_about_axis(space, weight, axis) for axis in _axes(space))
+    spread, mean = _closest_ring(space, weight)
     if spread < _RING * mean:
         return max(2.0 * spread, floor)
     centre = weight @ space.points
     if space.dimension == 2:
         centre[0] = 0.0
     return max(float(np.sqrt(2.5 * weight @ np.sum((space.points - centre) ** 2, axis=1))), floor)
+
+
+def _closest_ring(space: ContactSpace, weight: NDArray[np.float64]) -> tuple[float, float]:
+    """Spread of the pressure [m] and its mean radius [m] about the axis that suits it best."""
+    return min(_about_axis(space, weight, axis) for axis in _axes(space))
 
 
 def _axes(space: ContactSpace) -> list[NDArray[np.float64]]:
@@ -395,10 +401,11 @@ def check_rim(static: StaticContact) -> None:
     raise error
 
 
-def check_resolution(static: StaticContact, force: float | None = None) -> float:
+def size_over_half_width(static: StaticContact, force: float | None = None) -> float:
     """Element size across the contact over its half width, at an axial force.
 
-    About one or less is good; above 1.5 the weighted gaps blur the contact and a warning is given.
+    About one or less is good; above :data:`COARSE` the weighted gaps blur the contact.  On a mesh
+    far too coarse the half width is that of one row of elements, and the ratio 2.4.
 
     Parameters
     ----------
@@ -411,16 +418,29 @@ def check_resolution(static: StaticContact, force: float | None = None) -> float
     float [-]
     """
     force = static.max_force if force is None else force
-    lam = static.pattern_at(force)
     width = static.half_width_at(force)
-    size = float(np.average(static.space.size, weights=lam))
-    ratio = size / width if width > 0 else float("inf")
-    if ratio > COARSE:
-        warnings.warn(
-            f"contact: elements of {size * 1e6:.3g} um across a contact of half width "
-            f"{width * 1e6:.3g} um at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful "
-            f"above {COARSE:g}). Refine the contact surfaces to about {width * 1e6:.2g} um.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
-    return ratio
+    size = float(np.average(static.space.size, weights=static.pattern_at(force)))
+    return size / width if width > 0 else float("inf")
+
+
+def points_across(static: StaticContact, force: float) -> int:
+    """Contact points that carry across the whole width of the contact at an axial force."""
+    space, lam = static.space, static.pattern_at(force)
+    if space.dimension == 2:
+        count = int(np.sum(lam > 0))
+        # around the axis the half section holds half of the width
+        return count if ring_radius(space, lam) is not None else 2 * count - 1
+    # two rows of points per element
+    return round(4.0 / size_over_half_width(static, force)) + 1
+
+
+def ring_radius(space: ContactSpace, lam: NDArray[np.float64]) -> float | None:
+    """Mean radius of a contact that is a narrow ring [m]; None for any other.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    lam : array, shape (nc,) [N]
+    """
+    spread, mean = _closest_ring(space, lam / lam.sum())
+    return mean if spread < _RING * mean else None

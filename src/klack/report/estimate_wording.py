@@ -1,5 +1,6 @@
 """How good a reduced level is: its estimated error, beside the true one where that is known."""
 
+from collections.abc import Sequence
 from math import isfinite
 
 from klack.contact.restitution import Deviation
@@ -36,7 +37,7 @@ def estimate_sentence(study: ImpactStudy) -> str:
     estimate, true = study.estimates[name], _true(study, name)
     text = (
         f"Compared with one run of the {study.estimate_basis}, at the same condition, the "
-        f"'{name}' level is off by {_off(estimate)}: {_verdict(estimate)}."
+        f"'{name}' level is off by {_off(estimate)}: {_verdict(estimate, study.contact.doubts)}."
     )
     if true is not None:
         text += f" Compared with the full order, which was run too, it is off by {_off(true)}."
@@ -65,8 +66,13 @@ def _off(deviation: Deviation) -> str:
     )
 
 
-def _verdict(deviation: Deviation) -> str:
-    """Judge the largest of the four errors."""
+def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
+    """Judge the largest of the four errors, unless the contact itself is in doubt."""
+    if doubts:
+        return (
+            "both share the same contact, which cannot be relied on, because "
+            f"{' and '.join(doubts)}"
+        )
     errors = [deviation.peak_force, deviation.contact_time, deviation.impulse]
     worst = max(abs(value) for value in (*errors, deviation.restitution) if isfinite(value))
     if worst <= _GOOD:

@@ -40,7 +40,9 @@ _REFRESH = 256
 """Changes of the active set after which its inverse is computed afresh."""
 
 _PAY_LIMIT = 1e-3
-"""Largest share of a contact force that pays the energy debt."""
+"""Share of a contact force that may always pay the energy debt.
+
+More may, where the debt is more than that share of the energy that the contact holds."""
 
 
 @njit(cache=True)
@@ -257,6 +259,16 @@ def safe_flight(
         if closing > 0.0 or pull > 0.0:
             safe = min(safe, 2.0 * distance / (closing + np.sqrt(closing**2 + 2 * pull * distance)))
     return safe
+
+
+@njit(cache=True)
+def _payment(owed: float, slope: float, square: float) -> float:
+    """Smaller root of ``owed + slope p + square p^2``; where it has none, its extremum."""
+    inside = slope**2 - 4.0 * square * owed
+    if inside < 0.0:
+        return -0.5 * slope / square
+    divisor = slope + np.sqrt(inside) * (1.0 if slope >= 0.0 else -1.0)
+    return -2.0 * owed / divisor if divisor != 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -546,7 +558,9 @@ def march(
             owed = debt + work + stored - potential
             pay = 0.0
             if owed != 0.0 and work != 0.0:
-                limit = _PAY_LIMIT if whole_step else 1.0
+                limit = 1.0
+                if whole_step:  # what the contact still holds must suffice
+                    limit = min(max(_PAY_LIMIT, 2.0 * abs(owed) / potential), 1.0)
                 pay = min(max(-owed / work, -limit), limit)
                 for i in range(modes):
                     kick[i] = 0.0
@@ -559,7 +573,22 @@ def march(
                     whole[i] += kick[i]
                     qf[i] += B1[i] * kick[i]
                     vf[i] += B2[i] * kick[i]
-                work, stored = _work(gap0, traces, lam, new, before, qf)
+                first, kept = _work(gap0, traces, lam, new, before, qf)
+                if whole_step or pay == 0.0:
+                    work, stored = first, kept  # what is left of the debt comes next
+                else:
+                    # the last chance: both are linear in the payment, the balance is quadratic
+                    work_slope, stored_slope = (first - work) / pay, (kept - stored) / pay
+                    exact = _payment(owed, work + work_slope + stored_slope, work_slope)
+                    exact = min(max(exact, -limit), limit)
+                    more = exact / pay - 1.0
+                    for i in range(modes):
+                        whole[i] += more * kick[i]
+                        qf[i] += more * B1[i] * kick[i]
+                        vf[i] += more * B2[i] * kick[i]
+                    pay = exact
+                    work += pay * work_slope
+                    stored += pay * stored_slope
             for k in range(n):
                 mean = 0.5 * (1.0 + pay) * (lam[k] + new[k])
                 mean_force += axial[k] * mean

@@ -14,7 +14,6 @@ from klack.cache.setting import result_cache
 from klack.case.schema import Case, SubmodelLocalLaw
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
-from klack.contact.statics import check_resolution
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
 from klack.errors import InputError
@@ -23,6 +22,7 @@ from klack.reduction.transfer import TransferComparison
 from klack.transient.result import FullOrderResult
 from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
+from klack.workflow.contact_check import ContactCheck, check_contact, ends_reached
 from klack.workflow.given_impact import run_given_impact
 from klack.workflow.interface_level import (
     build_guide,
@@ -172,7 +172,7 @@ def run_impact(
         clock("radiating surfaces", 0.0)
         structures = impact_structures(problem, pools, own)
         clock("radiating surfaces", 1.0)
-        ratio = check_resolution(problem.static, peak)
+        check = check_contact(case, problem.pair, problem.static, peak, _surfaces(case))
         problem.close()
         sections: tuple[SectionPicture, ...] = ()
         if "full" in wanted:
@@ -185,6 +185,7 @@ def run_impact(
                     threads=threads,
                 )
             sections = _sections(problem, run)
+        check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
     _take_better(results, certificate)
     reference = best_level(results)
     compared = deviations(results, reference)
@@ -201,7 +202,7 @@ def run_impact(
         wall_time=perf_counter() - begin,
         stage_times=clock.times(),
         bodies=_summaries(problem, own),
-        contact=_contact_summary(problem, peak, ratio),
+        contact=_contact_summary(problem, check),
         law=_law_summary(own, classical, peak),
         levels=results,
         reference=reference,
@@ -360,13 +361,19 @@ def _summaries(problem: ContactProblem, own: ReducedPair) -> tuple[BodySummary, 
     )
 
 
-def _contact_summary(problem: ContactProblem, peak: float, ratio: float) -> ContactSummary:
-    static, contact = problem.static, problem.case.contact
+def _surfaces(case: Case) -> str:
+    return f"{case.contact.moving} on {case.contact.stop}"
+
+
+def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSummary:
+    static = problem.static
     return ContactSummary(
-        surfaces=f"{contact.moving} on {contact.stop}",
+        surfaces=_surfaces(problem.case),
         points=static.space.count,
-        half_width=static.half_width_at(peak),
-        size_ratio=ratio,
+        half_width=check.half_width,
+        size_ratio=check.size_ratio,
+        points_across=check.points_across,
+        doubts=check.doubts,
         approach=static.approach,
         force=static.force,
         area=static.area,

@@ -85,6 +85,7 @@ class ImpactJson(TypedDict):
         dict[str, DeviationJson | None],
         Field(description="Of every reduced level, by a run at the interface level."),
     ]
+    warnings: list[str]
 
 
 class ReducedBodyJson(TypedDict):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.pairing import face_geometry, project_to_surface
+from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.profile import Curve, Profile
@@ -141,7 +141,9 @@ def first_touch_of_meshes(
     """
     samples = np.concatenate(
         [
-            face_geometry(upper.points, block, _lattice(block.family)).position.reshape(-1, 3)
+            face_geometry(
+                upper.points, block, face_lattice(block.family, _LATTICE)
+            ).position.reshape(-1, 3)
             for block in surface_a.blocks
         ]
     )
@@ -165,13 +167,3 @@ def first_touch_of_meshes(
 
 def _points(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(x) for x in row) for row in array)
-
-
-def _lattice(family: str) -> NDArray[np.float64]:
-    """Return points spread over a reference face, borders excluded."""
-    s = (np.arange(_LATTICE) + 0.5) / _LATTICE
-    u, v = (x.ravel() for x in np.meshgrid(s, s))
-    if family.startswith("tri"):
-        inside = u + v < 1.0
-        return np.column_stack([u[inside], v[inside]])
-    return np.column_stack([2 * u - 1, 2 * v - 1])

@@ -13,7 +13,6 @@ from klack import __version__
 from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase, Variant
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.contact.statics import check_resolution
 from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
@@ -25,6 +24,7 @@ from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
+from klack.workflow.contact_check import check_contact
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
 from klack.workflow.stroke_missing import missing_notes
@@ -324,9 +324,14 @@ def _stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
 def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
     contact, local = valve.contacts.get(name), valve.laws.get(name)
     none, nan = np.empty(0), float("nan")
+    surfaces = " on ".join(str(s) for s in valve.case.stops[name].between) if contact else ""
+    check = None
+    if contact is not None:
+        force = contact.pattern_force
+        check = check_contact(valve.case, contact.pair, contact.static, force, surfaces)
     return StopSummary(
         name=name,
-        surfaces=" on ".join(str(s) for s in valve.case.stops[name].between) if contact else "",
+        surfaces=surfaces,
         kind=part.law.kind if part.law is not None else "film",
         gap=part.gap,
         film=part.film is not None,
@@ -337,8 +342,8 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         static_force=contact.static.force if contact else none,
         area=contact.static.area if contact else none,
         pattern_force=contact.pattern_force if contact else nan,
-        half_width=contact.static.half_width_at(contact.pattern_force) if contact else nan,
-        size_ratio=check_resolution(contact.static, contact.pattern_force) if contact else nan,
+        half_width=check.half_width if check else nan,
+        size_ratio=check.size_ratio if check else nan,
     )
 
 

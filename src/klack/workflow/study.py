@@ -75,6 +75,10 @@ class ContactSummary:
         Half width of the contact at the highest force of the impact.
     size_ratio : float [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    points_across : int
+        Contact points that carry across the whole width then; 0 where nobody knows.
+    doubts : tuple of str
+        Why no error can be judged on these meshes, each in a few words.
     approach, force, area : array, shape (n,) [m], [N], [m^2]
         Ladder from first touch.
     """
@@ -86,6 +90,8 @@ class ContactSummary:
     approach: NDArray[np.float64]
     force: NDArray[np.float64]
     area: NDArray[np.float64]
+    points_across: int = 0
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,0 +1,197 @@
+r"""Edges of a contact surface: where the named surface ends, and where the skin has a corner.
+
+A contact that reaches the end of the *named* surface may go on where nobody looked; one on a sharp
+corner has no width of its own.  Both are told by the angle between the outward normals of the two
+faces that meet: :math:`\cos\vartheta = n_1 \cdot n_2`, counted positive where the body is convex.
+In the half section of a body of revolution an edge is a point.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.pairing import face_geometry
+from klack.elasticity.shape_functions import reference_nodes
+from klack.mesh.boundary import FaceTable
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import FaceBlock, Mesh, Surface
+
+__all__ = ["SHARP", "SurfaceEdges", "surface_edges"]
+
+SHARP = np.radians(10.0)
+"""Angle between two normals [rad] above which an edge is a corner; a smooth surface on coarse
+quadratic faces has less."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurfaceEdges:
+    """Edges of a surface, each between one of its faces and another face of the skin.
+
+    Parameters
+    ----------
+    line : array, shape (m, 3, d) [m]
+        Begin, middle and end of each edge; three times the same point in a half section.
+    angle : array, shape (m,) [rad]
+        Between the outward normals; above 0 where the body is convex.
+    along : array, shape (m, 2, d) [-]
+        Unit tangents away from the edge into the face of the surface and into the other one.
+    neighbour : tuple of str or None
+        Name of the surface that the other face belongs to; empty where it has none, None where it
+        belongs to the surface itself.
+    """
+
+    line: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    along: NDArray[np.float64]
+    neighbour: tuple[str | None, ...]
+
+    @property
+    def corners(self) -> NDArray[np.bool_]:
+        """Edges where a convex body has a corner, shape (m,)."""
+        return self.angle > SHARP
+
+    @property
+    def ends(self) -> NDArray[np.bool_]:
+        """Edges where the surface ends although the skin goes on, smoothly or rising."""
+        outside = np.array([name is not None for name in self.neighbour], dtype=bool)
+        return outside & ~self.corners
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points, shape (p, d), to every edge: shape (m, p) [m]."""
+        result = np.full((len(self.line), len(points)), np.inf)
+        for i in (0, 1):
+            start, way = self.line[:, None, i], self.line[:, None, i + 1] - self.line[:, None, i]
+            length = np.maximum(np.sum(way**2, axis=2), 1e-300)
+            share = np.clip(np.sum((points - start) * way, axis=2) / length, 0.0, 1.0)
+            gap = np.linalg.norm(points - start - share[..., None] * way, axis=2)
+            result = np.minimum(result, gap)
+        return result
+
+
+def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
+    """Find the edges of a surface at which it ends or has a corner.
+
+    Smooth edges between two of its own faces are left out, and so are places on the axis of a body
+    of revolution.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    surface : Surface
+    """
+    own = _rims(mesh, surface.blocks)
+    skin = _rims(mesh, _skin_beside(mesh, surface))
+    d = mesh.dimension
+    rows: list[tuple[int, _Rims, int, bool]] = []
+    first: dict[tuple[int, ...], int] = {}
+    paired: set[tuple[int, ...]] = set()
+    for i, key in enumerate(own.keys):
+        if key in first:
+            rows.append((first[key], own, i, False))
+            paired.add(key)
+        else:
+            first[key] = i
+    for j, key in enumerate(skin.keys):
+        if key in first and key not in paired:
+            rows.append((first[key], skin, j, True))
+    angle = np.array([_angle(own, i, other, j) for i, other, j, _ in rows])
+    names = _names(mesh, [other.faces[j] if out else None for _, other, j, out in rows])
+    kept = [
+        k
+        for k, (i, *_, outside) in enumerate(rows)
+        if (outside or angle[k] > SHARP) and not (d == 2 and own.line[i, 0, 0] == 0.0)
+    ]
+    chosen = [rows[k] for k in kept]
+    return SurfaceEdges(
+        line=np.array([own.line[i] for i, *_ in chosen]).reshape(-1, 3, d),
+        angle=angle[kept],
+        along=np.array([(own.along[i], o.along[j]) for i, o, j, _ in chosen]).reshape(-1, 2, d),
+        neighbour=tuple(names[k] for k in kept),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Rims:
+    """Sides of faces: corner nodes, normal of the face there, tangent into the face."""
+
+    keys: list[tuple[int, ...]]
+    faces: list[tuple[int, ...]]
+    line: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    along: NDArray[np.float64]
+
+
+def _rims(mesh: Mesh, blocks: Sequence[FaceBlock]) -> _Rims:
+    keys: list[tuple[int, ...]] = []
+    faces: list[tuple[int, ...]] = []
+    lines, normals, tangents = [], [], []
+    for block in blocks:
+        family, corner = FAMILIES[block.family], reference_nodes(block.family)
+        sides = [(k,) for k in range(2)] if family.dimension == 1 else list(family.edges)
+        nodes = block.connectivity
+        for side in sides:
+            at = face_geometry(mesh.points, block, corner[list(side)].mean(axis=0, keepdims=True))
+            begin, end = mesh.points[nodes[:, side[0]]], mesh.points[nodes[:, side[-1]]]
+            middle, normal = at.position[:, 0], at.normal[:, 0]
+            inward = mesh.points[nodes[:, : family.corners]].mean(axis=1) - middle
+            inward = _without(_without(inward, normal), _unit(end - begin))
+            keys.extend(tuple(sorted(row)) for row in nodes[:, list(side)].tolist())
+            faces.extend(tuple(sorted(row)) for row in nodes[:, : family.corners].tolist())
+            lines.append(np.stack([begin, middle, end], axis=1))
+            normals.append(normal)
+            tangents.append(_unit(inward))
+    d = mesh.dimension
+    return _Rims(
+        keys,
+        faces,
+        np.concatenate([np.zeros((0, 3, d)), *lines]),
+        np.concatenate([np.zeros((0, d)), *normals]),
+        np.concatenate([np.zeros((0, d)), *tangents]),
+    )
+
+
+def _unit(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    length = np.linalg.norm(x, axis=-1, keepdims=True)
+    return x / np.where(length > 0.0, length, 1.0)
+
+
+def _without(x: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    return x - np.sum(x * direction, axis=-1, keepdims=True) * direction
+
+
+def _angle(own: _Rims, i: int, other: _Rims, j: int) -> float:
+    cosine = float(np.clip(own.normal[i] @ other.normal[j], -1.0, 1.0))
+    convex = other.along[j] @ own.normal[i] <= 0.0
+    return float(np.arccos(cosine)) * (1.0 if convex else -1.0)
+
+
+def _skin_beside(mesh: Mesh, surface: Surface) -> list[FaceBlock]:
+    """Faces of the skin outside of the surface that share a node with it."""
+    table = FaceTable.of(mesh.blocks)
+    near = np.isin(table.keys, surface.nodes).any(axis=1)
+    if mesh.dimension == 2:  # the axis is no skin
+        near &= (mesh.points[table.keys[:, -2:], 0] > 0.0).any(axis=1)
+    inside = [
+        table.find(block.connectivity[:, : FAMILIES[block.family].corners])
+        for block in surface.blocks
+    ]
+    rows = np.setdiff1d(np.flatnonzero(near & ~table.shared), np.concatenate(inside))
+    return list(table.surface("", rows).blocks)
+
+
+def _names(mesh: Mesh, faces: list[tuple[int, ...] | None]) -> list[str | None]:
+    """Name of the surface of each face, empty without one; None stays None."""
+    wanted = {face for face in faces if face is not None}
+    owner: Mapping[tuple[int, ...], str] = {
+        face: name
+        for name, surface in mesh.surfaces.items()
+        for block in surface.blocks
+        for face in map(
+            tuple,
+            np.sort(block.connectivity[:, : FAMILIES[block.family].corners], axis=1).tolist(),
+        )
+        if face in wanted
+    }
+    return [None if face is None else owner.get(face, "") for face in faces]

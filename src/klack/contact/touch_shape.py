@@ -1,0 +1,91 @@
+r"""Shape of two surfaces where they press on each other: how fast their gap opens.
+
+Around the most loaded contact point the gap is, to second order in the tangent plane,
+
+.. math:: g = g_0 + s \cdot x + \tfrac{1}{2} x^T H x ,
+
+taken on the curved faces, so a mesh much coarser than the contact gives it as well as a fine one.
+The eigenvalues of *H* are the relative curvatures of Hertz's theory.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.mortar import ContactSpace
+from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
+from klack.mesh.mesh import FaceBlock, Mesh, Surface
+
+__all__ = ["relative_curvatures"]
+
+_LATTICE = 7
+_LEAST_SHARE = 0.3  # of the samples that have to face the other surface
+
+
+def relative_curvatures(
+    space: ContactSpace,
+    pressures: NDArray[np.float64],
+    sides: tuple[tuple[Mesh, Surface], tuple[Mesh, Surface]],
+) -> NDArray[np.float64]:
+    """Principal relative curvatures [1/m] at the most loaded contact point, the largest first.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    pressures : array, shape (nc,) [N]
+        Forces of the contact points.
+    sides : pairs of mesh and surface
+        Of body a and of body b, as they touch.
+
+    Returns
+    -------
+    array, shape (d - 1,)
+        Convex positive: about 1/R for a sphere on a plane, 0 for flat on flat.  nan where too
+        little of the faces around that point has something to face.
+    """
+    slave, master = sides if space.slave == "a" else (sides[1], sides[0])
+    mesh, surface = slave
+    node = int(space.nodes[np.argmax(pressures)])
+    positions, normals = _samples(mesh, surface, node)
+    met = project_to_surface(positions, normals, *master)
+    columns = 1 if mesh.dimension == 2 else 2
+    if np.sum(met.met) < max(_LEAST_SHARE * len(positions), 6 * columns):
+        return np.full(columns, np.nan)
+    normal = normals.mean(axis=0)
+    frame = _tangents(normal / np.linalg.norm(normal))
+    x = (positions[met.met] - mesh.points[node]) @ frame.T
+    scale = float(np.abs(x).max())
+    x, gap = x / scale, met.gap[met.met]
+    if columns == 1:
+        terms = np.column_stack([np.ones(len(x)), x, x**2])
+        coefficient, *_ = np.linalg.lstsq(terms, gap)
+        return np.array([2.0 * coefficient[2] / scale**2])
+    u, v = x.T
+    terms = np.column_stack([np.ones(len(x)), u, v, u**2, u * v, v**2])
+    coefficient, *_ = np.linalg.lstsq(terms, gap)
+    _, _, _, a, b, c = coefficient
+    H = np.array([[2.0 * a, b], [b, 2.0 * c]]) / scale**2
+    return np.asarray(np.linalg.eigvalsh(H)[::-1], dtype=float)
+
+
+def _samples(
+    mesh: Mesh, surface: Surface, node: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions and outward normals on the faces at a node, shape (p, d) each."""
+    positions, normals = [], []
+    for block in surface.blocks:
+        lattice = face_lattice(block.family, _LATTICE)
+        here = block.connectivity[(block.connectivity == node).any(axis=1)]
+        if not len(here):
+            continue
+        at = face_geometry(mesh.points, FaceBlock(block.family, here), lattice)
+        positions.append(at.position.reshape(-1, mesh.dimension))
+        normals.append(at.normal.reshape(-1, mesh.dimension))
+    return np.concatenate(positions), np.concatenate(normals)
+
+
+def _tangents(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal tangents in rows, shape (d - 1, d)."""
+    if len(normal) == 2:
+        return np.array([[-normal[1], normal[0]]])
+    _, _, rows = np.linalg.svd(normal[None, :])
+    return np.asarray(rows[1:])

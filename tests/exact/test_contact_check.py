@@ -1,0 +1,234 @@
+"""What a mesh alone cannot tell of its contact: width, sharp edges, ends of the named surface.
+
+Truth: Hertz's laws (Johnson 1985, 4.22 and 4.45) and the contact of a mesh that resolves it; angles
+and names of the drawing.
+"""
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from klack.case import read_case
+from klack.case.schema import Case
+from klack.contact.statics import COARSE
+from klack.contact.surface_edges import surface_edges
+from klack.errors import AccuracyWarning
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.profile import Arc, Line, Profile
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_revolved
+from klack.workflow.contact_check import FEWEST_POINTS, ContactCheck, check_contact, ends_reached
+from klack.workflow.impact import run_impact
+from klack.workflow.problem import build_problem
+from klack.workflow.progress import silent
+
+CASE = """
+klack: 1
+title: Small needle
+materials: {{steel: {{young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}}}
+bodies:
+  needle:
+    geometry:
+      model: axisymmetric
+      profile: {{unit: mm, parts: {{needle: {{start: {start}, edges: [{needle}, {{line: [1, 4]}},
+        {{line: [0, 4]}}, {{close: true}}]}}}}}}
+    material: steel
+    mesh: {{size: 0.5 mm, grading: 0.5, contact: {{size: {size} mm, extent: {extent} mm}}}}
+  housing:
+    geometry:
+      model: axisymmetric
+      profile: {{unit: mm, parts: {{housing: {{start: {seat_start}, edges: [{seat}]}}}}}}
+    material: steel
+    mesh: {{size: 0.5 mm, grading: 0.5, contact: {{size: {size} mm, extent: {extent} mm}}}}
+    fixed: [{{surface: outside}}]
+contact: {{between: [needle.tip, housing.seat], gap: 0 um}}
+motion: {{speed: {speed} m/s}}
+reduction: {{modes: {{needle: {{count: 4}}, housing: {{count: 4}}}}}}
+run: {{duration: 12 us, levels: [interface]}}
+"""
+BALL = "{arc: [1, 1], centre: [0, 1], name: tip}"
+FLAT = (
+    "{line: [2.5, -2]}, {line: [2.5, 0], name: outside}, {line: [0, 0], name: seat}, {close: true}"
+)
+CONE = (
+    "{line: [2.5, -2.5]}, {line: [2.5, 0], name: outside}, {line: [1.2, 0]}, "
+    "{line: [0.2, -1.0], name: seat}, {close: true}"
+)
+SHARP = (  # a bore with a square edge, met by a cone
+    "{line: [2.5, -2]}, {line: [2.5, 0], name: outside}, {line: [0.5, 0], name: seat}, "
+    "{close: true}"
+)
+ROUNDED = (
+    "{line: [2.5, -2]}, {line: [2.5, 0], name: outside}, {line: [0.55, 0]}, "
+    "{arc: [0.5, -0.05], centre: [0.55, -0.05], name: seat}, {close: true}"
+)
+POINTED = "{line: [0.2, 0]}, {line: [1, 0.8], name: tip}"
+CROWNED = "{line: [0.2, 0]}, {arc: [1, 0.8], centre: [-2.4, 3.4], name: tip}"
+
+
+def case(needle: str, seat: str, size: float, *, extent: float = 0.0, speed: float = 0.3) -> Case:
+    starts = {FLAT: "[0, -2]", CONE: "[0.2, -2.5]"}
+    text = CASE.format(
+        start="[0, 0]",
+        needle=needle,
+        seat=seat,
+        seat_start=starts.get(seat, "[0.5, -2]"),
+        size=size,
+        extent=max(extent, 2.0 * size),
+        speed=speed,
+    )
+    return read_case(text, Path("small.yaml"))
+
+
+def checked(asked: Case, force: float = 5.0) -> tuple[ContactCheck, list[str]]:
+    """Check the static contact at a force, and return what was said."""
+    problem = build_problem(asked, silent)
+    force = min(force, problem.static.max_force)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = check_contact(asked, problem.pair, problem.static, force, "tip on seat")
+    problem.close()
+    return found, [str(w.message) for w in caught if issubclass(w.category, AccuracyWarning)]
+
+
+@pytest.mark.parametrize(
+    ("needle", "seat", "size"),
+    [
+        pytest.param(BALL, FLAT, 0.4, id="sphere on a plane"),
+        pytest.param(BALL, CONE, 0.3, id="sphere on a cone"),
+        pytest.param(POINTED, ROUNDED, 0.1, id="cone on a torus"),
+        pytest.param(CROWNED, ROUNDED, 0.1, id="crowned cone on a torus"),
+    ],
+)
+def test_one_round_of_refinement_is_enough(needle, seat, size):
+    """A mesh up to forty times too coarse names the size that the next one needs.
+
+    Tolerance of the width: the curvature on elements as long as the radius, and finite slopes.
+    """
+    coarse, said = checked(case(needle, seat, size))
+    assert coarse.size_ratio > COARSE
+    assert len(said) == 1
+    assert "refine both contact surfaces to" in said[0]
+    advised = 0.5 * coarse.expected
+
+    fine, said = checked(case(needle, seat, 1e3 * advised, extent=3e3 * coarse.expected))
+
+    assert said == []
+    assert fine.doubts == ()
+    assert fine.size_ratio < 1.2
+    assert fine.points_across >= FEWEST_POINTS
+    assert coarse.expected == pytest.approx(fine.half_width, rel=0.25)
+    assert fine.expected == pytest.approx(fine.half_width, rel=0.08)
+
+
+@pytest.mark.parametrize("size", [0.03, 0.014])
+def test_a_sharp_edge_is_told_whatever_the_mesh(size):
+    found, said = checked(case(POINTED, SHARP, size))
+
+    assert found.doubts[0] == "it lies on a sharp edge"
+    assert np.isnan(found.expected)
+    assert len(said) == 1  # and no size of elements
+    assert "sharp edge of 'housing' (housing.seat, at (0.5, 0) mm, 90 deg)" in said[0]
+    assert "give the edge the radius that it really has" in said[0]
+
+
+def test_a_flat_face_with_edges_is_no_sharp_edge():
+    flat = "{line: [1, 0], name: tip}"
+
+    found, said = checked(case(flat, FLAT, 0.1, speed=0.05))
+
+    assert said == []
+    assert "it lies on a sharp edge" not in found.doubts
+
+
+def split(at: float) -> str:
+    """Ball whose named arc ends at an angle from the axis [rad]."""
+    r, z = np.sin(at), 1.0 - np.cos(at)
+    return (
+        f"{{arc: [{r:.12f}, {z:.12f}], centre: [0, 1], name: tip}}, "
+        "{arc: [1, 1], centre: [0, 1], name: flank}"
+    )
+
+
+def test_a_contact_over_the_end_of_the_named_surface_names_the_next_one():
+    """A sphere touches a cone of 45 degrees at 45 degrees; its named arc ends there."""
+    whole, none = checked(case(BALL, CONE, 0.005, extent=0.05), 20.0)
+    half, said = checked(case(split(np.pi / 4), CONE, 0.005, extent=0.05), 20.0)
+
+    assert whole.doubts == ()
+    assert none == []
+    assert "it runs over the end of a named surface" in half.doubts
+    assert len(said) == 1
+    assert "end of 'needle.tip'" in said[0]
+    assert "add 'needle.flank' to 'tip'" in said[0]
+
+
+def test_an_end_beside_the_contact_is_not_told():
+    found, said = checked(case(split(np.pi / 4 + 0.12), CONE, 0.005, extent=0.05), 20.0)
+
+    assert said == []
+    assert found.doubts == ()
+
+
+def test_levels_with_contact_points_tell_the_end_as_well():
+    asked = case(split(np.pi / 4), CONE, 0.005, extent=0.05)
+    problem = build_problem(asked, silent)
+    study = run_impact(asked, levels=("interface",))
+    unseen = ContactCheck(half_width=1e-5, size_ratio=0.5, points_across=9, expected=1e-5)
+
+    with pytest.warns(AccuracyWarning, match=r"level 'interface': .*add 'needle\.flank'"):
+        seen = ends_reached(unseen, problem.pair, problem.space, study.levels, "tip on seat")
+
+    assert seen.doubts == ("it runs over the end of a named surface",)
+    blind = {"interface": replace(study.levels["interface"], pressure=None)}
+    assert ends_reached(unseen, problem.pair, problem.space, blind, "") is unseen
+    assert any("add 'needle.flank'" in note for note in study.warnings)
+    assert set(seen.doubts) <= set(study.contact.doubts)
+
+
+HALF = Profile(
+    (0, 0),
+    (
+        Arc((0.5e-3, 1e-3 * (1 - np.sqrt(0.75))), (0, 1e-3), "tip"),
+        Arc((1e-3, 1e-3), (0, 1e-3), ""),
+        Line((0, 1e-3), "top"),
+        Line((0, 0), "axis"),
+    ),
+)
+
+
+@pytest.mark.parametrize("mesher", [mesh_meridian, mesh_revolved])
+def test_edges_of_a_drawing_come_back_from_its_mesh(mesher):
+    """A tip that goes on smoothly without a name, and a top that ends at a right angle."""
+    mesh = mesher({"ball": HALF}, MeshSizing(size=0.3e-3))
+
+    tip, top = (surface_edges(mesh, mesh.surface(name)) for name in ("tip", "top"))
+
+    assert tip.ends.any()
+    assert not tip.corners.any()
+    assert set(tip.neighbour) <= {"", "face1", "face2", "face3"}
+    radius = np.linalg.norm(tip.line[tip.ends, 0, :-1], axis=1)
+    np.testing.assert_allclose(radius, 0.5e-3, rtol=1e-6)
+    assert top.corners.any()
+    assert not top.ends.any()
+    np.testing.assert_allclose(np.degrees(top.angle[top.corners]), 90.0, atol=6.0)
+
+
+def test_a_set_of_faces_in_a_mesh_is_known_by_its_name():
+    mesh = mesh_meridian({"ball": HALF}, MeshSizing(size=0.3e-3))
+    rest = surface_edges(mesh, mesh.surface("tip"))
+    (number,) = np.flatnonzero(rest.ends)
+    assert rest.neighbour[number] == ""
+    profile = Profile(
+        HALF.start, (HALF.edges[0], replace(HALF.edges[1], name="SET-2"), *HALF.edges[2:])
+    )
+
+    named = mesh_meridian({"ball": profile}, MeshSizing(size=0.3e-3))
+
+    surfaces = MappingProxyType(dict(named.surfaces))
+    ends = surface_edges(replace(named, surfaces=surfaces), named.surface("tip"))
+    assert ends.neighbour == ("SET-2",)
