@@ -32,6 +32,9 @@ __all__ = [
 ]
 
 Real = float | None
+OwnComponents = Annotated[
+    dict[str, str], Field(description="First digits of the SHA-256 of their code, by name.")
+]
 Share = Annotated[Real, Field(description="Relative: 0.01 is 1 %.")]
 
 
@@ -186,9 +189,7 @@ class StrokeJson(VariantJson):
     schema: Literal["klack-stroke/1"]
     case: str
     klack: Annotated[str, Field(description="Version.")]
-    own_components: Annotated[
-        dict[str, str], Field(description="First digits of the SHA-256 of their code, by name.")
-    ]
+    own_components: OwnComponents
     variant: Annotated[str, Field(description="Name of the reference variant.")]
     variants: Annotated[dict[str, VariantJson], Field(description="All of them by name.")]
 
@@ -295,6 +296,7 @@ class DesignNoiseJson(ClickJson):
 
     kind: str
     run: str
+    own_components: OwnComponents
     third_octave: Annotated[list[BandJson], Field(description="Of the force of all stops.")]
     injected_energy_J: Real
     radiated_energy_J: Real
@@ -334,6 +336,7 @@ class CalibrationJson(TypedDict):
     schema: Literal["klack-calibrate/1"]
     case: str
     klack: Annotated[str, Field(description="Version.")]
+    own_components: OwnComponents
     variant: str
     strokes: int
     parameters: Annotated[dict[str, CalibratedJson], Field(description="By their path.")]
