@@ -62,8 +62,9 @@ def prepare() -> None:
 
     text = (DATA / "tiny_rods.yaml").read_text()
     for name, speed in (("a", "1 m/s"), ("b", "2 m/s")):
-        Path(f"{name}.yaml").write_text(text.replace("1 m/s", speed))
-        words = ["impact", f"{name}.yaml", "--no-certify", "--no-report", "-q"]
+        Path(name).mkdir()
+        Path(name, "rods.yaml").write_text(text.replace("1 m/s", speed))
+        words = ["impact", f"{name}/rods.yaml", "--no-certify", "--no-report", "-q"]
         assert run([*words, "--out", f"result-{name}"]) == 0
     Path("bench").mkdir()
     write_bench(Path("bench").absolute(), 3, 2)
@@ -77,7 +78,7 @@ def words_of(command: str, name: str) -> list[str]:
     one = ("--workers", "1", "--threads", "1")
     seed = "1" if name == "a" else "2"
     return {
-        "impact": ["impact", f"{name}.yaml", "--no-certify", "--no-report"],
+        "impact": ["impact", f"{name}/rods.yaml", "--no-certify", "--no-report"],
         "noise": ["noise", f"result-{name}", "--no-report"],
         "shots": ["shots", str(NEEDLE), "--shots", "2", *one, "--seed", seed, "--no-report"],
         "calibrate": ["calibrate", calibrated, *strokes, "--no-report"],
@@ -102,6 +103,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     from klack.cli.stored import is_result, load_stored
     from klack.errors import InputError
     from klack.whole_file import completed
+    from klack.workflow.noise_summary import noise_to_json
 
     there = contents(completed(out))
     logs = {name: there.pop(name) for name in list(there) if "unfinished" in name}
@@ -125,7 +127,8 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
         elif command == "shots":
             same = study.seed == {"a": 1, "b": 2}[name]
         else:
-            same = beside == of_it
+            reference = load_stored(Path(f"{command}-{name}"))
+            same = noise_to_json(study) == noise_to_json(reference)
         if same and (command == "calibrate" or beside == of_it):
             return name
     return "mixed"
