@@ -245,8 +245,8 @@ def test_a_run_stopped_at_any_time_leaves_a_whole_result(number, code, tmp_path:
         # while Python itself starts or ends, it is Python that answers
         assert process.returncode in (0, 1, code, -number), err
         if process.returncode == code:
-            assert err.startswith("klack impact: stopped; ")
-            assert err.count("\n") == 1
+            assert err.splitlines()[-1].startswith("klack impact: stopped; ")
+            assert "Traceback" not in err
         assert names(tmp_path / "out") == ["result.zarr"]
         assert load_stored(tmp_path / "out") is not None
 

@@ -454,7 +454,7 @@ def test_files_are_whole_or_as_before(
     before = path.read_bytes()
     assert [item.name for item in path.parent.iterdir()] == [name]
 
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
@@ -473,7 +473,7 @@ def test_tables_of_text_come_together_or_not(
     def broken(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(json, "dumps", broken)
+    monkeypatch.setattr(Path, "write_text", broken)
     with pytest.raises(InputError, match="No space left"):
         write_csv(tables["stroke"], tmp_path)
 
