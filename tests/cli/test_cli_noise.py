@@ -187,7 +187,7 @@ def test_two_designs_stand_side_by_side(impact, tmp_path, capsys):
     }
     out = capsys.readouterr().out
     assert "0.5 % of critical damping is assumed" in out
-    assert re.search(r"other - out( +\+0\.0 dB){7}( +x 1){2}", out)
+    assert re.search(r"other - out( +\+0\.0 dB){8}( +x 1){2}", out)
 
 
 def test_differences_of_two_designs_are_levels(heard):

@@ -5,6 +5,7 @@ file that code would write if it ran.
 """
 
 import json
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -151,6 +152,8 @@ def test_a_class_that_was_let_in_acts_and_stands_in_the_record(tmp_path, monkeyp
     assert load_any_case("case.yaml", [EddyBrake]).own_components == {BRAKE: digest}
     tree = read_case_tree(Path("case.yaml"), [EddyBrake])
     assert tree.case().own_components == {BRAKE: digest}
+    sent = pickle.loads(pickle.dumps(tree))  # to the workers of a calibration
+    assert sent.case().own_components == {BRAKE: digest}
     changed = HOW_TO.joinpath("eddy_brake.py").read_bytes() + b"\n"
     Path("eddy_brake.py").write_bytes(changed)
     monkeypatch.setattr(sys.modules["eddy_brake"], "__file__", str(Path("eddy_brake.py")))

@@ -17,7 +17,7 @@ from klack.acoustics.plate import Plate
 from klack.acoustics.port_forces import port_forces
 from klack.acoustics.radiation import power_transfer
 from klack.acoustics.spectrum import force_spectrum
-from klack.acoustics.surface_bands import face_band_velocity, radiated_bands
+from klack.acoustics.surface_bands import face_band_velocity, radiated_bands, surface_spectra
 from klack.acoustics.third_octave import band_edges, band_numbers
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
@@ -126,6 +126,34 @@ def test_static_force_on_the_hold(damped: Structure) -> None:
     for port in damped.port_names:
         share = support_force_transfer(damped, port, np.array([0.0, 10.0]))
         assert share == pytest.approx([1.0, 1.0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("mount", "plate"), [(None, None), (MOUNT, None), (None, PLATE), (MOUNT, PLATE)]
+)
+def test_energy_of_the_force_is_lost_in_the_modes_or_below(
+    damped: Structure, mount: Mount | None, plate: Plate | None
+) -> None:
+    """Int 2 Re(Y) |F|^2 df = losses of the modes + what flows into mount and plate."""
+    pulse = pulses(step=20e-9, count=30_000, times=(2e-5, 2e-4), length=1e-5)
+    bands = np.column_stack(band_edges(band_numbers(900.0, 224e3)))
+    spectra = surface_spectra(damped, {"tip": pulse}, bands, mount=mount, plate=plate)
+    count, at = len(damped.omega), damped.port_index("tip")
+
+    below = spectra.support_energy()
+
+    given = lost = 0.0
+    for part in spectra.parts:
+        f, weights = part.frequency, part.weights.sum(axis=0)
+        force = part.fields[:, count + at] / (2j * np.pi * f)
+        drive = drive_point_mobility(damped, "tip", f, mount=mount, plate=plate)
+        given += weights @ (2.0 * drive.real * np.abs(force) ** 2)
+        rates = 2.0 * damped.damping * damped.omega
+        lost += weights @ (2.0 * np.abs(part.fields[:, :count]) ** 2 @ rates)
+    assert below.shape == (len(bands),)
+    assert np.all(below >= 0.0)
+    assert (below.sum() > 0.1 * given) == (mount is not None or plate is not None)
+    assert lost + below.sum() == pytest.approx(given, rel=1e-9)
 
 
 def test_bands_add_up_to_the_whole(damped: Structure) -> None:

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <math.h>
 #include <signal.h>
+#include <stdio.h>
 #include <unistd.h>
 
 #if FMI == 2

@@ -210,13 +210,14 @@ if sys.argv[2] == "idle":
 @pytest.mark.parametrize("state", ["hangs", "idle", "ends"])
 def test_no_process_is_left_alone(state: str, spring_damper_fmu: Build):
     """Killed while the FMU hangs in a call, killed while it waits, and at a usual end."""
-    path = spring_damper_fmu(fault="for (;;) sleep(1)")
+    fault = 'fclose(fopen("hanging", "w")); for (;;) sleep(1)'
+    path = spring_damper_fmu(fault=fault)
     command = [sys.executable, "-c", PARENT, str(path), state]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
         assert parent.stdout is not None
         child = int(parent.stdout.readline())
         if state == "hangs":
-            _until(lambda: _state(child) == "S", 10.0)
+            _until(Path(f"/proc/{child}/cwd/hanging").exists, 20.0)
         else:
             parent.stdout.readline()
         if state != "ends":

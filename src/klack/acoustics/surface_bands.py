@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.air import Air
 from klack.acoustics.harmonic import harmonic_response
-from klack.acoustics.mount import Mount
+from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Plate
 from klack.acoustics.port_forces import aligned_forces
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
@@ -81,13 +81,14 @@ class SurfaceSpectra:
     Parameters
     ----------
     structure : Structure
-    plate : Plate or None
+    mount, plate : Mount, Plate or None
     bands : array, shape (n, 2) [Hz]
     parts : tuple
         Spectra, decade by decade.
     """
 
     structure: Structure
+    mount: Mount | None
     plate: Plate | None
     bands: Floats
     parts: tuple[_Decade, ...]
@@ -125,6 +126,26 @@ class SurfaceSpectra:
         energy = np.array(columns).reshape(len(columns), len(names)).T
         return RadiatedBands(names=names, bands=self.bands, energy=energy)
 
+    def support_energy(self) -> Floats:
+        r"""Energy that flows through the held surfaces into mount and plate, in every band [J].
+
+        .. math:: \int_{band} 2\,\mathrm{Re}(Y_s)\,|\hat F_s|^2\,\mathrm df
+
+        with mobility :math:`Y_s` of the support and force :math:`F_s` on it; zero for a rigid hold.
+        """
+        return np.array(
+            [
+                float(weights @ flowing)
+                for part in self.parts
+                for flowing in [
+                    2.0
+                    * support_mobility(part.frequency, self.mount, self.plate).real
+                    * np.abs(part.support_force) ** 2
+                ]
+                for weights in part.weights
+            ]
+        )
+
 
 def surface_spectra(
     structure: Structure,
@@ -149,7 +170,7 @@ def surface_spectra(
     aligned_forces(structure, forces)
     edges = _edges(bands, forces)
     parts = tuple(_decades(structure, forces, edges, mount, plate))
-    return SurfaceSpectra(structure=structure, plate=plate, bands=edges, parts=parts)
+    return SurfaceSpectra(structure=structure, mount=mount, plate=plate, bands=edges, parts=parts)
 
 
 def face_band_velocity(

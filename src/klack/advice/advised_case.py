@@ -80,7 +80,7 @@ def advised_text(tree: CaseTree, advice: Advice, path: Path, version: str) -> st
     moved = moved_files(tree, path.absolute().parent)
     text = with_values(tree, {**moved, **values}, header)
     try:
-        read_any_case(text, path, tree.components)
+        read_any_case(text, path, tree.components.values())
     except InputError as error:
         raise InputError(
             f"--write {path}",

@@ -1,7 +1,7 @@
 """A case as it was written, with single values exchanged and the whole checked again."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +24,16 @@ class CaseTree:
     text : str
     data : mapping
     lines : Lines
-    components : tuple of type
-        Of the user's own, that the case may name.
+    components : mapping of str to type
+        Of the user's own, by the words that the case may name them with.  A worker process knows
+        a class of a script under another module, so that the word is kept.
     """
 
     path: Path
     text: str
     data: Any
     lines: Lines
-    components: tuple[type[Component], ...] = ()
+    components: Mapping[str, type[Component]] = field(default_factory=dict)
 
     def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
         """Check the case with other values at some keys that it has.
@@ -45,15 +46,15 @@ class CaseTree:
         data = self.data
         for key, value in (values or {}).items():
             data = exchanged(data, key, value)
-        own = {component_word(kind): kind for kind in self.components}
-        return validated(ValveCase, self.text, self.path, data, self.lines, own)
+        return validated(ValveCase, self.text, self.path, data, self.lines, self.components)
 
 
 def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
     """Read the file of a case; ``components`` are those of the user's own that it may name."""
     text = text_of(path)
     data, lines = parse(text, path)
-    return CaseTree(path=path, text=text, data=data, lines=lines, components=tuple(components))
+    own = {component_word(kind): kind for kind in components}
+    return CaseTree(path=path, text=text, data=data, lines=lines, components=own)
 
 
 def exchanged(data: Any, key: Key, value: object) -> Any:

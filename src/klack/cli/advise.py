@@ -91,7 +91,7 @@ def advise(
     from klack.case.valve_reader import read_any_case
 
     tree = read_case_tree(find_case(case), imported(component))
-    checked = read_any_case(tree.text, tree.path, tree.components)
+    checked = read_any_case(tree.text, tree.path, tree.components.values())
 
     from klack import __version__
     from klack.advice.advised_case import advice_yaml, advised_text, changed_values

@@ -135,7 +135,13 @@ def _of_sound(read: Callable[[ClickSound], float]) -> Cell:
 _ROWS: tuple[tuple[str, Cell, str, str], ...] = (
     ("peak force", lambda d: max(stop.peak_force for stop in d.stops), "N", "amplitude"),
     ("level of the unbalanced force", force_level, "dB", "level"),
-    ("structure-borne energy injected", lambda d: d.injected_energy, "J", "energy"),
+    (
+        "structure-borne energy injected, bodies rigidly held",
+        lambda d: d.injected_energy,
+        "J",
+        "energy",
+    ),
+    ("energy into mount and plate besides", lambda d: d.support_energy, "J", "energy"),
     ("sound energy radiated (estimate)", lambda d: d.radiated_energy, "J", "energy"),
     (
         "in the audible range (estimate)",

@@ -41,5 +41,5 @@ def calibrated_text(tree: CaseTree, study: CalibrationStudy, folder: Path) -> st
             f"({', '.join(item.keys)})"
         )
     text = rewritten(tree, values, "\n".join(lines))
-    read_valve_case(text, folder / CALIBRATED_NAME, tree.components)
+    read_valve_case(text, folder / CALIBRATED_NAME, tree.components.values())
     return text

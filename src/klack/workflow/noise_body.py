@@ -114,6 +114,7 @@ def body_noise(
         area=np.array(area),
         radiated=estimate.energy * around.share,
         upper_bound=bound.energy * around.share,
+        support_energy=float(spectra.support_energy() @ around.share),
         surface=Surface(
             points=structure.points,
             faces=structure.faces,

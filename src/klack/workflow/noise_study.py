@@ -125,6 +125,9 @@ class BodyNoise:
         Estimate of the radiated sound energy, on the mount and with the plate of the case.
     upper_bound : array, shape (g, b) [J]
         Equivalent radiated energy ``rho c int v_n^2 dA dt``: radiation efficiency 1.
+    support_energy : float [J]
+        That flows through the held surfaces into mount and plate; nan in results of former
+        versions.
     surface : Surface
     """
 
@@ -151,6 +154,7 @@ class BodyNoise:
     radiated: Floats
     upper_bound: Floats
     surface: Surface
+    support_energy: float = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,8 +285,19 @@ class NoiseDesign:
         return float(self.stops[0].bands.high[balanced[-1]]) if balanced.size else 0.0
 
     @property
+    def support_energy(self) -> float:
+        """Energy through the held surfaces into mounts and plates [J]; nan without bodies.
+
+        It does not stand in :attr:`injected_energy`, whose bodies are held rigidly: on a mount a
+        body moves as a whole and takes up more.  The radiated energy comes from both.
+        """
+        if not self.bodies:
+            return float("nan")
+        return float(sum(body.support_energy for body in self.bodies))
+
+    @property
     def injected_energy(self) -> float:
-        """Structure-borne energy through all ports [J]; nan without bodies."""
+        """Structure-borne energy through all ports of held bodies [J]; nan without bodies."""
         if not self.bodies:
             return float("nan")
         return float(sum(body.injected.sum() for body in self.bodies))
