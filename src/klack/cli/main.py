@@ -43,7 +43,13 @@ from klack.cli import (
 )
 from klack.cli.printable import printable
 from klack.cli.stopping import stop_code, terminable
-from klack.cli.surroundings import close_quietly, in_words, prepare_compiling, prepare_streams
+from klack.cli.surroundings import (
+    close_quietly,
+    in_words,
+    prepare_compiling,
+    prepare_streams,
+    require_present_folder,
+)
 from klack.errors import AccuracyWarning, CacheWarning, ConvergenceError, KlackError
 
 __all__ = ["COMMANDS", "app", "main"]
@@ -128,6 +134,7 @@ def _run(arguments: list[str], name: str) -> int:
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, note
         if arguments and not arguments[0].startswith("-"):
+            require_present_folder()
             prepare_compiling()
         code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
     sys.stdout.flush()
