@@ -19,6 +19,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from inspect import getdoc
 from typing import Any
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
@@ -81,10 +82,10 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",
 }
-"""Every command, and what its help ends with."""
+"""Every command, with the example that its help shows."""
 
 for _command, _example in COMMANDS.items():
-    app.command(_command, help_epilogue=f"Example: {_example}")
+    app.command(_command, help=f"{getdoc(_command)}\n\nExample: {_example}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
