@@ -23,6 +23,7 @@ def test_it_says_where_how_many_and_how_large(filled, capsys):
     out, words = capsys.readouterr()
     size = sum(path.stat().st_size for path in filled.glob("*.entry"))
     assert json.loads(out) == {
+        "schema": "klack-cache/1",
         "folder": str(filled),
         "count": 3,
         "size_B": size,

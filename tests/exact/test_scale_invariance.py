@@ -26,6 +26,7 @@ bodies:
   sphere:
     geometry:
       model: axisymmetric
+      extent: {ball}  # what klack would ask about 4 um and 4 m
       profile:
         unit: {unit}
         parts:
@@ -40,6 +41,7 @@ bodies:
   disc:
     geometry:
       model: axisymmetric
+      extent: {plate}
       profile:
         unit: {unit}
         parts:
@@ -88,6 +90,8 @@ def study_of(unit: str = "mm", scale: float = 1.0) -> ImpactStudy:
         d=point(0, -6),
         e=point(4, -6),
         f=point(4, 0),
+        ball=length(4.0),
+        plate=length(8.0),
         size=length(0.8),
         fine=length(0.03),
         extent=length(0.2),

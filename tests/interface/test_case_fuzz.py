@@ -1,24 +1,24 @@
 """Damaged and hostile case files: a case, or one clear error in bounded time and memory.
 
 Every shipped case is changed as text (lines, indentation, numbers, bytes) and as a tree (each value
-in turn becomes something nasty).  Longer: ``KLACK_LONG=100``, another ``KLACK_SEED=2``.
+in turn becomes something nasty; numbers, units, keys, references and types change).
+Longer: ``KLACK_LONG=100``, another ``KLACK_SEED=2``.
 """
 
 import json
 import os
 import random
 import resource
+import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, seed, settings
-from hypothesis import strategies as st
+from mutated_cases import NASTY, changed, leaves, mutated
 from ruamel.yaml import YAML
 
 from klack.case import shipped_cases
@@ -30,22 +30,6 @@ SEED = int(os.environ.get("KLACK_SEED", "1"))
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASES = [*shipped_cases().values(), *sorted(HOW_TO.glob("*.yaml"))]
 PATIENCE = 20.0  # s of processor time, on a slow machine; usual are 0.05 s
-
-NASTY = [
-    ".nan", ".inf", "-.inf", "1e400", "-1", "0", "1e-320", "'0 mm'", "'-5 um'", "'1e400 mm'",
-    "'nan m'", "'inf bar'", "'1e308 km'", "1e308", "99999999999999999999999999", "null", "~",
-    "true", "''", "' '", "[]", "{}", "[[[[1]]]]", "{kind: {kind: x}}", "{type: spring}",
-    "[1, two, .nan]",
-    "2024-01-01", "0x1F", "0o17", "1_000", "'\u0663 mm'", "'1 mm\\0'", "\"1 mm\\0\"", "\"\\ud800\"",
-    "'../../../../../../etc/passwd'", "/dev/zero", "'~nobody/x'", "'a\\nb'", "'{0.__class__}'",
-    "'%s%n'", "'" + "9" * 5000 + "'", "'" + "((" * 500 + "'", "!!python/object/apply:os.abort []",
-    "!!python/name:os.system", "!!binary aGFsbG8=", "!!set {a, b}", "!!omap [a: 1]", "!<x> y",
-    "*nothing", "&a [*a]", "'[a.b, c.d]'", "needle", "ground", "'needle.tip'", "-0.0", "1e-400",
-]  # fmt: skip
-
-ODD = ["\t", "\r\n", "\ufeff", "\x00", "\x85", "\u2028", "- ", ": ", "{", "}", "[", "]", "'", '"',
-       "|", ">", "&a ", "*a", "!!x ", "#", "%YAML 3.0\n", "---\n", "...\n", "<<: *a", "? ", "@",
-       "`", "\U0001f600", "e9", ".nan", "-", "1e999", "é"]  # fmt: skip
 
 
 def outcome(read: Any) -> None:
@@ -61,25 +45,6 @@ def outcome(read: Any) -> None:
         assert "valve.yaml" in said.where, str(said)
         assert len(str(said)) < 3000, str(said)
     assert time.process_time() - begin < PATIENCE
-
-
-def leaves(tree: Any, path: tuple = ()) -> Iterator[tuple]:
-    """Paths of everything in a tree: sections, lists and single values."""
-    items = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    for key, value in items:
-        yield (*path, key)
-        if isinstance(value, dict | list):
-            yield from leaves(value, (*path, key))
-
-
-def changed(tree: Any, path: tuple, text: str) -> str:
-    """Give the case as YAML, with other text in the place of one value."""
-    whole = json.loads(json.dumps(tree))
-    place = whole
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = "@@"
-    return json.dumps(whole).replace('"@@"', text)
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
@@ -109,55 +74,18 @@ def test_each_key_goes_or_comes_twice():
             outcome(lambda w=whole: read_any_case(json.dumps(w), path.with_name("valve.yaml")))
 
 
-@st.composite
-def damaged(draw: st.DrawFn) -> tuple[Path, str]:
-    """Text of a case with some lines left out, doubled, moved, indented or changed."""
-    path = draw(st.sampled_from(CASES))
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    for _ in range(draw(st.integers(1, 4))):
-        i = draw(st.integers(0, len(lines) - 1))
-        j = draw(st.integers(0, len(lines) - 1))
-        how = draw(st.sampled_from(["drop", "double", "move", "indent", "outdent", "put", "cut"]))
-        if how == "drop" and len(lines) > 2:
-            del lines[i]
-        elif how == "double":
-            lines.insert(j, lines[i])
-        elif how == "move":
-            lines.insert(j, lines.pop(i))
-        elif how == "indent":
-            lines[i] = draw(st.sampled_from([" ", "  ", "\t", " " * 60])) + lines[i]
-        elif how == "outdent":
-            lines[i] = lines[i].lstrip()
-        else:
-            at = draw(st.integers(0, len(lines[i])))
-            put = draw(st.sampled_from([*ODD, *NASTY])) if how == "put" else ""
-            lines[i] = lines[i][:at] + put + lines[i][at + draw(st.integers(0, 9)) :]
-    return path, "".join(lines)
-
-
-@seed(SEED)
-@settings(
-    max_examples=80 * LONGER,
-    deadline=None,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-)
-@given(damaged())
-def test_damaged_text(given_case: tuple[Path, str]):
-    path, text = given_case
-    outcome(lambda: read_any_case(text, path.with_name("valve.yaml")))
-
-
-@seed(SEED)
-@settings(max_examples=60 * LONGER, deadline=None, database=None)
-@given(st.data())
-def test_damaged_bytes(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject):
-    raw = bytearray(data.draw(st.sampled_from(CASES)).read_bytes()[:3000])
-    for _ in range(data.draw(st.integers(1, 5))):
-        raw[data.draw(st.integers(0, len(raw) - 1))] = data.draw(st.integers(0, 255))
-    path = tmp_path_factory.getbasetemp() / "valve.yaml"
-    path.write_bytes(data.draw(st.sampled_from([b"", b"\xef\xbb\xbf", b"\xff\xfe"])) + raw)
-    outcome(lambda: load_any_case(path))
+@pytest.mark.parametrize("batch", range(4))
+def test_mutated_cases(batch: int, tmp_path: Path):
+    """Bytes, lines, values, numbers, units, keys, references, types; see mutated_cases.py."""
+    draw = random.Random(f"{SEED}-{batch}")
+    sources = [path.read_bytes() for path in CASES]
+    for k, path in enumerate(CASES):
+        shutil.copytree(path.parent, tmp_path / str(k), ignore=shutil.ignore_patterns("*.md"))
+    for _ in range(25 * LONGER):
+        k = draw.randrange(len(CASES))
+        path = tmp_path / str(k) / "valve.yaml"
+        path.write_bytes(mutated(sources[k], draw))
+        outcome(lambda path=path: load_any_case(path))
 
 
 HOSTILE = {
@@ -169,6 +97,10 @@ HOSTILE = {
         for a, b in pairwise("abcdefghijklmnopqrstuvwx")
     ),
     "itself": "a: &a\n  b: *a\n",
+    "itself merged": "a: &a {<<: *a}\n",
+    "open brackets": "klack: 1\nx: " + "[" * 5_000,
+    "point far away": "bodies: {a: {geometry: {profile: {parts: {a: {centre: [0, 1e308]}}}}}}\n",
+    "long speed": "motion: {speed: " + "9" * 400 + "}\n",
     "deep lists": "a: " + "[" * 20_000,
     "deep closed lists": "a: " + "[" * 3_000 + "]" * 3_000,
     "deep blocks": "".join(f"{' ' * i}a:\n" for i in range(900)),

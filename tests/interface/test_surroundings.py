@@ -315,3 +315,14 @@ def test_signs_that_steer_a_terminal_are_shown(capsys, tmp_path: Path):
     path.write_text('klack: 1\n"\\e[2J": 1\n')
     assert main(["impact", str(path)]) == 2
     assert "\x1b" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["impact two-rods", "inspect two-rods", "stroke demo-stroke"])
+def test_a_deleted_working_folder_is_one_clear_error(words, tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    done = shell(f"cd {gone} && rmdir {gone} && klack {words}", tmp_path)
+
+    assert done.returncode == 2
+    assert "the present folder: got an error" in done.stderr
+    assert "Traceback" not in done.stderr

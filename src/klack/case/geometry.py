@@ -217,6 +217,12 @@ class Geometry(Section):
     layers: Count | None = Field(
         default=None, ge=6, description="Layers round the circle of a swept mesh."
     )
+    extent: Length | None = Field(
+        default=None,
+        gt=0,
+        description="Longest side of the shape, to confirm its unit of length; asked for where it "
+        "is unusual: all bodies below 0.1 mm, one above 1 m, or two that differ 100-fold.",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -15,7 +15,7 @@ from klack.case.valve_roles import FLEXIBLE_BODY
 from klack.errors import InputError
 from klack.input.problem import Key, key_text, nearest, one_of
 
-__all__ = ["require_surface_names"]
+__all__ = ["place_of", "require_surface_names"]
 
 _Named = tuple[Key, str, str]
 """Key, body, surface."""
@@ -37,7 +37,7 @@ def require_surface_names(case: CaseFile, known: Mapping[str, Collection[str]]) 
     for key, body, surface in (*_of_bodies(case), *_of_contacts(case)):
         if body in known and surface not in known[body]:
             raise InputError(
-                _place(case, key, on_key=key[-1] == surface),
+                place_of(case, key, on_key=key[-1] == surface),
                 got=f"the unknown surface '{surface}' of {body}",
                 expected=f"one of: {one_of(known[body])}",
                 hint=nearest(
@@ -87,7 +87,8 @@ def _of_valve(case: ValveCase) -> Iterator[_Named]:
                 yield ("network", "components", name, "points", i), used, point
 
 
-def _place(case: CaseFile, key: Key, *, on_key: bool) -> str:
+def place_of(case: CaseFile, key: Key, *, on_key: bool) -> str:
+    """File, line and key of a place in a case, for an error."""
     path = case.path or Path("case")
     if not case.source:
         return f"{path}: {key_text(key)}"

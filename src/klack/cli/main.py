@@ -19,6 +19,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from inspect import getdoc
 from typing import Any
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
@@ -43,7 +44,13 @@ from klack.cli import (
 )
 from klack.cli.printable import printable
 from klack.cli.stopping import stop_code, terminable
-from klack.cli.surroundings import close_quietly, in_words, prepare_compiling, prepare_streams
+from klack.cli.surroundings import (
+    close_quietly,
+    in_words,
+    prepare_compiling,
+    prepare_streams,
+    require_present_folder,
+)
 from klack.errors import (
     AccuracyWarning,
     CacheWarning,
@@ -81,10 +88,10 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",
 }
-"""Every command, and what its help ends with."""
+"""Every command, with the example that its help shows."""
 
 for _command, _example in COMMANDS.items():
-    app.command(_command, help_epilogue=f"Example: {_example}")
+    app.command(_command, help=f"{getdoc(_command)}\n\nExample: {_example}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -135,6 +142,7 @@ def _run(arguments: list[str], name: str) -> int:
     with warnings.catch_warnings():
         usual, warnings.showwarning = warnings.showwarning, note
         if arguments and not arguments[0].startswith("-"):
+            require_present_folder()
             prepare_compiling()
         code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
     sys.stdout.flush()

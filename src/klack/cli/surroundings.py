@@ -8,7 +8,15 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
-__all__ = ["close_quietly", "in_words", "prepare_compiling", "prepare_streams"]
+from klack.errors import InputError
+
+__all__ = [
+    "close_quietly",
+    "in_words",
+    "prepare_compiling",
+    "prepare_streams",
+    "require_present_folder",
+]
 
 _WORDS: Mapping[int, str] = {
     errno.ENOSPC: "no space is left on the disk.\nTry: make room, or give another folder (--out; "
@@ -64,6 +72,19 @@ def prepare_compiling() -> None:
             "command compiles them again.",
             file=sys.stderr,
         )
+
+
+def require_present_folder() -> None:
+    """Refuse to start in a folder that somebody has deleted: every relative name fails there."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise InputError(
+            "the present folder",
+            got=f"an error: {error.strerror}; it was deleted or closed to you",
+            expected="a folder that exists",
+            hint="cd to another one, e.g. cd ~.",
+        ) from None
 
 
 def in_words(error: OSError) -> str | None:

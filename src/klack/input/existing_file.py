@@ -40,7 +40,12 @@ def _existing_file(value: Any, info: ValidationInfo) -> Path:
         got, hint = f"'{value}'", "write the name of a file, relative to the case file."
         raise CaseProblem((), got=got, expected="a file name", hint=hint)
     folder = info.context.get("folder", Path()) if info.context else Path()
-    path = (folder / Path(value).expanduser()).resolve()
+    try:
+        path = (folder / Path(value).expanduser()).resolve()
+    except (OSError, RuntimeError) as error:  # the present folder is gone; links in a circle
+        hint = "write the whole path of the file."
+        got = f"'{value}', which leads nowhere ({error})"
+        raise CaseProblem((), got=got, expected="an existing file", hint=hint) from None
     if not path.is_file():
         kind = "a folder" if path.is_dir() else "a file that does not exist"
         raise CaseProblem(

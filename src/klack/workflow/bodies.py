@@ -21,11 +21,11 @@ from klack.mesh.sizing import MeshSizing, Refinement
 from klack.units import format_si
 from klack.workflow.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.workflow.generated_mesh import meshed_profiles, meshed_step
+from klack.workflow.given_shapes import require_given_shapes
 from klack.workflow.held_nodes import held_nodes
 from klack.workflow.mesh_messages import meshed_for_case
 from klack.workflow.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.workflow.progress import Progress
-from klack.workflow.step_names import require_step_names
 
 __all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
 
@@ -70,7 +70,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     """
     _require_surfaces(case)
     progress("mesh", 0.0)
-    require_step_names(case)
+    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
     moving, stop = case.contact.moving, case.contact.stop
     touch = find_touch(case.bodies, moving, stop)
     upper = mesh_body(case.moving_body, moving.body, _places_of_moving_body(case, touch))

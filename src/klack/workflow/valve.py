@@ -25,10 +25,10 @@ from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.structure import Structure
 from klack.workflow.bodies import assemble_body, find_touch, mesh_body
+from klack.workflow.given_shapes import require_given_shapes
 from klack.workflow.levels import damping_of, mode_pool, selection_of
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import warnings_of
-from klack.workflow.step_names import require_step_names
 from klack.workflow.stops import StopContact, build_stop, split_law, stop_law
 from klack.workflow.structures import valve_structures
 
@@ -121,7 +121,7 @@ def build_valve(
 def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
     """Mesh every body, fine at the first touch of each of its stops."""
     progress("mesh", 0.0)
-    require_step_names(case)
+    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
     places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
     for stop in case.stops.values():
         touch = find_touch(case.bodies, stop.upper, stop.lower)
