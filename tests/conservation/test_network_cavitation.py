@@ -30,7 +30,7 @@ network:
        cavitation: null}
     face: {type: pressure-face, direction: opening, outer_diameter: 10 mm}
     poppet: {type: rigid-mass, mass: 20 g, points: [nose]}
-    spring: {type: spring, stiffness: 20 N/mm, preload: 157.0796 N, damping: DAMPING N*s/m}
+    spring: {type: spring, stiffness: 20 N/mm, preload: 157.0796 N, damping: 2 N*s/m}
     seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
     stop: {type: end-stop, gap: 3 mm, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
   connections:
@@ -42,15 +42,13 @@ network:
     - [ground, stop.upper]
     - [ground, spring.base]
     - [ground, out.body]
-run: {duration: 100 ms, step: 200 ns, record: 5 us, variants: [wet], lift: poppet.nose}
+run: {duration: 95 ms, step: 200 ns, record: 5 us, variants: [wet], lift: poppet.nose}
 """
 
 
-@pytest.mark.parametrize("damping", [2, 20])
-def test_a_chattering_valve_runs_through_cavitation(damping):
-    text = CASE.replace("DAMPING", str(damping))
-    data, lines = parse(text, Path("relief.yaml"))
-    case = validated(ValveCase, text, Path("relief.yaml"), data, lines)
+def test_a_chattering_valve_runs_through_cavitation():
+    data, lines = parse(CASE, Path("relief.yaml"))
+    case = validated(ValveCase, CASE, Path("relief.yaml"), data, lines)
     run = case.run
     result = simulate_network(
         case.network.network().rows(), duration=run.duration, step=run.step, record=run.record
