@@ -89,7 +89,7 @@ class ImpactFinder:
     @property
     def state(self) -> Vector:
         """What is known of unfinished impacts, shape (interfaces, n); to go on from."""
-        return self._state.copy().view(np.float64).reshape(len(self._stops), -1)
+        return self._state.copy().view(np.float64).reshape(len(self._stops), _STATE.itemsize // 8)
 
     @state.setter
     def state(self, values: Vector) -> None:

@@ -199,7 +199,7 @@ def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: 
         way = max(way, here)
         left += abs((force - S[ELEMENTS_BEFORE + p]) * (y - S[USED + p]))
         work += abs(force) * here
-    if moved <= share * way and left <= _ENERGY_LEFT * work:
+    if moved <= share * way and left <= _ENERGY_LEFT * work and work < np.inf:
         return True
     displacement, by_forces = 0.0, 0.0
     for p in range(ports):
@@ -252,6 +252,15 @@ def _moved_by_round_off(
             total += abs(way * fi[c])
         largest = max(largest, total)
     return _FORCE_ROUND_OFF * largest
+
+
+@njit(cache=True)
+def _finite(S: Any, ports: int) -> bool:
+    """Whether all ports are somewhere; looked at while it can be seen which part is to blame."""
+    total = 0.0
+    for p in range(ports):
+        total += S[Y1 + p]
+    return abs(total) < np.inf
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -599,8 +608,9 @@ def run_network(
                             r[0] /= A[0]
                         else:
                             _solve(A, r, volumes)
-                        worst = 0.0
+                        worst, total = 0.0, 0.0
                         for i in range(volumes):
+                            total += r[i]
                             target = rho[i] + slope[i] * r[i]
                             large = abs(r[i]) > _LARGE_STEP * p[i]
                             if iteration >= _PLAIN_NEWTON:
@@ -615,7 +625,8 @@ def run_network(
                                 new, node_hint[i] = pressure_at(node_fluid, target, node_hint[i])
                                 r[i] = new - p[i]
                             worst = max(worst, abs(r[i]) / max(p[i], node_ambient))
-                        if worst < _PRESSURE_LEFT:
+                        finite = abs(total) < np.inf
+                        if finite and worst < _PRESSURE_LEFT:
                             for i in range(volumes):
                                 p[i] += r[i]
                             break
@@ -623,7 +634,8 @@ def run_network(
                         share = 1.0 if iteration < _FULL_NEWTON else 0.5
                         for i in range(volumes):
                             p[i] += share * r[i]
-                        if iteration == _MOST_NEWTON - 1 or not worst < np.inf:
+                        # at once, while it can be seen which branch is to blame
+                        if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
                             report[0], report[2] = 0.0, t
                             for i in range(volumes):
                                 if abs(r[i]) / max(p[i], node_ambient) == worst:
@@ -740,7 +752,7 @@ def run_network(
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
                     break
-                if sweep == _MOST_SWEEPS - 1:
+                if sweep == _MOST_SWEEPS - 1 or (sweep == 0 and not _finite(S, ports)):
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
             S[FORCE + ports] = 0.0  # what pushes the ground moves nothing

@@ -6,6 +6,7 @@ the records are thinned to the spacing that was asked for, and the steps are kep
 more room for them.  So the memory of a run follows from the number of its records alone.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,7 +142,10 @@ class Recorder:
             network.interfaces.gap,
         )
         self._points[:, 0] = self.recording.points[0]
-        if fresh:  # a finder that goes on knows this moment
+        if fresh:  # a run that goes on knows this moment
+            for name, value in self._derived_states():
+                place = next(i for i, column in enumerate(self.points) if column.name == name)
+                self._points[place, 0] = value
             none = [np.empty((0, _FINE))] * len(self._fine)
             finder.feed(np.array([time]), self._velocities(1), none)
 
@@ -204,6 +208,22 @@ class Recorder:
                 if found is None or look < found[0]:
                     found = int(look), columns[column].name
         return found
+
+    def _derived_states(self) -> Iterator[tuple[str, float]]:
+        """Derived states as the step functions gave them in the call before the first step."""
+        network = self.network
+        for k, row in enumerate(network.rows.elements):
+            begin = network.elements.output0[k] + len(row.ports)
+            for channel in row.channels:
+                if channel.derived:
+                    value = network.elements.outputs[begin + channel.index]
+                    yield _column(row, channel.label), float(value)
+        for k, branch in enumerate(network.rows.branches):
+            begin = network.branches.output0[k] + 3 + len(branch.ports)
+            for channel in branch.channels:
+                if channel.derived:
+                    value = network.branches.outputs[begin + channel.index]
+                    yield _column(branch, channel.label), float(value)
 
     def _velocities(self, count: int) -> dict[str, Vector]:
         """Of the centres of mass [m/s] in the present chunk, by component."""

@@ -1,6 +1,6 @@
 """Run a network: static start, time loop, channels, impacts, energy books."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Literal
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from klack import energy_balance
 from klack.errors import ConvergenceError, InputError, require_positive
+from klack.hydraulics.fluid_table import fluid_at
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
@@ -44,6 +45,7 @@ __all__ = ["simulate_network"]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
+Kept = Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
@@ -240,11 +242,7 @@ def _run(
         kept = _everything(network, clock)
         good, failure = _try_chunk(network, recorder, limits, clock, grid, count)
         if failure is not None:
-            # again, without the looks that failed, so that all that is kept is of one moment
-            _put_back(kept)
-            if good and _try_chunk(network, recorder, limits, clock, grid, good)[1] is not None:
-                _put_back(kept)  # one that cannot be repeated
-                good = 0
+            good, failure = _up_to(network, recorder, limits, clock, grid, kept, good, failure)
         if good:
             steps = int(clock[0]) + grid.look_steps * np.arange(1 - good, 1)
             recorder.take(np.asarray(grid.step * steps, dtype=float), finder)
@@ -252,6 +250,47 @@ def _run(
         if failure is not None:
             return failure
     return None
+
+
+def _up_to(
+    network: CompiledNetwork,
+    recorder: Recorder,
+    limits: Limits,
+    clock: NDArray[np.int64],
+    grid: _Grid,
+    kept: Kept,
+    good: int,
+    failure: ConvergenceError,
+) -> tuple[int, ConvergenceError]:
+    """Compute a chunk again without the looks that failed, so that all of it is of one moment.
+
+    Returns
+    -------
+    good : int
+        Looks that are done: the most that run without a failure.  0 where nothing can be repeated:
+        an FMU does not go back.
+    failure : ConvergenceError
+        That of the first look that fails.
+    """
+    low, high = 0, good + 1
+    count = good
+    try:
+        while high - low > 1:
+            _put_back(kept)
+            most, again = _try_chunk(network, recorder, limits, clock, grid, count)
+            if again is None:
+                low, done = count, count
+            else:
+                high, done, failure = min(count, most + 1), 0, again
+            count = (low + high) // 2
+        if low and done != low:
+            _put_back(kept)
+            low, _ = _try_chunk(network, recorder, limits, clock, grid, low)
+    except InputError:
+        low = 0
+    if not low:
+        _put_back(kept)
+    return low, failure
 
 
 def _try_chunk(
@@ -288,7 +327,7 @@ def _try_chunk(
         good = wrong[0]
         failure = _not_a_number(wrong[1], grid.step * (first + (good + 1) * grid.look_steps))
     elif failure is None and (name := _not_finite_account(network)):
-        good = 0
+        good = count - 1  # or fewer
         failure = _not_a_number(name, grid.step * int(clock[0]))
     steps = first + grid.look_steps * np.arange(1, good + 1)
     time = np.asarray(grid.step * steps, dtype=float)
@@ -447,7 +486,7 @@ def _numbers(values: Vector) -> str:
 
 def _read_stores(network: CompiledNetwork) -> None:
     nodes = network.nodes
-    rho = np.full(len(nodes.p), nodes.density)
+    rho = np.array([fluid_at(nodes.fluid, p, 0)[0] for p in nodes.p])
     for rows, head in ((network.elements, 0), (network.branches, 3)):
         failed = read_stores(
             rows,
@@ -481,9 +520,7 @@ _LEDGER = {
 }
 
 
-def _everything(
-    network: CompiledNetwork, clock: NDArray[np.int64]
-) -> list[tuple[NDArray[np.generic], NDArray[np.generic]]]:
+def _everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
     """All arrays that a step changes, and what they hold now."""
     arrays: list[NDArray[np.generic]] = [clock]
     for group in (_SAVED, _LEDGER):
@@ -493,7 +530,7 @@ def _everything(
     return [(array, array.copy()) for array in arrays]
 
 
-def _put_back(kept: list[tuple[NDArray[np.generic], NDArray[np.generic]]]) -> None:
+def _put_back(kept: Kept) -> None:
     for array, values in kept:
         array[...] = values
 
