@@ -29,7 +29,7 @@ from klack.report.stroke_wording import largest, stroke_answer
 from klack.report.wording import count, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
 from klack.workflow.stroke_study import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
-from klack.workflow.stroke_summary import first_impact, real_time_factor
+from klack.workflow.stroke_summary import first_impact, real_time_factor, start_text
 
 __all__ = ["stroke_charts", "stroke_content"]
 
@@ -292,6 +292,7 @@ _VARIANT_ROWS: tuple[tuple[str, Callable[[StrokeVariant], str]], ...] = (
     ("opening time", lambda v: quantity(v.opening_time, "s")),
     ("closing time", lambda v: quantity(v.closing_time, "s")),
     ("impacts", lambda v: count(len(v.result.events))),
+    ("start", lambda v: start_text(v).removeprefix("start ") or "goes on, or free"),
 )
 
 _RUN_ROWS: tuple[tuple[str, Callable[[StrokeVariant], str]], ...] = (

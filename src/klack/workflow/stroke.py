@@ -79,6 +79,13 @@ def run_stroke(
     rows = [run.rows for run in runs.values()]
     told = (rest_note(name, run.variant.result, roles.seat) for name, run in runs.items())
     resting = tuple(note for note in told if note)
+    starts = {name: run.variant.result.start for name, run in runs.items()}
+    begun = [
+        f"'{name}': {note}"
+        for name, at in starts.items()
+        for note in (at.notes if at else ())
+        if not any(note in told for told in notes)  # a warning already
+    ]
     return StrokeStudy(
         case=case.name,
         title=case.title,
@@ -101,7 +108,7 @@ def run_stroke(
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
-        warnings=(*notes, *resting),
+        warnings=(*notes, *begun, *resting),
     )
 
 
