@@ -1,7 +1,6 @@
 """Truth: energy is conserved, in any sensible valve; and any sensible valve runs.
 
-The draws are those of ``benchmarks/random_valves.py``; of 1000 the largest residuals are named in
-``docs/theory/stroke.md``.
+The draws are those of ``benchmarks/random_valves.py``, which runs as many as wanted.
 """
 
 import runpy
