@@ -1,4 +1,6 @@
-"""Everything that klack promises about speed, measured: ``uv run --group dev python benchmarks/run.py``.
+"""Everything that klack promises about speed, measured.
+
+``uv run --group dev python benchmarks/run.py`` runs it all.
 
 Each part is a file of this folder and runs in a process of its own, so that its peak memory is its
 own.  Results of former runs are not used: the cache of results is off.

@@ -182,12 +182,15 @@ def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr:
 
 
 def _print_impacts(variant: "StrokeVariant", *, to_stderr: bool) -> None:
-    from klack.workflow.stroke_summary import IMPACT_COLUMNS, impact_rows
+    from klack.workflow.stroke_summary import IMPACT_COLUMNS, impact_rows, start_text
 
+    stream = sys.stderr if to_stderr else sys.stdout
+    if begun := start_text(variant):
+        print(f"{variant.name}: {begun}", file=stream)
     total = len(variant.result.events)
     title = f"{variant.name}: {variant.label}"
     if not total:
-        print(f"{title}\n  no impacts", file=sys.stderr if to_stderr else sys.stdout)
+        print(f"{title}\n  no impacts", file=stream)
         return
     if total > _MOST:
         title += f" (the first {_MOST} of {total} impacts; all of them with --json)"

@@ -155,10 +155,25 @@ class TimesJson(TypedDict):
     closing: PassageJson
 
 
+class StartJson(TypedDict):
+    """Static equilibrium at time zero."""
+
+    displacement_m: Annotated[dict[str, float], Field(description="By port.")]
+    pressure_Pa: Annotated[dict[str, float], Field(description="Absolute, by node.")]
+    pressure_stated: Annotated[
+        dict[str, bool], Field(description="Whether the case states it; else it is found.")
+    ]
+    mass_flow_kg_s: Annotated[dict[str, float], Field(description="By restriction.")]
+    residual_force_N: Annotated[dict[str, float], Field(description="What is left, by body.")]
+
+
 class VariantJson(TimesJson):
     """One variant of a stroke; opening and closing are those of the needle."""
 
     label: str
+    start: Annotated[
+        StartJson | None, Field(description="Null for a run that goes on or began free.")
+    ]
     complete: Annotated[bool, Field(description="False: the run ended early.")]
     failure: Annotated[str | None, Field(description="Why the run ended early.")]
     end_time_s: Real

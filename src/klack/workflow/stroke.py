@@ -88,6 +88,13 @@ def run_stroke(
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
     rows = [run.rows for run in runs.values()]
     told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
+    starts = {name: item.result.start for name, item in results.items()}
+    begun = [
+        f"'{name}': {note}"
+        for name, at in starts.items()
+        for note in (at.notes if at else ())
+        if not any(note in other for other in notes)  # a warning already
+    ]
     missing = missing_notes(results, [name for name in wanted if name not in results], failure)
     study = StrokeStudy(
         case=case.name,
@@ -112,7 +119,7 @@ def run_stroke(
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
         own_components=case.own_components,
-        warnings=(*missing, *notes, *(note for note in told if note)),
+        warnings=(*missing, *notes, *begun, *(note for note in told if note)),
     )
     if failure is not None:
         raise IncompleteStrokeError(str(failure), study) from failure

@@ -4,7 +4,15 @@ from collections.abc import Iterator
 from math import isfinite
 
 from klack.simulation.network_result import ImpactEvent
-from klack.workflow.json_results import EventJson, PassageJson, StrokeJson, TimesJson, VariantJson
+from klack.units import format_si
+from klack.workflow.json_results import (
+    EventJson,
+    PassageJson,
+    StartJson,
+    StrokeJson,
+    TimesJson,
+    VariantJson,
+)
 from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 from klack.workflow.stroke_times import LiftTimes, Passage
@@ -17,6 +25,7 @@ __all__ = [
     "first_impact",
     "impact_rows",
     "real_time_factor",
+    "start_text",
     "stroke_to_json",
     "time_rows",
     "touch_event",
@@ -150,6 +159,22 @@ def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
     return next((event for event in events if event.approach_speed > _NOTICED * fastest), None)
 
 
+def start_text(variant: StrokeVariant) -> str:
+    """Equilibrium from which a variant began, in one line; empty if it began in none."""
+    start = variant.result.start
+    if start is None:
+        return ""
+    places: dict[tuple[str, float], list[str]] = {}
+    for name, y in start.displacement.items():  # points of a rigid body are at one place
+        body, _, port = name.partition(".")
+        places.setdefault((body, y), []).append(port)
+    parts = [f"{body} {format_si(y, 'm', 3)}" for (body, y) in places]
+    for name, p in start.pressure.items():
+        parts.append(f"{name} {p / 1e5:.5g} bar" + (" (stated)" if start.stated[name] else ""))
+    left = max((abs(force) for force in start.residual.values()), default=0.0)
+    return f"start at rest: {', '.join(parts)}; forces balance to {format_si(left, 'N', 1)}"
+
+
 def real_time_factor(variant: StrokeVariant) -> float:
     """Wall time of the time loop over the simulated time [-]."""
     time = variant.result.time
@@ -179,6 +204,22 @@ def _numbers(variant: StrokeVariant) -> VariantJson:
         "wall_time_s": _number(result.wall_time),
         "real_time_factor": _number(real_time_factor(variant)),
         "degrees_of_freedom": int(variant.modes),
+        "start": _start(variant),
+    }
+
+
+def _start(variant: StrokeVariant) -> StartJson | None:
+    """Static start; None for a run that goes on or began free."""
+    start = variant.result.start
+    if start is None:
+        return None
+    return {
+        "displacement_m": dict(start.displacement),
+        "pressure_Pa": dict(start.pressure),
+        "pressure_stated": dict(start.stated),
+        "mass_flow_kg_s": dict(start.flow),
+        "residual_force_N": dict(start.residual),
+        "notes": list(start.notes),
     }
 
 

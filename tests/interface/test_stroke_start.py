@@ -1,0 +1,48 @@
+"""What a user reads of the static start: one line, and plain numbers."""
+
+from pathlib import Path
+
+from klack.case.valve_reader import read_valve_case
+from klack.workflow.stroke import run_stroke
+from klack.workflow.stroke_store import load_stroke, save_stroke
+from klack.workflow.stroke_summary import start_text, stroke_to_json
+
+CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
+
+
+def study(tmp_path, **changes):
+    text = CASE.read_text().replace("duration: 2 ms", "duration: 20 us")
+    for before, after in changes.values():
+        assert before in text
+        text = text.replace(before, after)
+    made = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"))
+    save_stroke(made, tmp_path)
+    return load_stroke(tmp_path)
+
+
+def test_displacements_and_pressures_are_told_after_storing(tmp_path):
+    made = study(
+        tmp_path,
+        preload=("preload: 12 N", "preload: -12 N"),
+        pressure=("volume: 200 mm^3}", "volume: 200 mm^3, pressure: 3 bar}"),
+    )
+
+    assert start_text(made.variants["dry"]).startswith("start at rest: needle 100 um; forces")
+    wet = start_text(made.variants["wet"])
+    # 2 bar above ambient on 10 mm: 16 N hold it closed
+    assert wet.startswith("start at rest: needle -")
+    assert "chamber 3 bar (stated); forces balance to " in wet
+    start = stroke_to_json(made)["variants"]["dry"]["start"]
+    assert start["displacement_m"]["needle.tip"] > 99e-6
+    assert abs(start["residual_force_N"]["needle"]) < 1e-9
+    assert start["notes"] == []
+
+
+def test_a_run_that_goes_on_has_no_start_of_its_own(tmp_path):
+    first = study(tmp_path)
+
+    text = CASE.read_text().replace("duration: 2 ms", "duration: 20 us")
+    after = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"), after=first)
+
+    assert start_text(after.variants["dry"]) == ""
+    assert stroke_to_json(after)["start"] is None
