@@ -144,6 +144,7 @@ def simulate_network(
     begin = perf_counter()
     for first in range(0, records, chunk):
         count = min(chunk, records - first)
+        failure = None
         try:
             _advance(
                 network,
@@ -156,13 +157,16 @@ def simulate_network(
                 block,
                 coarse > 1,
             )
+            filled = first + count + 1
         except ConvergenceError as error:
-            # a range left on the way there is the better word
-            filled = int(np.searchsorted(time, (error.time or 0.0) + 0.5 * step))
-            limits.look(recorder.recording.points[first:filled], time[first:filled])
-            raise
-        seen = slice(first, first + count + 1)
-        limits.look(recorder.recording.points[seen], time[seen])
+            failure, filled = error, int(np.searchsorted(time, (error.time or 0.0) + 0.5 * step))
+        points, moments = recorder.recording.points[first:filled], time[first:filled]
+        limits.tell(points, moments)
+        left = limits.left(points, moments)
+        if left is not None:  # on the way to a failure it is the better word
+            raise left[1] from failure
+        if failure is not None:
+            raise failure
         progress((first + count) / records)
     wall_time = perf_counter() - begin
     channels = recorder.channels()
