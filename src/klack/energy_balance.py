@@ -1,8 +1,9 @@
 """Judge the energy books of a finished run: what does not close is told, not hidden."""
 
 import warnings
+from math import isfinite
 
-from klack.errors import AccuracyWarning
+from klack.errors import AccuracyWarning, ConvergenceError
 
 __all__ = ["check_energy_balance"]
 
@@ -27,6 +28,11 @@ def check_energy_balance(
     advice : str
         What to try, a clause without full stop.
 
+    Raises
+    ------
+    ConvergenceError
+        When one of them is not a finite number: then nothing in the run can be trusted.
+
     Warns
     -----
     AccuracyWarning
@@ -36,10 +42,15 @@ def check_energy_balance(
     --------
     >>> check_energy_balance("simulate", 3e-14, 0.0, limit=1e-9, advice="a shorter step")
     """
+    if not (isfinite(residual) and isfinite(least_loss)):
+        raise ConvergenceError(
+            f"{run}: the energy of this run is not a finite number.\nTry: check the parameters of "
+            f"all parts for nan and inf; {advice}."
+        )
     faults = []
-    if not abs(residual) <= limit:  # nan as well
+    if abs(residual) > limit:
         faults.append(f"does not close by {abs(residual):.1e} of the energy turned over")
-    if not least_loss >= -limit:
+    if least_loss < -limit:
         faults.append(f"has a loss that gave back {abs(least_loss):.1e} of it")
     if faults:
         warnings.warn(

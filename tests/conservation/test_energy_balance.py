@@ -9,7 +9,7 @@ import pytest
 
 from klack import energy_balance
 from klack.contact.laws import LinearLaw
-from klack.errors import AccuracyWarning
+from klack.errors import AccuracyWarning, ConvergenceError
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
@@ -99,7 +99,6 @@ def test_a_user_is_not_warned_without_a_leak():
 @pytest.mark.parametrize(
     ("residual", "least_loss", "words"),
     [
-        (float("nan"), 0.0, "does not close by nan"),
         (0.0, -1e-3, r"has a loss that gave back 1\.0e-03 of it"),
         (-2e-9, 0.0, r"does not close by 2\.0e-09 of the energy turned over, more than the 1e-09"),
     ],
@@ -107,6 +106,13 @@ def test_a_user_is_not_warned_without_a_leak():
 def test_what_a_user_is_told(residual, least_loss, words):
     with pytest.warns(AccuracyWarning, match=words):
         energy_balance.check_energy_balance("run", residual, least_loss, limit=1e-9, advice="x")
+
+
+@pytest.mark.usefixtures("as_for_a_user")
+@pytest.mark.parametrize("numbers", [(float("nan"), 0.0), (0.0, float("nan")), (float("inf"), 0.0)])
+def test_energy_that_is_no_number_is_a_failure(numbers):
+    with pytest.raises(ConvergenceError, match="energy of this run is not a finite number"):
+        energy_balance.check_energy_balance("run", *numbers, limit=1e-9, advice="x")
 
 
 def test_every_solver_is_judged():

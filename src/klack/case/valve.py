@@ -30,7 +30,7 @@ __all__ = [
 
 Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]
 VARIANTS: tuple[Variant, ...] = ("wet", "dry", "wet-lumped", "dry-lumped")
-_MOST_STEPS = 50_000_000
+_MOST_STEPS = 20_000_000_000
 _MOST_RECORDS = 2_000_000
 
 

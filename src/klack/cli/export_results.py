@@ -58,16 +58,23 @@ def run_and_export(
     from klack.case.schema import Case
     from klack.workflow.impact import run_impact
     from klack.workflow.stroke import run_stroke
+    from klack.workflow.stroke_study import IncompleteStrokeError
 
     study: Any
+    incomplete: Exception | None = None
     with show_progress(quiet) as progress:
         if isinstance(case, Case):
             study = run_impact(
                 case, levels=case.run.levels, certify=False, progress=progress, threads=threads
             )
         else:
-            study = run_stroke(case, progress=progress, threads=threads)
+            try:
+                study = run_stroke(case, progress=progress, threads=threads)
+            except IncompleteStrokeError as error:
+                study, incomplete = error.study, error
     export_result(study, to, folder, quiet=quiet)
+    if incomplete:
+        raise incomplete
 
 
 def export_fields(

@@ -75,13 +75,18 @@ def stroke(
 
     from klack.workflow.stroke import run_stroke
     from klack.workflow.stroke_store import load_stroke, save_stroke
+    from klack.workflow.stroke_study import IncompleteStrokeError
     from klack.workflow.stroke_summary import stroke_to_json
 
     after = load_stroke(continued) if continued is not None else None
     with show_progress(quiet) as progress:
-        study = run_stroke(
-            checked, variants=wanted, after=after, progress=progress, threads=threads
-        )
+        incomplete: Exception | None = None
+        try:
+            study = run_stroke(
+                checked, variants=wanted, after=after, progress=progress, threads=threads
+            )
+        except IncompleteStrokeError as error:
+            study, incomplete = error.study, error
         failure = write_result(study, folder, save_stroke, report=report, progress=progress)
     if not quiet:
         made = report and failure is None
@@ -90,6 +95,8 @@ def stroke(
         print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, stroke_to_json(study))
+    if incomplete:
+        raise incomplete
     if failure:
         raise failure
     return 0

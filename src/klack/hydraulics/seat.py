@@ -272,8 +272,8 @@ class Seat(Component):
             parameters=self.parameters(viscosity, fluid.vapour_pressure),
             state=(self.lift, 0.0, 0.0, 0.0, 0.0),
             channels=(
-                Channel("lift", "m", 0),
-                Channel("area", "m^2", 1),
-                Channel("jet force", "N", 2),
+                Channel("lift", "m", 0, derived=True),
+                Channel("area", "m^2", 1, derived=True),
+                Channel("jet force", "N", 2, derived=True),
             ),
         )

@@ -71,11 +71,16 @@ class Book:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A state that is recorded under ``<component> <label>``; ``index`` counts in the state."""
+    """A state that is recorded under ``<component> <label>``; ``index`` counts in the state.
+
+    ``derived`` states follow from displacements and pressures of the same moment: before the first
+    step they are what the step function makes of those, not what the state starts with.
+    """
 
     label: str
     unit: str
     index: int
+    derived: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -28,6 +28,7 @@ from klack.report.stroke_figures import (
 from klack.report.stroke_wording import largest, stroke_answer
 from klack.report.wording import count, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
+from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.workflow.stroke_summary import (
     NOT_REACHED,
@@ -446,17 +447,16 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
             )
         )
     incomplete = [
-        f"'{stop}' ({variant.name})"
+        f"'{stop}' ({variant.name}) at {quantity(end, 's', 4)}"
         for variant in study.variants.values()
-        for stop, record in variant.result.interfaces.items()
-        if not record.complete
+        for stop, end in cut_records(variant.result).items()
     ]
     if incomplete:
         limits.append(
             (
                 "Records",
-                f"The fine record of {', '.join(incomplete)} was full before the end of the run; "
-                "events and channels are complete.",
+                f"The fine record ends early, of {', '.join(incomplete)}, because it was full. "
+                "Impacts and channels are complete.",
             )
         )
     return tuple(limits)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_positive
+from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
 from klack.simulation.contact_step import law_potential
 from klack.simulation.kernel import STATUS_FINE, run_steps
@@ -113,7 +114,7 @@ def simulate(
     Raises
     ------
     ConvergenceError
-        When the forces of several contacts do not settle.
+        When the forces of several contacts do not settle, or a number is not finite.
 
     Warns
     -----
@@ -183,10 +184,18 @@ def simulate(
             f"simulate: the forces of {contacts} contacts did not settle within a step of "
             f"{step:g} s.\nTry: a tenth of the step."
         )
-    if not np.all(np.isfinite(out_v[-1])):
-        raise ConvergenceError(
-            "simulate: the motion is not finite.\nTry: check the bodies and laws for nan and inf."
-        )
+    pairs = [
+        f"{pair.body_a}.{pair.port_a} on {pair.body_b}.{pair.port_b}" for pair in system.contacts
+    ]
+    require_finite(
+        "simulate",
+        step * steps_per_record,
+        {
+            **{f"velocity of {body.name}": out_v[:, i] for i, body in enumerate(system.bodies)},
+            **{f"contact force of {name}": force[:, c] for c, name in enumerate(pairs)},
+            **{f"gap of {name}": gap[:, c] for c, name in enumerate(pairs)},
+        },
+    )
     positions, speeds = [], []
     for block in flat.blocks:
         own = slice(block.first, block.last)

@@ -1,29 +1,57 @@
-"""Impacts in a run: when, how fast, how hard, how long, and what was left."""
+"""Impacts in a run: when, how fast, how hard, how long, and what was left.
+
+They are found while the run goes on, in a few numbers per interface, so that their memory does not
+grow with time.  :class:`ImpactFinder` is fed with the steps in which an interface carried force and
+with the speed of its gap between them; where the run is cut into parts does not matter, not even
+for the last bit.
+"""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from klack.network.rows import GROUND, BodyRow, InterfaceRow, Rows
-from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord
+from klack.network.rows import GROUND, BodyRow, Rows
+from klack.simulation.network_result import ImpactEvent
 from klack.simulation.rest import effective_mass, longest_period, rest_time
 
-__all__ = ["impact_events"]
+__all__ = ["ImpactFinder"]
 
 Vector = NDArray[np.float64]
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 
+_PART = ("impulse", "peak", "peak_time")
+_STATE = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            # the run: its start, the last step with a force and the last two records
+            *("run_start", "row_time", "time1", "rate1", "time0", "rate0"),
+            # film that may lead into a contact
+            *("lead", "lead_fastest", *(f"lead_{part}" for part in _PART)),
+            # the contact that is closed now
+            *("closed", "begin", "until", "steps", "rests", "before", "from_start", "opened"),
+            *("news", *(f"contact_{part}" for part in _PART)),
+            # the impact that it may belong to: all contacts before it
+            *("impact", "first", "impact_before", "impact_from_start", "impact_steps"),
+            *("impact_rests", "stop", "last", "impact_news"),
+            *(f"impact_{part}" for part in _PART),
+            # what followed the last contact of this impact
+            *("tail", *(f"tail_{part}" for part in _PART), *(f"flight_{part}" for part in _PART)),
+            *("between", "between_earlier", "candidate", "fastest"),
+            *("leaves", "leave_time0", "leave_rate0", "leave_time1", "leave_rate1"),
+        )
+    ]
+)
+_EVENT = ("time", "before", "after", "peak", "peak_time", "steps", "stop", "impulse")
 
-def impact_events(
-    rows: Rows,
-    time: Vector,
-    channels: Mapping[str, ChannelData],
-    interfaces: Mapping[str, InterfaceRecord],
-) -> tuple[ImpactEvent, ...]:
-    """Find the impacts on all interfaces, in order of time.
+
+class ImpactFinder:
+    """Finds the impacts on all interfaces of a network.
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
     so are contacts between which the centres of mass do not move apart.  Rigid bodies have no
@@ -31,158 +59,350 @@ def impact_events(
     start is none.  A film acts before the first touch and after the last one: the speeds are the
     highest ones while it presses, and within two of these periods while it pulls.  An impact whose
     last contact lasts until the bodies are at rest ends there; the stop is left later.
+
+    Parameters
+    ----------
+    rows : Rows
+    start : float [s]
+        Of the run; what is closed then was not hit.
     """
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
-    events: list[ImpactEvent] = []
-    for row in rows.interfaces:
-        bodies = tuple(owner[h] if h != GROUND else None for h in (row.upper, row.lower))
-        speed = _gap_rate(bodies, time, channels)
-        events += _of_interface(row, interfaces[row.component], bodies, time, speed)
-    return tuple(sorted(events, key=lambda event: event.time))
 
+    def __init__(self, rows: Rows, start: float) -> None:
+        owner = {handle: row for row in rows.bodies for handle in row.ports}
+        self._stops = [row.component for row in rows.interfaces]
+        self._bodies = [
+            tuple(owner[h] if h != GROUND else None for h in (row.upper, row.lower))
+            for row in rows.interfaces
+        ]
+        self._period = [longest_period(bodies) for bodies in self._bodies]
+        self._mass = [effective_mass(bodies) for bodies in self._bodies]
+        self._rest = [
+            rest_time(row, bodies)
+            for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
+        ]
+        self._state = np.zeros(len(self._stops), dtype=_STATE)
+        for name in ("row_time", "time1", "time0"):
+            self._state[name] = -np.inf
+        self._state["run_start"] = start
+        self._found: list[ImpactEvent] = []
 
-def _gap_rate(
-    bodies: Sequence[BodyRow | None], time: Vector, channels: Mapping[str, ChannelData]
-) -> Vector:
-    """Relative velocity of the centres of mass, above zero when the gap opens."""
-    rate = np.zeros(len(time))
-    for body, sign in zip(bodies, (1.0, -1.0), strict=True):
-        if body is not None and f"{body.component} velocity" in channels:
-            rate += sign * channels[f"{body.component} velocity"].values
-    return rate
+    @property
+    def state(self) -> Vector:
+        """What is known of unfinished impacts, shape (interfaces, n); to go on from."""
+        return self._state.copy().view(np.float64).reshape(len(self._stops), _STATE.itemsize // 8)
 
+    @state.setter
+    def state(self, values: Vector) -> None:
+        self._state = np.ascontiguousarray(values, dtype=float).copy().view(_STATE).reshape(-1)
 
-def _of_interface(
-    row: InterfaceRow,
-    record: InterfaceRecord,
-    bodies: Sequence[BodyRow | None],
-    time: Vector,
-    gap_rate: Vector,
-) -> list[ImpactEvent]:
-    closed = record.contact_force > 0.0
-    if not np.any(closed):
-        return []
-    # a contact runs from a closed step to the next recorded open one
-    edges = np.diff(np.concatenate([[0], closed.astype(np.int8), [0]]))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    begin = record.time[starts]
-    until = record.time[ends - 1] + record.step[ends - 1]
-    stop = until.copy()
-    open_ended = ends == len(closed)
-    if open_ended[-1]:
-        stop[-1] = np.nan
-    period, rest = longest_period(bodies), rest_time(row, bodies)
-    clusters = _clusters(begin, stop, period, time, gap_rate)
-    mass = effective_mass(bodies)
-    total = record.contact_force + record.film_force
-    events = []
-    for first, last in clusters:
-        if begin[first] <= time[0] + record.step[starts[first]]:
-            continue  # closed from the start
-        t0, left = begin[first], stop[last]
-        rests = [i for i in range(first, last + 1) if until[i] - begin[i] >= rest]
-        if rests:  # the impact is over then
-            last = rests[0]
-            t1 = begin[last] + rest
-        else:
-            t1 = left
-        end = int(np.searchsorted(record.time, t1)) if rests else ends[last]
-        pause = _PAUSE_SHARE * rest
-        window = slice(
-            _film_start(record, starts[first], pause),
-            end if rests else _film_end(record, end, pause),
-        )
-        felt = record.time[window.start]
-        let_go = record.time[window.stop - 1] + record.step[window.stop - 1]
-        before = -max(_fastest(felt, t0, time, -gap_rate), -_at(t0, time, gap_rate, earlier=True))
-        if not before < 0.0:
-            continue  # trembles while the stop is left: nothing was hit
-        after = 0.0 if rests else np.nan
-        if np.isfinite(t1) and not rests:
-            leaving = _at(t1, time, gap_rate, earlier=False)
-            soon = min(let_go, t1 + 2.0 * (period or t1 - begin[last]))
-            after = max(_fastest(t1, soon, time, gap_rate), leaving)
-        force, steps = total[window], record.step[window]
-        peak = int(np.argmax(force))
-        closed_steps = np.concatenate(
-            [
-                np.arange(s, e)
-                for s, e in zip(starts[first : last + 1], ends[first : last + 1], strict=True)
-            ]
-        )
-        closed_steps = closed_steps[closed_steps < end]
-        events.append(
-            ImpactEvent(
-                stop=row.component,
-                time=float(t0),
-                approach_speed=-before,
-                peak_force=float(force[peak]),
-                peak_time=float(record.time[window][peak] + 0.5 * steps[peak]),
-                contact_time=float(record.step[closed_steps].sum()),
-                separation_time=float(left),
-                impulse=float(force @ steps),
-                restitution=-after / before,
-                energy_loss=0.5 * mass * (before**2 - after**2),
+    def feed(self, time: Vector, velocity: Mapping[str, Vector], steps: Sequence[Vector]) -> None:
+        """Take in what followed in the run.
+
+        Parameters
+        ----------
+        time : array, shape (n,) [s]
+            After the last time that was fed.
+        velocity : mapping of str to array, shape (n,) [m/s]
+            Of the centre of mass of each body that moves, at these times, by component.
+        steps : sequence of array, shape (k, 5)
+            Per interface: start, length [s], contact force, film force [N], gap [m] of every step
+            in which it carried force, up to the last of these times.
+        """
+        for c, rows in enumerate(steps):
+            rate = self._gap_rate(c, time, velocity)
+            closings = int(np.count_nonzero(rows[:, 2] > 0.0))
+            out = np.empty((min(closings, len(rows) // 2 + 1) + 1, len(_EVENT)))
+            pause = _PAUSE_SHARE * self._rest[c]
+            count = _feed(
+                self._state, c, self._period[c], self._rest[c], pause, rows, time, rate, out
             )
+            self._found += [self._event(c, row) for row in out[:count]]
+
+    def events(self) -> tuple[ImpactEvent, ...]:
+        """All impacts so far, in order of time, each as far as it is known.
+
+        One that is not over yet is reported again, whole, by a finder that goes on from
+        :attr:`state`; it has the same stop and the same time.
+        """
+        out = np.empty((2, len(_EVENT)))
+        open_ones: list[ImpactEvent] = []
+        for c in range(len(self._stops)):
+            count = _unfinished(self._state, c, self._period[c], out)
+            open_ones += [self._event(c, row) for row in out[:count]]
+        return tuple(sorted((*self._found, *open_ones), key=lambda event: event.time))
+
+    def told(self) -> None:
+        """Note that all impacts so far are reported: again only those of which more gets known."""
+        self._found.clear()
+        self._state["news"] = self._state["impact_news"] = 0.0
+
+    def _gap_rate(self, c: int, time: Vector, velocity: Mapping[str, Vector]) -> Vector:
+        """Relative velocity of the centres of mass, above zero when the gap opens."""
+        rate = np.zeros(len(time))
+        bodies: tuple[BodyRow | None, ...] = self._bodies[c]
+        for body, sign in zip(bodies, (1.0, -1.0), strict=True):
+            if body is not None and body.component in velocity:
+                rate += sign * velocity[body.component]
+        return rate
+
+    def _event(self, c: int, row: Vector) -> ImpactEvent:
+        found = dict(zip(_EVENT, row.tolist(), strict=True))
+        before, after = found["before"], found["after"]
+        return ImpactEvent(
+            stop=self._stops[c],
+            time=found["time"],
+            approach_speed=-before,
+            peak_force=found["peak"],
+            peak_time=found["peak_time"],
+            contact_time=found["steps"],
+            separation_time=found["stop"],
+            impulse=found["impulse"],
+            restitution=-after / before,
+            energy_loss=0.5 * self._mass[c] * (before**2 - after**2),
         )
-    return events
 
 
-def _at(t: float, time: Vector, rate: Vector, *, earlier: bool) -> float:
-    """Rate at ``t`` from the two nearest records on one side, before or after the contact."""
-    if earlier:
-        i = int(np.searchsorted(time, t, side="right")) - 1
-        j = i - 1
-    else:
-        i = int(np.searchsorted(time, t, side="left"))
-        j = i + 1
-    if not 0 <= i < len(time):
-        return np.nan
-    if not 0 <= j < len(time):
-        return float(rate[i])
-    return float(rate[i] + (rate[i] - rate[j]) / (time[i] - time[j]) * (t - time[i]))
-
-
-def _clusters(
-    begin: Vector, stop: Vector, period: float, time: Vector, gap_rate: Vector
-) -> list[tuple[int, int]]:
-    """First and last contact of each impact; it lasts until the centres of mass move apart."""
-    groups = [[0, 0]]
-    for i in range(1, len(begin)):
-        shorter = np.fmin(stop[i - 1] - begin[i - 1], stop[i] - begin[i])
-        near = begin[i] - stop[i - 1] < (period or 0.5 * shorter)
-        if near or _fastest(stop[i - 1], begin[i], time, gap_rate) <= 0.0:
-            groups[-1][1] = i
+@njit(cache=True)
+def _feed(
+    state: Any,
+    c: int,
+    period: float,
+    rest: float,
+    pause: float,
+    rows: Any,
+    times: Vector,
+    rates: Vector,
+    out: Any,
+) -> int:
+    """Steps and records in order of time; a record stands before the step that starts then."""
+    s = state[c]
+    count, place = 0, 0
+    for i in range(rows.shape[0]):
+        t, h, contact, film = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]
+        while place < times.size and times[place] <= t:
+            _record(s, period, times[place], rates[place])
+            place += 1
+        if contact > 0.0:
+            _closed_step(s, rest, pause, t, h, contact + film)
         else:
-            groups.append([i, i])
-    return [(a, b) for a, b in groups]
+            if s.closed > 0.0:
+                count += _contact_over(s, period, t, out, count)
+            _open_step(s, period, pause, t, h, film)
+        s.row_time = t
+    while place < times.size:
+        _record(s, period, times[place], rates[place])
+        place += 1
+    return count
 
 
-def _fastest(begin: float, end: float, time: Vector, speed: Vector) -> float:
-    """Highest speed in the records between two times; -infinity without any."""
-    first, last = np.searchsorted(time, (begin, end))
-    return float(np.max(speed[int(first) : int(last)], initial=-np.inf))
+@njit(cache=True)
+def _record(s: Any, period: float, time: float, rate: float) -> None:
+    """Take in the speed of the gap at a time."""
+    s.time0, s.rate0 = s.time1, s.rate1
+    s.time1, s.rate1 = time, rate
+    if s.closed > 0.0:
+        return
+    if s.lead > 0.0:
+        s.lead_fastest = max(s.lead_fastest, -rate)
+    if s.impact > 0.0:
+        _after_contact(s, period, time, rate)
 
 
-def _film_end(record: InterfaceRecord, end: int, pause: float) -> int:
-    """First step after ``end`` that no longer feels the film that follows the contact."""
-    i = end
-    while i < len(record.time):
-        longest = max(pause, _PAUSE_STEPS * record.step[i])
-        gapless = record.time[i] - record.time[i - 1] < longest
-        if not gapless or record.contact_force[i] > 0.0:
-            break
-        i += 1
-    return i
+@njit(cache=True)
+def _after_contact(s: Any, period: float, time: float, rate: float) -> None:
+    """Speed of the gap after the last contact of an impact."""
+    s.between_earlier = s.between
+    s.between = max(s.between, rate)
+    pull = s.last
+    if period > 0.0:
+        pull = period
+    if s.tail > 0.0 and time < s.stop + 2.0 * pull:
+        s.candidate = max(s.candidate, rate)
+    if s.leaves == 0.0:
+        s.leave_time0, s.leave_rate0 = time, rate
+    elif s.leaves == 1.0:
+        s.leave_time1, s.leave_rate1 = time, rate
+    if s.leaves < 2.0:
+        s.leaves += 1.0
+        s.impact_news = 1.0
 
 
-def _film_start(record: InterfaceRecord, first: int, pause: float) -> int:
-    """First step of the film force that leads into the contact at ``first``."""
-    i = first
-    while i > 0:
-        longest = max(pause, _PAUSE_STEPS * record.step[i])
-        gapless = record.time[i] - record.time[i - 1] < longest
-        if not gapless or record.contact_force[i - 1] > 0.0 or record.film_force[i - 1] <= 0.0:
-            break
-        i -= 1
-    return i
+@njit(cache=True)
+def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: float) -> None:
+    if s.closed == 0.0:
+        if not t - s.row_time < max(pause, _PAUSE_STEPS * h):
+            s.lead = 0.0
+        s.closed, s.begin = 1.0, t
+        s.steps = s.rests = 0.0
+        s.contact_impulse, s.contact_peak, s.contact_peak_time = 0.0, -np.inf, t
+        s.from_start = 1.0 if t <= s.run_start + h else 0.0
+        speed = -np.inf
+        if s.time1 > -np.inf:
+            rate = s.rate1
+            if s.time0 > -np.inf:
+                rate += (s.rate1 - s.rate0) / (s.time1 - s.time0) * (t - s.time1)
+            speed = -rate
+        if s.lead > 0.0:
+            speed = max(speed, s.lead_fastest)
+        s.before = -speed
+        # the speed at the moment of touch is that of the approach
+        s.opened = s.between_earlier if s.time1 == t else s.between
+    s.until = t + h
+    if s.rests == 0.0:
+        s.contact_impulse += force * h
+        if force > s.contact_peak:
+            s.contact_peak, s.contact_peak_time = force, t + 0.5 * h
+        s.steps += h
+        s.news = 1.0
+        if s.until - s.begin >= rest:
+            s.rests = 1.0
+
+
+@njit(cache=True)
+def _contact_over(s: Any, period: float, t: float, out: Any, count: int) -> int:
+    """End the contact at ``t``: a part of the impact so far, or the beginning of the next one."""
+    s.until = t
+    emitted = 0
+    if s.impact > 0.0 and not _joins(s, period, t - s.begin):
+        emitted = _emit(s, out, count)
+        s.impact = 0.0
+    _merge(s)
+    s.closed = 0.0
+    s.stop, s.last = t, t - s.begin
+    s.lead = 0.0
+    s.impact_news = 1.0
+    s.tail = 1.0
+    s.tail_impulse, s.tail_peak = 0.0, -np.inf
+    s.flight_impulse, s.flight_peak = 0.0, -np.inf
+    s.between = s.between_earlier = s.candidate = s.fastest = -np.inf
+    s.leaves = 0.0
+    if s.time1 == t:
+        _after_contact(s, period, t, s.rate1)
+    return emitted
+
+
+@njit(cache=True)
+def _joins(s: Any, period: float, duration: float) -> bool:
+    """Whether the present contact, of this duration so far, belongs to the impact before it."""
+    if s.opened <= 0.0:
+        return True
+    pause = period
+    if period == 0.0:
+        pause = 0.5 * min(s.last, duration)
+    return bool(s.begin - s.stop < pause)
+
+
+@njit(cache=True)
+def _merge(s: Any) -> None:
+    """Add the present contact to the impact, or begin one with it and the film before it."""
+    if s.impact == 0.0:
+        s.impact, s.first = 1.0, s.begin
+        s.impact_before, s.impact_from_start = s.before, s.from_start
+        s.impact_rests = s.impact_steps = s.impact_impulse = 0.0
+        s.impact_peak, s.impact_peak_time = -np.inf, s.begin
+        if s.lead > 0.0:
+            s.impact_impulse = s.lead_impulse
+            s.impact_peak, s.impact_peak_time = s.lead_peak, s.lead_peak_time
+    elif s.impact_rests > 0.0:
+        return  # it was over before
+    else:
+        _add_tail(s)
+        s.impact_impulse += s.flight_impulse
+        if s.flight_peak > s.impact_peak:
+            s.impact_peak, s.impact_peak_time = s.flight_peak, s.flight_peak_time
+    s.impact_impulse += s.contact_impulse
+    if s.contact_peak > s.impact_peak:
+        s.impact_peak, s.impact_peak_time = s.contact_peak, s.contact_peak_time
+    s.impact_steps += s.steps
+    s.impact_rests = s.rests
+
+
+@njit(cache=True)
+def _add_tail(s: Any) -> None:
+    s.impact_impulse += s.tail_impulse
+    if s.tail_peak > s.impact_peak:
+        s.impact_peak, s.impact_peak_time = s.tail_peak, s.tail_peak_time
+
+
+@njit(cache=True)
+def _open_step(s: Any, period: float, pause: float, t: float, h: float, film: float) -> None:
+    """Film between two contacts: the end of one impact, the beginning of another, or both."""
+    gapless = t - s.row_time < max(pause, _PAUSE_STEPS * h)
+    if s.impact > 0.0 and s.impact_rests == 0.0:
+        if not gapless:
+            s.tail = 0.0
+        if s.tail > 0.0:
+            s.tail_impulse += film * h
+            if film > s.tail_peak:
+                s.tail_peak, s.tail_peak_time = film, t + 0.5 * h
+            s.fastest = max(s.fastest, s.candidate)
+            s.impact_news = 1.0
+        else:
+            s.flight_impulse += film * h
+            if film > s.flight_peak:
+                s.flight_peak, s.flight_peak_time = film, t + 0.5 * h
+    if film <= 0.0:
+        s.lead = 0.0
+        return
+    if s.lead == 0.0 or not gapless:
+        s.lead = 1.0
+        s.lead_fastest = -s.rate1 if s.time1 == t else -np.inf
+        s.lead_impulse, s.lead_peak = 0.0, -np.inf
+    s.lead_impulse += film * h
+    if film > s.lead_peak:
+        s.lead_peak, s.lead_peak_time = film, t + 0.5 * h
+
+
+@njit(cache=True)
+def _emit(s: Any, out: Any, count: int) -> int:
+    """Write the impact as a row of ``_EVENT``; 0 if it was none, or nothing of it is new."""
+    if s.impact_from_start > 0.0 or s.impact_news == 0.0:
+        return 0
+    if not s.impact_before < 0.0:
+        return 0  # trembles while the stop is left: nothing was hit
+    impulse, peak, peak_time = s.impact_impulse, s.impact_peak, s.impact_peak_time
+    after = 0.0
+    if s.impact_rests == 0.0:
+        if np.isfinite(s.stop):
+            impulse += s.tail_impulse
+            if s.tail_peak > peak:
+                peak, peak_time = s.tail_peak, s.tail_peak_time
+        after = np.nan
+        if s.leaves > 0.0:
+            after = s.leave_rate0
+            if s.leaves > 1.0:
+                slope = (s.leave_rate1 - s.leave_rate0) / (s.leave_time1 - s.leave_time0)
+                after += slope * (s.stop - s.leave_time0)
+            after = max(after, s.fastest)
+    out[count, 0] = s.first
+    out[count, 1] = s.impact_before
+    out[count, 2] = after
+    out[count, 3] = peak
+    out[count, 4] = peak_time
+    out[count, 5] = s.impact_steps
+    out[count, 6] = s.stop
+    out[count, 7] = impulse
+    return 1
+
+
+@njit(cache=True)
+def _unfinished(state: Any, c: int, period: float, out: Any) -> int:
+    """What the impacts that may go on would be if nothing followed; leaves the state as it is."""
+    copy = state[c : c + 1].copy()
+    s = copy[0]
+    count = 0
+    if s.closed > 0.0:
+        news = max(s.news, 0.0)
+        # how long it will last is not known: as long as the contact before it
+        if s.impact > 0.0 and not _joins(s, period, np.inf):
+            count += _emit(s, out, count)
+            s.impact = 0.0
+        if s.impact > 0.0:
+            news = max(news, s.impact_news)
+        _merge(s)
+        s.impact_news = news
+        s.stop = np.nan
+        s.leaves = 0.0
+    if s.impact > 0.0:
+        count += _emit(s, out, count)
+    return count

@@ -112,6 +112,5 @@ def _stop(limit: LimitRow, value: float, time: float) -> ConvergenceError:
     return ConvergenceError(
         f"{limit.component}: the {limit.quantity} is {value_text(value, limit.unit)} at "
         f"{format_si(time, 's', 6)}, far outside the range of {limit.law}, {range_text(limit)}.\n"
-        f"Try: {limit.advice}",
-        time=time,
+        f"Try: {limit.advice}"
     )

@@ -77,6 +77,9 @@ _MOST_NEWTON = 80
 _PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _LARGE_STEP = 1e-3  # of the pressure
+_PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
+_MOST_OF = 0.9  # longest step within this interval
+_NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
 _SLOWEST = 1e-3  # [m/s] approach speed from which on a dashpot of a given restitution is scaled
 
 
@@ -131,6 +134,26 @@ def _solve(A: Any, r: Any, n: int) -> None:
 
 
 @njit(cache=True)
+def _bracketed(
+    target: float, density: float, lower: float, upper: float
+) -> tuple[float, float, float]:
+    """Density to go to from ``density``, and the interval known to hold the root.
+
+    Where a chamber is about to fill with liquid, the slope on the boiling side leads far into the
+    liquid, and that of the liquid back: Newton alone goes to and fro.
+    """
+    if upper - lower < _NARROW * density:
+        lower, upper = 0.0, np.inf
+    if target > density:
+        lower = density
+    else:
+        upper = density
+    if abs(target - density) > _MOST_OF * (upper - lower):
+        target = 0.5 * (lower + upper)
+    return target, lower, upper
+
+
+@njit(cache=True)
 def _move_by_guess(S: Any, G: Any, body_first: Any, body_last: Any, ports: int) -> None:
     """Displacements at the end of a step under the forces so far; ``G`` of its level.
 
@@ -173,13 +196,23 @@ def _settled(S: Any, ports: int, moved: float, share: float, left: float, work: 
         way = max(way, here)
         left += abs((force - S[ELEMENTS_BEFORE + p]) * (y - S[USED + p]))
         work += abs(force) * here
-    if moved <= share * way and left <= _ENERGY_LEFT * work:
+    if moved <= share * way and left <= _ENERGY_LEFT * work and work < np.inf:
         return True
     displacement, by_forces = 0.0, 0.0
     for p in range(ports):
         displacement = max(displacement, abs(S[Y1 + p]))
         by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
-    return moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
+    # a force or displacement that is not finite never settles
+    return work < np.inf and moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
+
+
+@njit(cache=True)
+def _finite(S: Any, ports: int) -> bool:
+    """Whether all ports are somewhere; looked at while it can be seen which part is to blame."""
+    total = 0.0
+    for p in range(ports):
+        total += S[Y1 + p]
+    return abs(total) < np.inf
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -337,6 +370,7 @@ def run_network(
     )
     p_used, V, V_used = first(at_nodes[4]), first(at_nodes[5]), first(at_nodes[6])
     r, inflow, known = first(at_nodes[7]), first(at_nodes[8]), first(at_nodes[9])
+    lower, upper = first(at_nodes[10]), first(at_nodes[11])
     mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
     gammas = nodes.gamma.shape[1]
@@ -526,19 +560,29 @@ def run_network(
                             r[0] /= A[0]
                         else:
                             _solve(A, r, volumes)
-                        worst = 0.0
+                        worst, total = 0.0, 0.0
                         for i in range(volumes):
-                            if abs(r[i]) > _LARGE_STEP * p[i]:
-                                # boiling: the density takes the step, the pressure follows it
-                                new, node_hint[i] = pressure_at(
-                                    node_fluid, rho[i] + slope[i] * r[i], node_hint[i]
+                            total += r[i]
+                            target = rho[i] + slope[i] * r[i]
+                            large = abs(r[i]) > _LARGE_STEP * p[i]
+                            if iteration >= _PLAIN_NEWTON:
+                                if iteration == _PLAIN_NEWTON:
+                                    lower[i], upper[i] = 0.0, np.inf
+                                target, lower[i], upper[i] = _bracketed(
+                                    target, rho[i], lower[i], upper[i]
                                 )
+                                large = True
+                            if large:
+                                # boiling: the density takes the step, the pressure follows it
+                                new, node_hint[i] = pressure_at(node_fluid, target, node_hint[i])
                                 r[i] = new - p[i]
                             worst = max(worst, abs(r[i]) / max(p[i], node_ambient))
                             p[i] += r[i]
-                        if worst < _PRESSURE_LEFT:
+                        finite = abs(total) < np.inf
+                        if finite and worst < _PRESSURE_LEFT:
                             break
-                        if iteration == _MOST_NEWTON - 1 or not worst < np.inf:
+                        # at once, while it can be seen which branch is to blame
+                        if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
                             report[0], report[2] = 0.0, t
                             for i in range(volumes):
                                 if abs(r[i]) / max(p[i], node_ambient) == worst:
@@ -651,7 +695,7 @@ def run_network(
                     break
                 if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
                     break
-                if sweep == _MOST_SWEEPS - 1:
+                if sweep == _MOST_SWEEPS - 1 or (sweep == 0 and not _finite(S, ports)):
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
             S[FORCE + ports] = 0.0  # what pushes the ground moves nothing

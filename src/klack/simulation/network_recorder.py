@@ -1,11 +1,20 @@
-"""Memory for what a run records, and the words for its columns."""
+"""Memory for what a run records, and the words for its columns.
 
+The loop runs in chunks and fills memory for one of them: steps in which an interface carried force,
+and records as closely spaced as the impacts need.  After each chunk the impacts are found in it,
+the records are thinned to the spacing that was asked for, and the steps are kept until there is no
+more room for them.  So the memory of a run follows from the number of its records alone.
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.memory import require_memory
 from klack.network.rows import BranchRow, ElementRow
+from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
 from klack.simulation.network_compile import CompiledNetwork
@@ -14,8 +23,11 @@ from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder"]
 
-_MOST_FINE = 1_000_000  # recorded fine steps per interface
-_MOST_VALUES = 400_000_000
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_MOST_FINE = 1_000_000  # recorded steps per interface that are kept
+_FINE = 5  # numbers of a recorded step
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +37,25 @@ class _Column:
 
 
 class Recorder:
-    """Memory for the records, and the words for its columns."""
+    """What a run records, chunk by chunk.
 
-    def __init__(self, network: CompiledNetwork, records: int) -> None:
-        self.network = network
+    Parameters
+    ----------
+    network : CompiledNetwork
+    records : int
+        Of the whole run, beside that of its start.
+    looks : int
+        Looks at the network in a record; the records of a chunk are one look apart.
+    chunk : int
+        Most looks of a chunk.
+    fine : int
+        Most steps of a chunk.
+    """
+
+    def __init__(
+        self, network: CompiledNetwork, *, records: int, looks: int, chunk: int, fine: int
+    ) -> None:
+        self.network, self.looks = network, looks
         rows, elements = network.rows, network.elements
         states = [
             (elements.state0[k] + channel.index, _column(row, channel.label), channel.unit)
@@ -67,19 +94,15 @@ class Recorder:
             *(_Column(name, unit) for _, name, unit in states + branch_states),
             *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
         ]
-        values = (records + 1) * (len(self.means) + len(self.points))
-        if values > _MOST_VALUES:
-            raise InputError(
-                "record",
-                got=f"{records} records of {len(self.means) + len(self.points)} channels",
-                expected=f"{_MOST_VALUES} values or fewer",
-                hint="take a longer record, or a shorter duration.",
-            )
+        self.peaks = [_Column(f"{row.component} peak force", "N") for row in rows.interfaces]
+        self._moving = {rows.bodies[b].component: 2 * len(ports) + i for i, b in enumerate(free)}
         count = len(rows.interfaces)
+        columns = len(self.means) + len(self.points) + count
+        _require_memory(records, columns)
         self.recording = Recording(
-            means=np.zeros((records + 1, len(self.means))),
-            peaks=np.zeros((records + 1, count)),
-            points=np.zeros((records + 1, len(self.points))),
+            means=np.zeros((chunk, len(self.means))),
+            peaks=np.zeros((chunk, count)),
+            points=np.zeros((chunk, len(self.points))),
             states=np.array([index for index, _, _ in states], dtype=np.int64),
             branch_states=np.array([index for index, _, _ in branch_states], dtype=np.int64),
             cm_block0=blocks[free].astype(np.int64),
@@ -87,16 +110,28 @@ class Recorder:
             port_block0=blocks[owner].astype(np.int64),
             port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
             port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
-            fine=np.empty((count, _MOST_FINE, 5)),
+            fine=np.empty((count, fine, _FINE)),
             filled=np.zeros(count, np.int64),
         )
+        # a row for each channel: nothing is copied when they are handed out
+        self._means = np.zeros((len(self.means), records + 1))
+        self._peaks = np.zeros((count, records + 1))
+        self._points = np.zeros((len(self.points), records + 1))
+        self._fine: list[list[Matrix]] = [[] for _ in range(count)]
+        self._room = [_MOST_FINE] * count
+        self._complete = [True] * count
+        self.looked = 0
 
-    def take(self, record: int) -> None:
-        """Record the present state."""
+    def begin(self) -> None:
+        """Make room for the next chunk."""
+        self.recording.filled[:] = 0
+
+    def start(self, time: float, finder: ImpactFinder, *, fresh: bool) -> None:
+        """Record the present state as that before the first step."""
         network = self.network
         record_points(
             self.recording,
-            record,
+            0,
             network.bodies.fine,
             network.bodies.start,
             network.bodies.modes,
@@ -106,37 +141,119 @@ class Recorder:
             network.branches.state,
             network.interfaces.gap,
         )
+        self._points[:, 0] = self.recording.points[0]
+        if fresh:  # a run that goes on knows this moment
+            for name, value in self._derived_states():
+                place = next(i for i, column in enumerate(self.points) if column.name == name)
+                self._points[place, 0] = value
+            none = [np.empty((0, _FINE))] * len(self._fine)
+            finder.feed(np.array([time]), self._velocities(1), none)
 
-    def channels(self) -> dict[str, ChannelData]:
-        """All channels by name."""
-        recording = self.recording
-        recording.means[0] = recording.means[1]
-        recording.peaks[0] = recording.peaks[1]
+    def take(self, time: Vector, finder: ImpactFinder) -> None:
+        """Take over a chunk of as many looks as there are times [s]."""
+        recording, count = self.recording, len(time)
+        steps = [recording.fine[c, : recording.filled[c]] for c in range(len(self._fine))]
+        finder.feed(time, self._velocities(count), steps)
+        self._thin(count)
+        for c, rows in enumerate(steps):
+            kept = rows[: self._room[c]]
+            if len(kept):
+                self._fine[c].append(kept.copy())
+            self._room[c] -= len(kept)
+            self._complete[c] &= len(kept) == len(rows)
+
+    def channels(self, records: int) -> dict[str, ChannelData]:
+        """All channels by name, as long as so many records."""
         result = {}
-        for columns, values in ((self.means, recording.means), (self.points, recording.points)):
-            for i, column in enumerate(columns):
-                result[column.name] = ChannelData(unit=column.unit, values=values[:, i].copy())
-        for c, row in enumerate(self.network.rows.interfaces):
-            peak = ChannelData(unit="N", values=recording.peaks[:, c].copy())
-            result[f"{row.component} peak force"] = peak
+        for columns, values in (
+            (self.means, self._means),
+            (self.points, self._points),
+            (self.peaks, self._peaks),
+        ):
+            if columns is not self.points:
+                values[:, 0] = values[:, 1]  # there is no record before the first moment
+            for column, row in zip(columns, values, strict=True):
+                result[column.name] = ChannelData(unit=column.unit, values=row[: records + 1])
         return result
 
     def interfaces(self) -> dict[str, InterfaceRecord]:
-        """Every step in which an interface carried force: see :class:`InterfaceRecord`."""
+        """Steps in which an interface carried force: see :class:`InterfaceRecord`."""
         result = {}
         for c, row in enumerate(self.network.rows.interfaces):
-            filled = int(self.recording.filled[c])
-            part = self.recording.fine[c, : min(filled, _MOST_FINE)]
-            columns = [part[:, i].copy() for i in range(5)]
+            part = np.concatenate([np.empty((0, _FINE)), *self._fine[c]])
+            self._fine[c].clear()
+            columns = [part[:, i].copy() for i in range(_FINE)]
             result[row.component] = InterfaceRecord(
                 time=columns[0],
                 step=columns[1],
                 contact_force=columns[2],
                 film_force=columns[3],
                 gap=columns[4],
-                complete=filled <= _MOST_FINE,
+                complete=self._complete[c],
             )
         return result
+
+    def first_not_finite(self, count: int) -> tuple[int, str] | None:
+        """First look of a chunk of ``count`` with a number that is none, and the channel's name."""
+        found: tuple[int, str] | None = None
+        recording = self.recording
+        for columns, values in (
+            (self.points, recording.points),
+            (self.means, recording.means),
+            (self.peaks, recording.peaks),
+        ):
+            wrong = ~np.isfinite(values[:count])
+            if wrong.any():
+                look, column = np.argwhere(wrong)[0]
+                if found is None or look < found[0]:
+                    found = int(look), columns[column].name
+        return found
+
+    def _derived_states(self) -> Iterator[tuple[str, float]]:
+        """Derived states as the step functions gave them in the call before the first step."""
+        network = self.network
+        for k, row in enumerate(network.rows.elements):
+            begin = network.elements.output0[k] + len(row.ports)
+            for channel in row.channels:
+                if channel.derived:
+                    value = network.elements.outputs[begin + channel.index]
+                    yield _column(row, channel.label), float(value)
+        for k, branch in enumerate(network.rows.branches):
+            begin = network.branches.output0[k] + 3 + len(branch.ports)
+            for channel in branch.channels:
+                if channel.derived:
+                    value = network.branches.outputs[begin + channel.index]
+                    yield _column(branch, channel.label), float(value)
+
+    def _velocities(self, count: int) -> dict[str, Vector]:
+        """Of the centres of mass [m/s] in the present chunk, by component."""
+        return {name: self.recording.points[:count, i] for name, i in self._moving.items()}
+
+    def _thin(self, count: int) -> None:
+        """Records of the present chunk: means of means, largest peaks, last points."""
+        recording, looks = self.recording, self.looks
+        first = self.looked + 1
+        self.looked += count
+        record = (np.arange(first, first + count) - 1) // looks + 1
+        starts = np.flatnonzero(np.diff(record, prepend=0))
+        here = record[starts]
+        means = recording.means[:count]
+        if looks > 1:
+            means = np.add.reduceat(means, starts, axis=0) / looks
+        self._means[:, here] += means.T
+        peaks = np.maximum.reduceat(recording.peaks[:count], starts, axis=0)
+        self._peaks[:, here] = np.maximum(self._peaks[:, here], peaks.T)
+        ends = np.flatnonzero(np.arange(first, first + count) % looks == 0)
+        self._points[:, record[ends]] = recording.points[ends].T
+
+
+def _require_memory(records: int, columns: int) -> None:
+    require_memory(
+        "record",
+        8.0 * (records + 1) * columns,
+        what=f"{records} records of {columns} channels",
+        hint="take a longer record, or a shorter duration.",
+    )
 
 
 def _column(row: ElementRow | BranchRow, what: str, port: str = "") -> str:

@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ChannelData", "EnergyBooks", "ImpactEvent", "InterfaceRecord", "NetworkResult"]
+from klack.errors import ConvergenceError
+
+__all__ = [
+    "ChannelData",
+    "EnergyBooks",
+    "ImpactEvent",
+    "IncompleteRunError",
+    "InterfaceRecord",
+    "NetworkResult",
+]
 
 BODY_STORE = "kinetic and strain"  # what a body holds; its component stands before it
 
@@ -41,7 +50,8 @@ class InterfaceRecord:
     gap : array, shape (k,) [m]
         At the end of the step, negative when closed; of the bodies, without the series compliance.
     complete : bool
-        False when the memory set aside was too small: the latest steps are missing.
+        False when there were more than a million of these steps: the later ones are missing.
+        Impacts are found nevertheless, and means of the forces are among the channels.
     """
 
     time: NDArray[np.float64]
@@ -175,7 +185,10 @@ class NetworkResult:
     wall_time : float [s]
         Of the time loop.
     state : mapping of str to array
-        Everything needed to go on: the run continues to the same bits.
+        Everything needed to go on: the run continues to the same bits.  An impact that is not over
+        is reported again, whole, by the run that goes on, with the same stop and time.
+    failure : str
+        Why the run ended before its time, all else is the record up to there; empty if it did not.
     """
 
     time: NDArray[np.float64]
@@ -188,3 +201,19 @@ class NetworkResult:
     coarse_steps: int
     wall_time: float
     state: Mapping[str, NDArray[np.generic]]
+    failure: str = ""
+
+
+class IncompleteRunError(ConvergenceError):
+    """A run failed on its way; ``result`` is what it left behind until then.
+
+    Parameters
+    ----------
+    text : str
+    result : NetworkResult
+        With the text as its ``failure``.
+    """
+
+    def __init__(self, text: str, result: NetworkResult) -> None:
+        super().__init__(text)
+        self.result = result

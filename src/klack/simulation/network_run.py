@@ -1,8 +1,8 @@
 """Run a network: static start, time loop, channels, impacts, energy books."""
 
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from klack import energy_balance
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
+from klack.hydraulics.fluid_table import fluid_at
 from klack.network.rows import BranchRow, ElementRow, Rows
-from klack.simulation.impact_events import impact_events
+from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.modal_step import ROW
 from klack.simulation.network_arrays import (
@@ -23,6 +24,7 @@ from klack.simulation.network_arrays import (
     SEEN,
     WORK,
     Y0,
+    Y1,
     Recording,
     Scratch,
     scratch_memory,
@@ -32,6 +34,7 @@ from klack.simulation.network_compile import (
     compile_bodies,
     compile_network,
     interface_compliance,
+    modal_state,
 )
 from klack.simulation.network_kernel import (
     STATUS_BRANCH,
@@ -43,7 +46,7 @@ from klack.simulation.network_kernel import (
 )
 from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
-from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.rest import resting_dissipation
 from klack.units import format_si
 
@@ -51,6 +54,7 @@ __all__ = ["simulate_network"]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
+Kept = Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
@@ -60,7 +64,9 @@ _SETTLE_STEPS = 1000  # between two looks at whether the ports still move
 _SETTLE_LOOKS = 100
 _SETTLED = 1e-9  # way of a port between two looks over the largest way of any since the beginning
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
-_CHUNK = 250_000  # fine steps between two looks at the keyboard: about 0.1 s
+_CHUNK = 250_000  # fine steps of a chunk: about 0.1 s
+_PYTHON_CHUNK = 2_500  # the same with step functions in Python, some of which cannot step back
+_LOOK = 1.5e-6  # [s] longest time between two looks of the search for impacts
 
 
 def simulate_network(
@@ -87,7 +93,9 @@ def simulate_network(
     coarse : int
         Fine steps of a coarse step, taken while nothing touches; 1 switches them off.
     record : float [s]
-        Spacing of the records; rounded to whole coarse steps.
+        Spacing of the records; rounded to whole coarse steps.  Impacts do not depend on it: they
+        are found while the run goes on, at most 1.5 us (or a coarse step) apart.  The memory of a
+        run is that of its records, eight bytes per channel, and 50 MB.
     start : "rest" or "free"
         ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
         ``"free"``: undeformed, with the speeds of their rows.
@@ -100,9 +108,13 @@ def simulate_network(
     Raises
     ------
     InputError
-        For steps that do not fit, and for a state of another network.
+        For steps that do not fit, for records that do not fit into the memory, and for a state of
+        another network.
+    IncompleteRunError
+        When a step fails, or a number is not finite: time, component, its state, and what to try;
+        it holds the result up to there.
     ConvergenceError
-        When a step fails: time, component, its state, and what to try.
+        The same before the first record.
 
     Warns
     -----
@@ -120,13 +132,15 @@ def simulate_network(
             hint="1 switches coarse steps off, 16 is usual.",
         )
     network = compile_network(rows, step=step, coarse=coarse)
-    block = coarse
-    if coarse == 1:  # no coarse steps: as many fine ones at a time as divide a record
-        of_record = max(1, round(record / step))
-        block = next(size for size in range(_BLOCK, 0, -1) if of_record % size == 0)
-    per_record = max(1, round(record / (block * step)))
-    records = max(1, int(np.ceil(duration / (per_record * block * step) - 1e-9)))
-    recorder = Recorder(network, records)
+    grid = _grid(duration, step, coarse, record)
+    chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
+    recorder = Recorder(
+        network,
+        records=grid.records,
+        looks=grid.looks,
+        chunk=min(max(1, chunk // grid.look_steps), grid.records * grid.looks),
+        fine=max(chunk, grid.look_steps),
+    )
     clock = np.array([0, -1, 0, 0], dtype=np.int64)
     if state is not None:
         _restore(network, clock, state)
@@ -134,44 +148,45 @@ def simulate_network(
         large = _SETTLE_SHARE * float(np.max(network.interfaces.rest, initial=0.0)) or _SETTLE_STEP
         _settle(network, recorder.recording, step * max(1, round(large / step)))
     first_step, done_before = int(clock[0]), clock[2:4].copy()
+    finder = ImpactFinder(rows, step * first_step)
+    fresh = state is None or _IMPACTS not in state  # of an earlier version
+    if state is not None and not fresh:
+        finder.state = np.asarray(state[_IMPACTS], dtype=float)
     reset_books(network)
     _read_stores(network)
     before = energy_stores(network)
-    recorder.take(0)
+    recorder.start(step * first_step, finder, fresh=fresh)
     limits = Limits(network, [column.name for column in recorder.points])
-    time = step * np.arange(records + 1, dtype=float) * (per_record * block) + first_step * step
-    chunk = max(1, _CHUNK // (per_record * block))
+    start_point, start_time = recorder.recording.points[:1], np.array([step * first_step])
+    limits.tell(start_point, start_time)
+    left = limits.left(start_point, start_time)
+    if left is not None:
+        raise left[1]
     begin = perf_counter()
-    for first in range(0, records, chunk):
-        count = min(chunk, records - first)
-        failure = None
-        try:
-            _advance(
-                network,
-                recorder.recording,
-                clock,
-                count * per_record,
-                per_record,
-                first + 1,
-                step,
-                block,
-                coarse > 1,
-            )
-            filled = first + count + 1
-        except ConvergenceError as error:
-            failure, filled = error, int(np.searchsorted(time, (error.time or 0.0) + 0.5 * step))
-        points, moments = recorder.recording.points[first:filled], time[first:filled]
-        limits.tell(points, moments)
-        left = limits.left(points, moments)
-        if left is not None:  # on the way to a failure it is the better word
-            raise left[1] from failure
-        if failure is not None:
-            raise failure
-        progress((first + count) / records)
+    failure = _run(network, recorder, finder, limits, clock, grid, progress)
     wall_time = perf_counter() - begin
-    channels = recorder.channels()
-    interfaces = recorder.interfaces()
+    records = recorder.looked // grid.looks
+    if failure is not None and not records:
+        raise failure
+    time = step * (first_step + np.arange(records + 1) * (grid.looks * grid.look_steps))
     books = energy_books(network, before)
+    events = finder.events()
+    finder.told()
+    result = NetworkResult(
+        time=time.astype(float),
+        channels=recorder.channels(records),
+        interfaces=recorder.interfaces(),
+        events=events,
+        books=books,
+        step=step,
+        fine_steps=int(clock[2] - done_before[0]),
+        coarse_steps=int(clock[3] - done_before[1]),
+        wall_time=wall_time,
+        state=_save(network, clock) | {_IMPACTS: finder.state},
+        failure="" if failure is None else str(failure),
+    )
+    if failure is not None:
+        raise IncompleteRunError(str(failure), result) from failure
     scale = books.scale or 1.0
     energy_balance.check_energy_balance(
         "simulate_network",
@@ -180,18 +195,165 @@ def simulate_network(
         limit=_BALANCE,
         advice="a shorter step",
     )
-    return NetworkResult(
-        time=time,
-        channels=channels,
-        interfaces=interfaces,
-        events=impact_events(rows, time, channels, interfaces),
-        books=books,
+    return result
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Grid:
+    """How fine steps make blocks, blocks looks, and looks records."""
+
+    step: float  # [s]
+    block: int  # fine steps
+    look: int  # blocks
+    looks: int  # of a record
+    records: int
+    coarse: bool
+
+    @property
+    def look_steps(self) -> int:
+        """Fine steps between two looks."""
+        return self.look * self.block
+
+
+def _grid(duration: float, step: float, coarse: int, record: float) -> _Grid:
+    block = coarse
+    if coarse == 1:  # no coarse steps: as many fine ones at a time as divide a record
+        block = _largest_divisor(max(1, round(record / step)), _BLOCK)
+    of_record = max(1, round(record / (block * step)))
+    look = _largest_divisor(of_record, int(_LOOK / (block * step)))
+    return _Grid(
         step=step,
-        fine_steps=int(clock[2] - done_before[0]),
-        coarse_steps=int(clock[3] - done_before[1]),
-        wall_time=wall_time,
-        state=_save(network, clock),
+        block=block,
+        look=look,
+        looks=of_record // look,
+        records=max(1, int(np.ceil(duration / (of_record * block * step) - 1e-9))),
+        coarse=coarse > 1,
     )
+
+
+def _largest_divisor(number: int, most: int) -> int:
+    return next((size for size in range(most, 1, -1) if number % size == 0), 1)
+
+
+def _has_python_steps(rows: Rows) -> bool:
+    steps = [row.step for row in rows.elements] + [row.step for row in rows.branches]
+    return any(hasattr(step, "errors") for step in steps)
+
+
+def _run(
+    network: CompiledNetwork,
+    recorder: Recorder,
+    finder: ImpactFinder,
+    limits: Limits,
+    clock: NDArray[np.int64],
+    grid: _Grid,
+    progress: Callable[[float], None],
+) -> ConvergenceError | None:
+    """Run chunk by chunk; the error that ended it early, with the record up to the look before."""
+    looks = grid.records * grid.looks
+    chunk = len(recorder.recording.points)
+    chunk -= chunk % grid.looks if chunk > grid.looks else 0
+    while recorder.looked < looks:
+        # a chunk ends with a record if it can, wherever the run began
+        to_record = grid.looks - recorder.looked % grid.looks
+        count = min(chunk, looks - recorder.looked if chunk >= grid.looks else to_record)
+        kept = _everything(network, clock)
+        good, failure = _try_chunk(network, recorder, limits, clock, grid, count)
+        if failure is not None:
+            good, failure = _up_to(network, recorder, limits, clock, grid, kept, good, failure)
+        if good:
+            steps = int(clock[0]) + grid.look_steps * np.arange(1 - good, 1)
+            times = np.asarray(grid.step * steps, dtype=float)
+            limits.tell(recorder.recording.points[:good], times)
+            recorder.take(times, finder)
+        progress(recorder.looked / looks)
+        if failure is not None:
+            return failure
+    return None
+
+
+def _up_to(
+    network: CompiledNetwork,
+    recorder: Recorder,
+    limits: Limits,
+    clock: NDArray[np.int64],
+    grid: _Grid,
+    kept: Kept,
+    good: int,
+    failure: ConvergenceError,
+) -> tuple[int, ConvergenceError]:
+    """Compute a chunk again without the looks that failed, so that all of it is of one moment.
+
+    Returns
+    -------
+    good : int
+        Looks that are done: the most that run without a failure.  0 where nothing can be repeated:
+        an FMU does not go back.
+    failure : ConvergenceError
+        That of the first look that fails.
+    """
+    low, high = 0, good + 1
+    count = good
+    try:
+        while high - low > 1:
+            _put_back(kept)
+            most, again = _try_chunk(network, recorder, limits, clock, grid, count)
+            if again is None:
+                low, done = count, count
+            else:
+                high, done, failure = min(count, most + 1), 0, again
+            count = (low + high) // 2
+        if low and done != low:
+            _put_back(kept)
+            low, _ = _try_chunk(network, recorder, limits, clock, grid, low)
+    except InputError:
+        low = 0
+    if not low:
+        _put_back(kept)
+    return low, failure
+
+
+def _try_chunk(
+    network: CompiledNetwork,
+    recorder: Recorder,
+    limits: Limits,
+    clock: NDArray[np.int64],
+    grid: _Grid,
+    count: int,
+) -> tuple[int, ConvergenceError | None]:
+    """Advance by so many looks; how many of them are good, and why not all."""
+    report, first = np.zeros(3), int(clock[0])
+    good = count
+    failure: ConvergenceError | None = None
+    recorder.begin()
+    try:
+        _advance(
+            network,
+            recorder.recording,
+            clock,
+            count * grid.look,
+            grid.look,
+            0,
+            grid.step,
+            grid.block,
+            grid.coarse,
+            report=report,
+        )
+    except ConvergenceError as error:
+        good = max(0, (round(report[2] / grid.step) - first) // grid.look_steps)
+        failure = error
+    times = grid.step * (first + grid.look_steps * np.arange(1.0, good + 1.0))
+    left = limits.left(recorder.recording.points[:good], times)
+    if left is not None:  # on the way to a failure it is the better word
+        good, failure = left
+    wrong = recorder.first_not_finite(good)
+    if wrong is not None:
+        good = wrong[0]
+        failure = _not_a_number(wrong[1], grid.step * (first + (good + 1) * grid.look_steps))
+    elif failure is None and (name := _not_finite_account(network)):
+        good = count - 1  # or fewer
+        failure = _not_a_number(name, grid.step * int(clock[0]))
+    return good, failure
 
 
 def _advance(
@@ -206,8 +368,9 @@ def _advance(
     allow_coarse: bool,
     *,
     settle: bool = False,
+    report: Vector | None = None,
 ) -> None:
-    report = np.zeros(3)
+    report = np.zeros(3) if report is None else report
     status = run_network(
         macros,
         per_record,
@@ -299,7 +462,11 @@ def _settle(network: CompiledNetwork, recording: Recording, step: float) -> None
 
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
-    row, code, time = int(report[0]), int(report[1]), float(report[2])
+    time = float(report[2])
+    wrong = _not_finite_part(network)
+    if wrong:
+        return _not_a_number(wrong, time)
+    row, code = int(report[0]), int(report[1])
     when = f"at {format_si(time, 's', 8)}"
     if status in (STATUS_ELEMENT, STATUS_BRANCH):
         rows: list[ElementRow] | list[BranchRow]
@@ -313,8 +480,7 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         words = failed.failures.get(code, f"status {code} of its step function")
         return ConvergenceError(
             f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
-            "Try: a smaller step, and look whether its parameters and start values make sense.",
-            time=time,
+            "Try: a smaller step, and look whether its parameters and start values make sense."
         )
     if status == STATUS_PRESSURES:
         handle = network.node_order[row]
@@ -323,15 +489,64 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
             f"{name}: the pressures did not settle {when}.\n"
             f"State: {_numbers(network.nodes.p)} Pa.\n"
             "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
-            "entrained gas.",
-            time=time,
+            "entrained gas."
         )
     return ConvergenceError(
         f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
         f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
-        "Try: a smaller step; look for a stiffness far above 1e10 N/m.",
-        time=time,
+        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
     )
+
+
+def _not_a_number(name: str, time: float) -> ConvergenceError:
+    return ConvergenceError(
+        f"{name}: not a finite number at {format_si(time, 's', 8)}.\n"
+        "Try: look whether the parameters of this component make sense; a smaller step."
+    )
+
+
+def _not_finite_part(network: CompiledNetwork) -> str:
+    """Component in whose last step a number was none; empty if all were."""
+    elements = [row.component for row in network.rows.elements]
+    branches = [row.component for row in network.rows.branches]
+    for names, data in ((elements, network.elements), (branches, network.branches)):
+        for k, name in enumerate(names):
+            if not np.all(np.isfinite(data.outputs[data.output0[k] : data.output0[k + 1]])):
+                return name
+    for i, handle in enumerate(network.node_order):
+        if not np.isfinite(network.nodes.p[i]):
+            return f"{network.rows.nodes[handle].component} pressure"
+    for c, contact in enumerate(network.rows.interfaces):
+        if not np.isfinite(network.interfaces.force[c]):
+            return f"{contact.component} force"
+    for i, port in enumerate(network.ports):
+        if not np.isfinite(network.bodies.at[Y1 + i]):
+            return f"{port.component}.{port.port} displacement"
+    return ""
+
+
+def _not_finite_account(network: CompiledNetwork) -> str:
+    """Component in whose state or energy a number is none; empty if all are."""
+    for name, value in zip(network.book_names, network.books, strict=True):
+        if not np.isfinite(value):
+            return name
+    part = _not_finite_part(network)
+    if part:
+        return part
+    for b, row in enumerate(network.rows.bodies):
+        if not all(np.all(np.isfinite(x)) for x in modal_state(network, b)):
+            return row.component
+    for values, what in (
+        (network.line_state.samples, "waves in a line"),
+        (network.line_books, "energy of a line"),
+        (network.nodes.mass, "mass in a chamber"),
+        (network.nodes.numeric, "energy of a chamber"),
+        (network.interfaces.contact_loss, "energy of a contact"),
+        (network.interfaces.film_loss, "energy of a film"),
+    ):
+        if not np.all(np.isfinite(values)):
+            return what
+    return ""
 
 
 def _numbers(values: Vector) -> str:
@@ -340,7 +555,7 @@ def _numbers(values: Vector) -> str:
 
 def _read_stores(network: CompiledNetwork) -> None:
     nodes = network.nodes
-    rho = np.full(len(nodes.p), nodes.density)
+    rho = np.array([fluid_at(nodes.fluid, p, 0)[0] for p in nodes.p])
     for rows, head in ((network.elements, 0), (network.branches, 3)):
         failed = read_stores(
             rows,
@@ -356,6 +571,7 @@ def _read_stores(network: CompiledNetwork) -> None:
             raise _failure(network, status, np.array([float(failed), 0.0, 0.0]))
 
 
+_IMPACTS = "impacts.unfinished"
 _SAVED = {
     "bodies": ("fine", "at"),
     "elements": ("state",),
@@ -364,6 +580,28 @@ _SAVED = {
     "line_state": ("samples", "head", "memory", "cavity"),
     "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "deepest", "since", "film_before"),
 }
+
+
+_LEDGER = {
+    "": ("books", "line_books"),
+    "nodes": ("numeric", "supply"),
+    "interfaces": ("contact_loss", "film_loss"),
+}
+
+
+def _everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
+    """All arrays that a step changes, and what they hold now."""
+    arrays: list[NDArray[np.generic]] = [clock]
+    for group in (_SAVED, _LEDGER):
+        for owner, names in group.items():
+            holder = getattr(network, owner) if owner else network
+            arrays += [getattr(holder, name) for name in names]
+    return [(array, array.copy()) for array in arrays]
+
+
+def _put_back(kept: Kept) -> None:
+    for array, values in kept:
+        array[...] = values
 
 
 def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, NDArray[np.generic]]:

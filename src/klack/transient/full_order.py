@@ -46,6 +46,7 @@ from klack.contact.mortar import ContactSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.finite import require_finite
 from klack.transient.inertia import InverseMass, massless_nodes
 from klack.transient.interface_solve import interface_solve
 from klack.transient.result import (
@@ -210,7 +211,22 @@ def simulate_full_order(
             record = _march(run, steps, stop_after_separation, energy_interval, progress, show)
         loop_time = perf_counter() - begin - set_up_time
         result = _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
-    ledger = result.history.ledger
+    history = result.history
+    require_finite(
+        "simulate_full_order",
+        history.step,
+        {
+            "contact force": history.force,
+            "gap": history.gap,
+            **{
+                f"velocity of {body.name}": values
+                for body, values in zip(
+                    bodies, (history.velocity_a, history.velocity_b), strict=False
+                )
+            },
+        },
+    )
+    ledger = history.ledger
     energy_balance.check_energy_balance(
         "simulate_full_order",
         ledger.residual,

@@ -19,6 +19,7 @@ from threadpoolctl import threadpool_limits
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
 from klack.transient.interface_kernel import FAILED, OPEN, TURNED, march, safe_flight
@@ -455,7 +456,7 @@ class _Run:
 
     def keep_motion(self) -> None:
         position, velocity = self.rigid_state()
-        if not np.all(np.isfinite(position)):
+        if not (np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))):
             raise ConvergenceError(
                 f"interface level: the motion is not finite at {1e6 * self.time:.4g} us.\n"
                 "Try: a shorter step."
@@ -501,6 +502,12 @@ class _Run:
         model = self.model
         force, gap, outside = (np.concatenate(part) for part in zip(*segment.parts, strict=True))
         drift = np.array(segment.drift)
+        require_finite(
+            "interface level",
+            self.step,
+            {"contact force": force, "gap": gap}
+            | {f"velocity of {name}": drift[:, i] for i, name in enumerate(model.bodies)},
+        )
         points = np.zeros((0, model.count), dtype=np.float32)
         if self.points:
             points = np.concatenate(segment.point_force)

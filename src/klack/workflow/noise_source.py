@@ -311,6 +311,8 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
             f"is left out (the fastest has {fastest:.2g} m/s); run it longer to have the whole of "
             "it."
         )
+    if result.failure:
+        found.append(f"The stroke is incomplete: {' '.join(result.failure.split())}")
     incomplete = [stop for stop, record in result.interfaces.items() if not record.complete]
     if incomplete:
         found.append(

@@ -8,7 +8,7 @@ a Zarr reader would silently take for zeros, and one of each group finds damaged
 import json
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from math import isfinite
@@ -47,6 +47,8 @@ class RecordFormat:
         That makes it, for messages.
     units : mapping of str to str
         By name of the array; a name not listed is stored without a unit.
+    tables : tuple of str
+        Members that are long tuples of one kind of record without arrays: an array per field.
     """
 
     name: str
@@ -54,6 +56,7 @@ class RecordFormat:
     kind: type
     command: str
     units: Mapping[str, str]
+    tables: tuple[str, ...] = ()
 
 
 def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
@@ -67,7 +70,7 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     with whole_file(folder / RESULT_NAME) as new:
         root = zarr.open_group(new, mode="w", zarr_format=3)
         root.attrs.put({"format": form.name, "format_version": form.version})
-        _write(root, "study", record, form.units)
+        _write(root, "study", record, form)
     return folder / RESULT_NAME
 
 
@@ -190,15 +193,18 @@ def _damaged(path: Path, got: str) -> InputError:
 # --------------------------------------------------------------------------- writing
 
 
-def _write(parent: zarr.Group, name: str, value: Any, units: Mapping[str, str]) -> None:
+def _write(parent: zarr.Group, name: str, value: Any, form: RecordFormat) -> None:
     """Store a value that is or holds arrays or records as a child of ``parent``."""
     if isinstance(value, np.ndarray):
         attributes: dict[str, Any] = {"crc32": _checksum(value), "stored": _kind(value)}
-        if name in units:
-            attributes["unit"] = units[name]
+        if name in form.units:
+            attributes["unit"] = form.units[name]
         parent.create_array(name, data=np.ascontiguousarray(value), attributes=attributes)
         return
-    if is_dataclass(value):
+    table = name in form.tables and len(value) > 0
+    if table:
+        members = _columns(value)
+    elif is_dataclass(value):
         members = {field.name: getattr(value, field.name) for field in fields(value)}
     elif isinstance(value, Mapping):
         members = dict(value)
@@ -208,12 +214,23 @@ def _write(parent: zarr.Group, name: str, value: Any, units: Mapping[str, str]) 
     plain: dict[str, Any] = {}
     for key, member in members.items():
         if _has_arrays(member):
-            _write(group, key, member, units)
+            _write(group, key, member, form)
         else:
             plain[key] = _plain(member)
     # the order of a mapping is part of it, and a zarr group does not keep it
     order = list(members)
-    group.attrs.put({"values": plain, "order": order, "crc32": _words_checksum(plain, order)})
+    marks = {"table": True} if table else {}
+    check = _words_checksum(plain, order)
+    group.attrs.put({"values": plain, "order": order, "crc32": check, **marks})
+
+
+def _columns(records: Sequence[Any]) -> dict[str, Any]:
+    """Fields of records of one kind: numbers as an array, words as a tuple."""
+    columns: dict[str, Any] = {}
+    for field in fields(records[0]):
+        values = [getattr(record, field.name) for record in records]
+        columns[field.name] = tuple(values) if isinstance(values[0], str) else np.array(values)
+    return columns
 
 
 def _has_arrays(value: Any) -> bool:
@@ -286,6 +303,8 @@ def _read(parent: zarr.Group, name: str, hint: Any) -> Any:
         raise _incomplete(f"damaged values in '{node.path}'")
     if is_dataclass(hint):
         return _read_record(node, hint, plain, order)
+    if attributes.get("table"):
+        return _read_table(node, _element(hint, 0), plain, order)
     kinds = [_element(hint, i) for i in range(len(order))]
     members = {
         key: _convert(plain[key], kind) if key in plain else _read(node, key, kind)
@@ -305,6 +324,19 @@ def _read_record(node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: l
         elif field.default is MISSING and field.default_factory is MISSING:
             raise _incomplete(f"no '{field.name}' in '{node.path}'")
     return kind(**members)
+
+
+def _read_table(
+    node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: list[str]
+) -> tuple[Any, ...]:
+    columns = {
+        name: plain[name] if name in plain else _read(node, name, Any).tolist() for name in order
+    }
+    known = [field.name for field in fields(kind) if field.name in columns]
+    return tuple(
+        kind(**dict(zip(known, row, strict=True)))
+        for row in zip(*(columns[name] for name in known), strict=True)
+    )
 
 
 @cache

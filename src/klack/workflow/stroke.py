@@ -14,22 +14,24 @@ from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase, Variant
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.statics import check_resolution
-from klack.errors import InputError
+from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.rows import Rows
 from klack.network.travel import Travel
-from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.progress import Progress, silent
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
+from klack.workflow.stroke_missing import missing_notes
 from klack.workflow.stroke_rest import rest_note
 from klack.workflow.stroke_study import (
     FluidSummary,
+    IncompleteStrokeError,
     LineSummary,
     StopSummary,
     StrokeChannels,
@@ -68,6 +70,11 @@ def run_stroke(
     Returns
     -------
     StrokeStudy
+
+    Raises
+    ------
+    IncompleteStrokeError
+        When a variant fails on its way: with the study up to there.
     """
     begin = perf_counter()
     wanted = case.require_variants(tuple(variants) or case.run.variants)
@@ -76,13 +83,13 @@ def run_stroke(
     clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
-        runs = {name: _run(valve, roles, name, states[name], clock) for name in wanted}
+        runs, failure = _runs(valve, roles, states, clock)
         stops = _stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
     rows = [run.rows for run in runs.values()]
-    told = (rest_note(name, run.variant.result, roles.seat) for name, run in runs.items())
-    resting = tuple(note for note in told if note)
-    return StrokeStudy(
+    told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
+    missing = missing_notes(results, [name for name in wanted if name not in results], failure)
+    study = StrokeStudy(
         case=case.name,
         title=case.title,
         description=case.description.strip(),
@@ -104,8 +111,11 @@ def run_stroke(
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
-        warnings=(*notes, *resting),
+        warnings=(*missing, *notes, *(note for note in told if note)),
     )
+    if failure is not None:
+        raise IncompleteStrokeError(str(failure), study) from failure
+    return study
 
 
 def variant_network(valve: Valve, variant: Variant) -> Network:
@@ -127,6 +137,7 @@ def variant_network(valve: Valve, variant: Variant) -> Network:
 class _Run:
     variant: StrokeVariant
     rows: Rows
+    failure: ConvergenceError | None
 
 
 def run_variant(
@@ -169,6 +180,24 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
     return after.variants[name].result.state
 
 
+def _runs(
+    valve: Valve, roles: ValveRoles, states: Mapping[Variant, State | None], progress: Progress
+) -> tuple[dict[str, _Run], ConvergenceError | None]:
+    """Variants up to the first one that fails, with what there is of it, and its error."""
+    runs: dict[str, _Run] = {}
+    for name, state in states.items():
+        try:
+            runs[name] = _run(valve, roles, name, state, progress)
+        except ConvergenceError as error:
+            if not runs:
+                raise
+            return runs, error
+        failure = runs[name].failure
+        if failure is not None:
+            return runs, failure
+    return runs, None
+
+
 def _run(
     valve: Valve, roles: ValveRoles, name: Variant, state: State | None, progress: Progress
 ) -> _Run:
@@ -176,7 +205,13 @@ def _run(
     stage = f"run {name}"
     progress(stage, 0.0)
     rows = variant_network(valve, name).rows()
-    result = run_variant(valve.case, rows, lambda fraction: progress(stage, fraction), state=state)
+    failure: ConvergenceError | None = None
+    try:
+        result = run_variant(
+            valve.case, rows, lambda fraction: progress(stage, fraction), state=state
+        )
+    except IncompleteRunError as error:
+        result, failure = error.result, error
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     variant = StrokeVariant(
@@ -191,7 +226,7 @@ def _run(
         result=result,
         setup_time=perf_counter() - begin - result.wall_time,
     )
-    return _Run(variant=variant, rows=rows)
+    return _Run(variant=variant, rows=rows, failure=failure)
 
 
 def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:

@@ -31,7 +31,16 @@ STROKE_FORMAT = RecordFormat(
         "static_force": "N",
         "area": "m^2",
         "frequencies": "Hz",
+        "approach_speed": "m/s",
+        "peak_force": "N",
+        "peak_time": "s",
+        "contact_time": "s",
+        "separation_time": "s",
+        "impulse": "N s",
+        "restitution": "1",
+        "energy_loss": "J",
     },
+    tables=("events",),
 )
 """How a stroke study is stored."""
 

@@ -11,6 +11,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.errors import ConvergenceError
 from klack.reduction.structure import Structure
 from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
 from klack.workflow.stroke_times import LiftTimes, Passage
@@ -18,6 +19,7 @@ from klack.workflow.study import BodySummary
 
 __all__ = [
     "FluidSummary",
+    "IncompleteStrokeError",
     "LineSummary",
     "StopSummary",
     "StrokeChannels",
@@ -244,7 +246,8 @@ class StrokeStudy:
         When the drivers' command ends; nan if no driver says.
     duration, step : float [s]
     variants : mapping of name to StrokeVariant
-        The first one is the one to compare with.
+        The first one is the one to compare with; the last one may be incomplete, see
+        :attr:`~klack.simulation.network_result.NetworkResult.failure`.
     channels : StrokeChannels
     bodies : tuple of BodySummary
         Their ``compliance_share`` is the smallest of all contact ports.
@@ -294,3 +297,18 @@ class StrokeStudy:
     def closing_time(self) -> float | None:
         """Closing time of the reference [s]; None if it does not reach its seat."""
         return self.reference.closing_time
+
+
+class IncompleteStrokeError(ConvergenceError):
+    """A variant failed on its way; ``study`` holds it until then, and all variants before it.
+
+    Parameters
+    ----------
+    text : str
+    study : StrokeStudy
+        Says in its warnings what is missing.
+    """
+
+    def __init__(self, text: str, study: StrokeStudy) -> None:
+        super().__init__(text)
+        self.study = study

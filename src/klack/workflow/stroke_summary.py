@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Any
 
 from klack.simulation.network_result import ImpactEvent
+from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 from klack.workflow.stroke_times import LiftTimes, Passage
 
@@ -70,7 +71,9 @@ def stroke_to_json(study: StrokeStudy) -> dict[str, Any]:
         ``touch_s``, and ``at_10_percent_s``, ``at_50_percent_s``, ``at_90_percent_s`` of the
         lift), ``starts`` (closed or open: which of both comes first), ``lift_m``, ``bodies`` (the
         same of every other body between stops), ``energy_residual`` (share of the throughput),
-        ``steps``, ``wall_time_s`` (of the time loop), ...; ``variants``: the same of every
+        ``steps``, ``wall_time_s`` (of the time loop), ...; ``complete`` and ``failure`` (why the
+        run ended early, at ``end_time_s``); ``fine_record_ends_s`` (end stops whose force in fine
+        steps is known up to there only; empty if all are); ``variants``: the same of every
         variant by its name.
         Times that are not reached in the run, and numbers that do not exist, are None.
     """
@@ -171,6 +174,10 @@ def _numbers(variant: StrokeVariant) -> dict[str, Any]:
     result = variant.result
     return {
         "label": variant.label,
+        "complete": not result.failure,
+        "failure": result.failure or None,
+        "end_time_s": _number(float(result.time[-1])),
+        "fine_record_ends_s": {stop: _number(t) for stop, t in cut_records(result).items()},
         "events": [_event(event) for event in result.events],
         "opening_time_s": variant.needle_times.opening.touch,
         "closing_time_s": variant.needle_times.closing.touch,

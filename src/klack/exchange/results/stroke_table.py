@@ -88,12 +88,13 @@ def _variant(variant: StrokeVariant, step: float) -> ResultRun:
 
 
 def _interface(stop: str, record: InterfaceRecord) -> tuple[ResultAxis, list[ResultChannel]]:
+    end = "" if record.complete else "; cut off, the record was full"
     axis = ResultAxis(
         name=f"{stop}_time",
         quantity="time",
         unit="s",
         values=record.time,
-        meaning=f"start of every fine step in which '{stop}' carries force",
+        meaning=f"start of every fine step in which '{stop}' carries force{end}",
     )
     parts = (
         ("step", "s", record.step, "length of the step"),
@@ -151,6 +152,7 @@ def _scalars(
     books = result.books
     numbers = [
         *_times(variant.needle_times),
+        ("complete", "1", not result.failure, "1 if the run came to its end"),
         ("impacts", "1", len(result.events), "on all stops"),
         ("energy residual", "1", books.relative_residual, "share of the throughput"),
         ("energy throughput", "J", books.throughput, "scale of the residual"),

@@ -1,0 +1,47 @@
+"""Numbers that are none: a run whose record holds one has failed, whatever else it says."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import ConvergenceError
+
+__all__ = ["require_finite"]
+
+
+def require_finite(run: str, step: float, record: Mapping[str, NDArray[np.floating]]) -> None:
+    """Refuse a record with nan or infinity in it.
+
+    Parameters
+    ----------
+    run : str
+        What was run, start of the text.
+    step : float [s]
+        From one row of the record to the next.
+    record : mapping of str to array, shape (n, ...)
+        What was recorded, by name; rows in order of time.
+
+    Raises
+    ------
+    ConvergenceError
+        With the name and the time of the first such number.
+
+    Examples
+    --------
+    >>> require_finite("simulate", 1e-6, {"contact force": np.zeros(5)})
+    """
+    first: tuple[int, str] | None = None
+    for name, values in record.items():
+        if np.isfinite(values.sum(dtype=float)):  # one number of them would show in the sum
+            continue
+        wrong = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+        row = int(np.argmax(wrong))
+        if wrong[row] and (first is None or row < first[0]):
+            first = row, name
+    if first is not None:
+        raise ConvergenceError(
+            f"{run}: {first[1]} is not a finite number {1e6 * step * first[0]:.4g} us after the "
+            "start of the record.\n"
+            "Try: check the bodies, materials and laws for nan and inf; a shorter step."
+        )
