@@ -223,7 +223,9 @@ def test_an_impact_that_is_left_out_is_told_when_it_would_be_heard(speed, told):
     """Below a tenth of the speed it has less than a hundredth of the energy."""
     loud = replace(last_impact(75e-6), approach_speed=3.0)
     last = replace(last_impact(np.nan), approach_speed=speed)
-    variant = SimpleNamespace(result=SimpleNamespace(events=[loud, last], interfaces={}))
+    variant = SimpleNamespace(
+        result=SimpleNamespace(events=[loud, last], interfaces={}, failure="")
+    )
 
     notes = noise_source._notes(variant, last)
 
