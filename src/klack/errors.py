@@ -45,18 +45,7 @@ def _shortened(text: str) -> str:
 
 
 class ConvergenceError(KlackError, RuntimeError):
-    """An iteration did not settle; the text names it, its state and a way out.
-
-    Parameters
-    ----------
-    text : str
-    time : float, optional [s]
-        Of the run, when it failed.
-    """
-
-    def __init__(self, text: str, *, time: float | None = None) -> None:
-        self.time = time
-        super().__init__(text)
+    """An iteration did not settle; the text names it, its state and a way out."""
 
 
 class AccuracyWarning(UserWarning):

@@ -116,7 +116,7 @@ def test_the_page_of_the_how_to_shows_the_times_of_the_json(numbers):
         (wet["lift_m"], wet["opening_time_s"]), rel=5e-3
     )
     for way in ("opening", "closing"):
-        row = re.search(rf"needle +{way} +([\d. ]+) +\w+\n", text)[1].split()
+        row = re.search(rf"needle +{way} +100 +([\d. ]+) +\w+\n", text)[1].split()
         keys = ("at_10_percent_s", "at_50_percent_s", "at_90_percent_s", "touch_s")
         assert wet[way]["stop"] == shown[way]["stop"]
         for key, value in zip(keys, row, strict=True):

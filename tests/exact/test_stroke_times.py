@@ -108,6 +108,15 @@ def test_without_an_opening_stop_the_lift_is_that_of_the_run():
     assert times.opening.at_90 == pytest.approx(1.9e-3, rel=1e-12)
 
 
+def test_a_valve_that_stays_far_below_its_stop_is_timed_by_its_own_lift():
+    times = times_of([(1, 0), (2, 40), (3, 0)], (hit("seat", 3e-3),), ends=(0.0, 1e-3))
+
+    assert (times.lift, times.between_stops) == (pytest.approx(40e-6, rel=1e-12), False)
+    assert moments(times.opening)[:3] == pytest.approx([1.1e-3, 1.5e-3, 1.9e-3], rel=1e-12)
+    assert times.opening.touch is None
+    assert times.closing.touch == 3e-3
+
+
 CHAIN = """
 klack: 1
 title: chain

@@ -79,6 +79,12 @@ run: {duration: 0.1 ms, step: 20 ns, record: 1 us, variants: [wet]}
 """
 
 
+def moment(error):
+    """When a run ended [s], as its message says."""
+    number, prefix = re.search(r" at ([\d.]+) ([um])s,", str(error)).groups()
+    return float(number) * {"u": 1e-6, "m": 1e-3}[prefix]
+
+
 def rows_of(text):
     return read_valve_case(text, Path("valve.yaml")).network.network().rows()
 
@@ -133,7 +139,7 @@ def test_an_armature_that_no_stop_holds_ends_the_run_with_its_name_and_time():
     assert len(told) == 1
     assert "leaves the range of the magnet of 'coil', from 0 m to 4 mm" in told[0]
     # 5 N and 60 to 100 um of way against a magnet of some 10 N: within a millisecond or two
-    assert 0.1e-3 < end.value.time < 4e-3
+    assert 0.1e-3 < moment(end.value) < 4e-3
 
 
 def test_a_contact_that_gives_way_a_little_is_no_reason_for_a_word():
@@ -204,7 +210,7 @@ def test_a_chamber_that_overflows_ends_the_run_when_its_pressure_leaves_all_sens
     # V rho(p) = V rho_0 + rho_0 q t
     rho_0, rho = (float(HEPTANE.density(p)) for p in (101325.0, 4e8))
     full = 1e-9 * (rho / rho_0 - 1.0) / (1e-3 / 60.0)
-    assert full <= end.value.time <= full + 2 * 64e-8
+    assert full <= moment(end.value) <= full + 2 * 64e-8
 
 
 @pytest.mark.parametrize(
@@ -233,12 +239,12 @@ def line_between(first, second, pressure=None, fluid=HEPTANE):
     return Network(parts, joints, fluid=fluid).rows()
 
 
-def test_a_line_without_a_pressure_takes_that_of_its_ends():
-    given, taken = line_between(2e7, 1e7, pressure=1.5e7), line_between(2e7, 1e7)
+def test_a_line_without_a_pressure_takes_the_higher_one_of_its_ends():
+    given, taken = line_between(2e7, 1e7, pressure=2e7), line_between(2e7, 1e7)
 
     assert taken.lines[0].delay == given.lines[0].delay
     assert taken.lines[0].impedance == given.lines[0].impedance
-    assert taken.lines[0].delay == 0.1 / float(HEPTANE.sound_speed(1.5e7))
+    assert taken.lines[0].delay == 0.1 / float(HEPTANE.sound_speed(2e7))
 
 
 def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():

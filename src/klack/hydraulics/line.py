@@ -65,7 +65,7 @@ class Line(Component):
         default=None,
         gt=0,
         description="Absolute, about which waves run; sets sound speed and density. Default: the "
-        "start pressure of its ends (their mean).",
+        "higher start pressure of its ends.",
     )
     wall_thickness: Length | None = Field(
         default=None, gt=0, description="Of a tube; without it the wall is rigid."
@@ -128,17 +128,20 @@ class Line(Component):
         """Return ``2 L / a`` [s], after which an end hears of the other one."""
         return 2.0 * self.length / self.wave_speed(fluid, pressure)
 
-    def mean_pressure(self, rows: Rows) -> float:
-        """Pressure [Pa] whose properties the line has: given, or that of its ends at the start."""
+    def working_pressure(self, rows: Rows) -> float:
+        """Pressure [Pa] whose properties the line has: given, or the higher one of its ends."""
         if self.pressure is not None:
             return self.pressure
         ends = [rows.nodes.get(rows.port(port)) for port in self.ports]
-        return float(np.mean([end.pressure[0] for end in ends if end is not None]))
+        return max(
+            (float(end.pressure[0]) for end in ends if end is not None),
+            default=rows.ambient.pressure,
+        )
 
     def add_rows(self, rows: Rows) -> None:
         """Add the delay line."""
         fluid = network_fluid(rows)
-        pressure = self.mean_pressure(rows)
+        pressure = self.working_pressure(rows)
         rho = float(fluid.density(pressure))
         # the network counts P = rho_ref g and q = mdot / rho_ref, with rho_ref at ambient pressure
         scale = (float(fluid.density(rows.ambient.pressure)) / rho) ** 2

@@ -49,40 +49,49 @@ class Limits:
                 weights[columns.index(limit.channel)] = 1.0
             self._watched.append((limit, weights))
 
-    def look(self, points: Matrix, time: Vector) -> None:
-        """Look at some records.
+    def left(self, points: Matrix, time: Vector) -> tuple[int, ConvergenceError] | None:
+        """First of some records in which a quantity has left what can be computed with.
 
         Parameters
         ----------
         points : array, shape (n, columns)
         time : array, shape (n,) [s]
 
+        Returns
+        -------
+        (int, ConvergenceError) or None
+            Its place, and what to say: component and time.
+        """
+        found: tuple[int, ConvergenceError] | None = None
+        for limit, weights in self._watched:
+            values = _values(limit, weights, points)
+            low, high = limit.usable
+            gone = np.flatnonzero((values <= low) | (values > high))
+            if gone.size and (found is None or gone[0] < found[0]):
+                place = int(gone[0])
+                found = place, _stop(limit, float(values[place]), float(time[place]))
+        return found
+
+    def tell(self, points: Matrix, time: Vector) -> None:
+        """Warn of ranges that are left in some records.
+
         Warns
         -----
         AccuracyWarning
-            Once for each law whose range is left.
-
-        Raises
-        ------
-        ConvergenceError
-            Where a quantity leaves what can be computed with.
+            Once for each law.
         """
-        left = []
         for limit, weights in self._watched:
-            used = np.flatnonzero(weights)
-            values = limit.start + points[:, used] @ weights[used]
-            low, high = limit.usable
-            gone = np.flatnonzero((values <= low) | (values > high))
-            if gone.size:
-                left.append((int(gone[0]), limit, values))
+            values = _values(limit, weights, points)
             low, high = limit.valid[0] - limit.slack, limit.valid[1] + limit.slack
             out = np.flatnonzero((values < low) | (values > high))
             if out.size and limit.law not in self._told:
                 self._told.add(limit.law)
                 warnings.warn(_warning(limit, values, time, int(out[0])), AccuracyWarning, 3)
-        if left:
-            place, limit, values = min(left, key=lambda item: item[0])
-            raise _stop(limit, float(values[place]), float(time[place]))
+
+
+def _values(limit: LimitRow, weights: Vector, points: Matrix) -> Vector:
+    used = np.flatnonzero(weights)
+    return np.asarray(limit.start + points[:, used] @ weights[used])
 
 
 def _warning(limit: LimitRow, values: Vector, time: Vector, first: int) -> str:
@@ -103,6 +112,5 @@ def _stop(limit: LimitRow, value: float, time: float) -> ConvergenceError:
     return ConvergenceError(
         f"{limit.component}: the {limit.quantity} is {value_text(value, limit.unit)} at "
         f"{format_si(time, 's', 6)}, far outside the range of {limit.law}, {range_text(limit)}.\n"
-        f"Try: {limit.advice}",
-        time=time,
+        f"Try: {limit.advice}"
     )

@@ -142,7 +142,11 @@ def simulate_network(
     before = energy_stores(network)
     recorder.start(step * first_step, finder, fresh=fresh)
     limits = Limits(network, [column.name for column in recorder.points])
-    limits.look(recorder.recording.points[:1], np.array([step * first_step]))
+    start_point, start_time = recorder.recording.points[:1], np.array([step * first_step])
+    limits.tell(start_point, start_time)
+    left = limits.left(start_point, start_time)
+    if left is not None:
+        raise left[1]
     begin = perf_counter()
     failure = _run(network, recorder, finder, limits, clock, grid, progress)
     wall_time = perf_counter() - begin
@@ -245,7 +249,9 @@ def _run(
             good, failure = _up_to(network, recorder, limits, clock, grid, kept, good, failure)
         if good:
             steps = int(clock[0]) + grid.look_steps * np.arange(1 - good, 1)
-            recorder.take(np.asarray(grid.step * steps, dtype=float), finder)
+            times = np.asarray(grid.step * steps, dtype=float)
+            limits.tell(recorder.recording.points[:good], times)
+            recorder.take(times, finder)
         progress(recorder.looked / looks)
         if failure is not None:
             return failure
@@ -322,6 +328,10 @@ def _try_chunk(
     except ConvergenceError as error:
         good = max(0, (round(report[2] / grid.step) - first) // grid.look_steps)
         failure = error
+    times = grid.step * (first + grid.look_steps * np.arange(1.0, good + 1.0))
+    left = limits.left(recorder.recording.points[:good], times)
+    if left is not None:  # on the way to a failure it is the better word
+        good, failure = left
     wrong = recorder.first_not_finite(good)
     if wrong is not None:
         good = wrong[0]
@@ -329,13 +339,6 @@ def _try_chunk(
     elif failure is None and (name := _not_finite_account(network)):
         good = count - 1  # or fewer
         failure = _not_a_number(name, grid.step * int(clock[0]))
-    steps = first + grid.look_steps * np.arange(1, good + 1)
-    time = np.asarray(grid.step * steps, dtype=float)
-    try:
-        limits.look(recorder.recording.points[:good], time)
-    except ConvergenceError as error:  # a range left on the way is the better word
-        good = int(np.searchsorted(time, (error.time or 0.0) - 0.5 * grid.step))
-        failure = error
     return good, failure
 
 
@@ -408,8 +411,7 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         words = failed.failures.get(code, f"status {code} of its step function")
         return ConvergenceError(
             f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
-            "Try: a smaller step, and look whether its parameters and start values make sense.",
-            time=time,
+            "Try: a smaller step, and look whether its parameters and start values make sense."
         )
     if status == STATUS_PRESSURES:
         handle = network.node_order[row]
@@ -418,14 +420,12 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
             f"{name}: the pressures did not settle {when}.\n"
             f"State: {_numbers(network.nodes.p)} Pa.\n"
             "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
-            "entrained gas.",
-            time=time,
+            "entrained gas."
         )
     return ConvergenceError(
         f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
         f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
-        "Try: a smaller step; look for a stiffness far above 1e10 N/m.",
-        time=time,
+        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
     )
 
 

@@ -47,6 +47,7 @@ TIME_COLUMNS = (
     "variant",
     "body",
     "way",
+    "lift [um]",
     "10 % [ms]",
     "50 % [ms]",
     "90 % [ms]",
@@ -109,6 +110,7 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
             variant.name,
             times.body,
             way,
+            _lift(times),
             _moment(passage.at_10),
             _moment(passage.at_50),
             _moment(passage.at_90),
@@ -261,6 +263,13 @@ def _event(event: ImpactEvent) -> EventJson:
 def _number(value: float) -> float | None:
     """JSON knows no nan and no infinity."""
     return float(value) if isfinite(value) else None
+
+
+def _lift(times: LiftTimes) -> str:
+    """What the shares count from: between stops, or the largest lift of the run."""
+    if times.lift is None:
+        return "none"
+    return f"{1e6 * times.lift:.4g}{'' if times.between_stops else ' (largest)'}"
 
 
 def _moment(time: float | None) -> str:

@@ -16,6 +16,7 @@ __all__ = ["LiftTimes", "Passage", "all_lift_times", "lift_times"]
 Vector = NDArray[np.float64]
 
 _MOVED = 0.1  # share of the lift at which a motion begins and ends
+_LEAST = 0.01  # share of the lift between stops that is worth times of its own
 _NO_LIFT = 1e-8  # [m] less is the elasticity of what is closed
 
 
@@ -59,7 +60,8 @@ class LiftTimes:
     lift : float or None [m]
         Between both ends; None if nothing moved.
     between_stops : bool
-        Whether stops end the lift; else it counts to the furthest place of the run.
+        Whether stops end the lift; else it counts to the furthest place of the run, because no stop
+        is there or because less than 10 % of the way to it are used.
     opening, closing : Passage
     """
 
@@ -155,6 +157,12 @@ def lift_times(
         )
     share = (displacement - low) / (high - low)
     is_open = bool(share[0] > 0.5)
+    moved = float(np.max(1.0 - share if is_open else share))
+    if not free and _LEAST <= moved < _MOVED:  # a relief valve that its stop never ends
+        free = True
+        way = moved * (high - low)
+        low, high = (high - way, high) if is_open else (low, low + way)
+        share = (displacement - low) / (high - low)
     rest, far = stops[::-1] if is_open else stops
     away, back = _stroke(time, 1.0 - share if is_open else share, events, rest, far)
     if is_open:  # passed 10 % from the open end: 90 % of the lift
