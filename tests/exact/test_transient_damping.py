@@ -125,6 +125,33 @@ def test_energy_taken_by_damping_is_booked_in_every_step(name, scheme):
     assert abs(result.history.ledger.residual) < 1e-10
 
 
+@pytest.mark.parametrize("scheme", ["contact-stabilised-newmark", "massless"])
+def test_a_spring_gives_and_takes_what_is_booked(scheme):
+    """Momentum and energy of a damped bar that a stiff spring holds back, to round-off."""
+    body, space = bar()
+    kept = Modes(modes().omega[:KEPT], modes().shapes[:, :KEPT])
+    result = simulate_full_order(
+        body,
+        None,
+        space,
+        speed=SPEED,
+        duration=3 * PERIOD,
+        step=STEP,
+        scheme=scheme,
+        axial_force=-5.0,
+        spring_stiffness=1e7,
+        damping=(body_damping(DAMPINGS["modal"], kept), None),
+        energy_interval=1,
+    )
+    history = result.history
+    pushed = (history.force.sum() + history.external_force.sum()) * STEP
+    gained = history.mass_a * (history.velocity_a[-1] + SPEED)
+    assert gained == pytest.approx(pushed, rel=1e-9)
+    assert np.ptp(history.external_force) > 10.0
+    assert np.max(np.abs(result.energy.residual)) < 1e-10 * result.energy.total[0]
+    assert history.ledger.spring == result.energy.spring[-1] != 0.0
+
+
 def test_no_damping_is_no_matrix():
     assert body_damping(ModalDamping(ratio=0.0), modes()) is None
     assert body_damping(RayleighDamping(alpha=0.0, beta=0.0), modes()) is None

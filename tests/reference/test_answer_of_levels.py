@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from klack.case.reader import load_case, read_case
-from klack.case.schema import Case, LinearLocalLaw
+from klack.case.schema import Case, LinearLocalLaw, Spring
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.workflow import impact
 from klack.workflow.impact import run_impact
@@ -137,6 +137,29 @@ def test_a_gap_that_is_only_drawn_is_flown_at_every_level():
     touches = [level.measures.first_touch for level in study.levels.values()]
     assert touches == pytest.approx([1e-6, 1e-6], rel=0.05)  # the meshes bend the ball
     assert study.gap == pytest.approx(0.5e-6, rel=0.05)
+
+
+def test_a_closing_spring_acts_at_every_level():
+    """The speed at first touch follows from the work on the way; the full order left it out."""
+    gap, stiffness, preload = 0.5e-6, 2e6, 2.0
+    case = with_contact(gap=gap)
+    motion = case.motion.model_copy(
+        update={"speed": 0.1, "spring": Spring(stiffness=stiffness, preload=preload)}
+    )
+    case = case.model_copy(
+        update={"motion": motion, "run": case.run.model_copy(update={"duration": 45e-6})}
+    )
+    study = run_impact(case, levels=("reduced", "interface", "full"), certify=False)
+
+    mass = study.bodies[0].mass
+    work = preload * gap + 0.5 * stiffness * gap**2
+    expected = (0.1**2 + 2 * work / mass) ** 0.5
+    assert expected > 0.13  # the spring matters
+    for result in study.levels.values():
+        assert result.measures.approach_speed == pytest.approx(expected, rel=0.01)  # one step
+    for level in ("reduced", "interface"):
+        assert abs(study.deviations[level].peak_force) < 0.01
+        assert abs(study.deviations[level].restitution) < 0.01
 
 
 def test_parts_drawn_far_apart_are_the_reason_that_is_named():

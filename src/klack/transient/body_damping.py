@@ -30,7 +30,7 @@ from klack.errors import require_nonnegative
 from klack.reduction.damping import Damping, RayleighDamping
 from klack.transient.interface_solve import InterfaceSolve
 
-__all__ = ["BodyDamping", "DampedSolve", "DampingMatrix", "body_damping"]
+__all__ = ["BodyDamping", "DampingMatrix", "LowRankSolve", "body_damping"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,17 +114,23 @@ class DampingMatrix:
             Mass that the run moves, which may differ from the one of the body at its contact nodes.
         """
         free = body.free
-        columns, rate = [(M @ damping.shapes)[free]], [damping.rate]
-        if damping.alpha > 0.0 and not body.is_fixed:
-            loads = M @ body.rigid_modes
-            root = np.linalg.cholesky(body.rigid_modes.T @ loads)
-            columns.append(solve_triangular(root, loads[free].T, lower=True).T)
-            rate.append(np.full(loads.shape[1], -damping.alpha))
+        columns, rate = M @ damping.shapes, damping.rate
+        if not body.is_fixed:
+            rigid = body.rigid_modes
+            loads = M @ rigid
+            root = np.linalg.cholesky(rigid.T @ loads)
+            loads = solve_triangular(root, loads.T, lower=True).T
+            motion = solve_triangular(root, rigid.T, lower=True).T
+            # modes of another mass than M would drag the rigid motion a little
+            columns = columns - loads @ (motion.T @ columns)
+            if damping.alpha > 0.0:
+                columns = np.hstack([columns, loads])
+                rate = np.append(rate, np.full(loads.shape[1], -damping.alpha))
         sparse = csr_array(damping.alpha * M + damping.beta * csr_array(body.K))
         return cls(
             sparse=csr_array(sparse[free][:, free]),
-            columns=np.hstack(columns),
-            rate=np.concatenate(rate),
+            columns=columns[free],
+            rate=rate,
         )
 
     def force(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -132,7 +138,7 @@ class DampingMatrix:
         return self.sparse @ v + self.columns @ (self.rate * (self.columns.T @ v))
 
 
-class DampedSolve:
+class LowRankSolve:
     """An :class:`InterfaceSolve` of S with the low-rank term Z diag(weight) Z^T added.
 
     Parameters

@@ -49,7 +49,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.finite import require_finite
-from klack.transient.body_damping import BodyDamping, DampedSolve, DampingMatrix
+from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve
 from klack.transient.inertia import InverseMass, massless_nodes
 from klack.transient.interface_solve import InterfaceSolve, interface_solve
 from klack.transient.result import (
@@ -105,6 +105,7 @@ def simulate_full_order(
     step: float = 50e-9,
     scheme: Scheme = "contact-stabilised-newmark",
     axial_force: float = 0.0,
+    spring_stiffness: float = 0.0,
     damping: tuple[BodyDamping | None, BodyDamping | None] = (None, None),
     stop_after_separation: float | None = None,
     energy_interval: int = 10,
@@ -137,6 +138,9 @@ def simulate_full_order(
     scheme : {"contact-stabilised-newmark", "massless"}
     axial_force : float [N]
         Constant force on a along +z (negative presses a onto b), spread over it like its weight.
+    spring_stiffness : float [N/m]
+        Of a massless spring from the centre of mass of a to ground, without force at the given
+        placement.
     damping : pair of BodyDamping or None
         Of body a and of body b; without any by default.
     stop_after_separation : float, optional [s]
@@ -186,7 +190,7 @@ def simulate_full_order(
         )
     begin = perf_counter()
     with ExitStack() as stack:
-        bodies = [_Motion(body_a, space.G_a, "a", damping[0])]
+        bodies = [_Motion(body_a, space.G_a, "a", damping[0], spring_stiffness)]
         if body_b is not None:
             bodies.append(_Motion(body_b, space.G_b, "b", damping[1]))
         if bodies[0].supported:
@@ -253,7 +257,12 @@ class _Motion:
     """State of one body on its free degrees of freedom, and what one step does to it."""
 
     def __init__(
-        self, body: ElasticBody, G: csr_array, role: str, damping: BodyDamping | None
+        self,
+        body: ElasticBody,
+        G: csr_array,
+        role: str,
+        damping: BodyDamping | None,
+        spring: float = 0.0,
     ) -> None:
         self.name = body.name
         self.role = role
@@ -273,7 +282,7 @@ class _Motion:
         fixed[self.free] = False
         self.supported = bool(np.any(fixed & (axis > 0)))
         self.whole_mass = csr_array(body.M)
-        self.body, self.damping = body, damping
+        self.body, self.damping, self.spring = body, damping, spring
         self.C: DampingMatrix | None = None
         self.K = csr_array(body.K)[self.free][:, self.free]
         self.G = csr_array(G)[:, self.free]
@@ -312,10 +321,16 @@ class _Motion:
             S = S + self.C.sparse * (2.0 / step)
         self.factor = factorize(csr_array(S), backend=backend, threads=threads, precision=precision)
         self.solve: InterfaceSolve = interface_solve(self.factor, self.G)
-        if self.C is not None and len(self.C.rate):
-            self.solve = DampedSolve(
-                self.solve, self.factor, self.G, self.C.columns, 2.0 / step * self.C.rate
-            )
+        columns, weight = [np.zeros((len(self.free), 0))], [np.zeros(0)]
+        if self.C is not None:
+            columns.append(self.C.columns)
+            weight.append(2.0 / step * self.C.rate)
+        if self.spring > 0.0:
+            columns.append((self.axial_mass / self.mass)[:, None])
+            weight.append(np.array([self.spring]))
+        if sum(len(part) for part in weight):
+            Z, D = np.hstack(columns), np.concatenate(weight)
+            self.solve = LowRankSolve(self.solve, self.factor, self.G, Z, D)
 
     def learn(self, points: NDArray[np.int64]) -> None:
         """Work out the response to contact points that come near for the first time."""
@@ -338,6 +353,9 @@ class _Motion:
         self.resistance = self.K @ (self.u + self.w)
         if self.C is not None:
             self.resistance += 2.0 * self.C.force(self.v)
+        if self.spring > 0.0:
+            both = float(self.axial_mass @ (self.u + self.w)) / self.mass
+            self.resistance += self.axial_mass * (self.spring / self.mass * both)
         return self.G @ self.w
 
     def predict(self, push: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -419,7 +437,8 @@ class _Run:
         self.watched = np.zeros(count, dtype=bool)
         self.learned = np.zeros(count, dtype=bool)
         self.share = 1.0 if scheme == "massless" else 2.0
-        self.contact_loss = self.overshoot_loss = self.damped = self.work = 0.0
+        self.contact_loss = self.overshoot_loss = self.damped = self.work = self.stored = 0.0
+        self.outside = axial_force
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
     def place(self) -> tuple[float, float]:
@@ -438,7 +457,7 @@ class _Run:
         if retraction > 0:
             _log.info("bodies overlap by %.3g um; body a starts further back", retraction * 1e6)
         flown = 0
-        if self.axial_force == 0.0:
+        if self.axial_force == 0.0 == needle.spring:
             flown = max(0, floor(touch / (self.speed * self.step)) - 1)
         needle.force = needle.axial_mass * (self.axial_force / needle.mass)
         needle.u = needle.axis * (retraction - self.speed * flown * self.step)
@@ -543,7 +562,11 @@ class _Run:
         self.damped += sum(body.damped() for body in self.bodies)
         for body in self.bodies:
             body.commit()
-        self.work += self.axial_force * (self.bodies[0].centre() - centre)
+        needle = self.bodies[0]
+        travel, spring = needle.centre() - centre, needle.spring * 0.5 * (needle.centre() + centre)
+        self.work += self.axial_force * travel
+        self.stored += spring * travel
+        self.outside = self.axial_force - spring
         self.lam, self.mean = lam, mean
         self.steps += 1
         self.steps_in_contact += bool(np.any(lam))
@@ -577,6 +600,7 @@ class _Record:
     def __init__(self, run: _Run) -> None:
         self.force: list[float] = []
         self.gap: list[float] = []
+        self.outside: list[float] = []
         self.point_force: list[NDArray[np.float32]] = []
         self.velocity: list[list[float]] = []
         self.energy: list[tuple[float, ...]] = []
@@ -603,13 +627,14 @@ class _Record:
     def keep_energy(self, run: _Run) -> None:
         kinetic = [body.kinetic(run.y) for body in run.bodies]
         strain = [body.strain() for body in run.bodies]
-        losses = (run.contact_loss, run.overshoot_loss, run.work, run.damped)
+        losses = (run.contact_loss, run.overshoot_loss, run.work, run.damped, run.stored)
         self.energy.append((*kinetic, *strain, *losses))
         self.energy_step.append(run.steps)
 
     def keep_step(self, run: _Run, force: float, gap: float) -> None:
         self.force.append(force)
         self.gap.append(gap)
+        self.outside.append(run.outside)
         self.point_force.append(run.mean.astype(np.float32))
         self.keep_velocity(run)
         carries = bool(np.any(run.mean))
@@ -718,6 +743,7 @@ def _result(
         overshoot=energy[:, 2 * count + 1],
         work=energy[:, 2 * count + 2],
         damping=energy[:, 2 * count + 3],
+        spring=energy[:, 2 * count + 4],
     )
     history = ImpactHistory(
         step=run.step,
@@ -730,7 +756,7 @@ def _result(
         mass_a=bodies[0].mass,
         mass_b=inf if count == 1 or bodies[1].supported else bodies[1].mass,
         ledger=_ledger(bodies, book, velocity[-1]),
-        external_force=np.full(len(record.force), run.axial_force),
+        external_force=np.array(record.outside),
         longest_period=longest_period,
         solver=f"full order, {sum(len(body.free) for body in bodies)} degrees of freedom, "
         f"{run.scheme}",
@@ -777,6 +803,7 @@ def _ledger(
         contact_dissipation=float(book.contact[-1] + book.overshoot[-1]),
         damping=float(book.damping[-1]),
         work=float(book.work[-1]),
+        spring=float(book.spring[-1]),
     )
 
 

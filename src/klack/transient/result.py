@@ -37,6 +37,8 @@ class EnergyRecord:
         Done by the constant force.
     damping : array, shape (k,) [J]
         Lost in the damping of the bodies, >= 0.
+    spring : array, shape (k,) [J]
+        Taken up by the spring since the start.
     """
 
     time: NDArray[np.float64]
@@ -46,6 +48,7 @@ class EnergyRecord:
     overshoot: NDArray[np.float64]
     work: NDArray[np.float64]
     damping: NDArray[np.float64]
+    spring: NDArray[np.float64]
 
     @property
     def total(self) -> NDArray[np.float64]:
@@ -56,7 +59,7 @@ class EnergyRecord:
     def residual(self) -> NDArray[np.float64]:
         """Energy from nowhere, shape (k,) [J]: round-off in a sound run."""
         lost = self.contact + self.overshoot + self.damping
-        return self.total - self.total[0] + lost - self.work
+        return self.total - self.total[0] + self.spring + lost - self.work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,5 +205,6 @@ class FullOrderResult:
     def energy_loss(self) -> float:
         """Energy that the scheme lost, relative to the energy at the start [-]."""
         given = self.energy.total[0] + self.energy.work[-1]
-        lost = given - self.energy.damping[-1] - self.energy.total[-1]
+        kept = self.energy.total[-1] + self.energy.spring[-1] + self.energy.damping[-1]
+        lost = given - kept
         return float(lost / max(self.energy.total[0], abs(self.energy.work[-1])))

@@ -446,6 +446,8 @@ def simulate_in_full(
         Both as in :func:`klack.transient.full_order.simulate_full_order`.
     """
     case, pair = problem.case, problem.pair
+    spring = case.motion.spring
+    stiffness = 0.0 if spring is None else spring.stiffness
     progress("full order", 0.0)
     return simulate_full_order(
         pair.upper,
@@ -454,7 +456,9 @@ def simulate_in_full(
         speed=case.motion.speed,
         duration=case.run.duration,
         step=case.run.full_step,
-        axial_force=-case.motion.closing_force,
+        # the preload is the force at first touch; a gap above it the spring pushes harder
+        axial_force=-(case.motion.closing_force + stiffness * _gap(case)),
+        spring_stiffness=stiffness,
         damping=(_damping(case, pair.upper, kept), _damping(case, pair.lower, kept)),
         longest_period=longest_period,
         threads=threads or 2,
