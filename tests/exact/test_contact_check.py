@@ -105,7 +105,7 @@ def checked(asked: Case, force: float = 5.0) -> tuple[ContactCheck, list[str]]:
     ],
 )
 def test_one_round_of_refinement_is_enough(needle, seat, size):
-    """A mesh up to forty times too coarse names the size that the next one needs.
+    """A mesh that resolves nothing names the size that the next one needs.
 
     Tolerance of the width: the curvature on elements as long as the radius, and finite slopes.
     """

@@ -27,13 +27,17 @@ from klack.contact.laws import TableLaw
 from klack.contact.statics import StaticContact
 from klack.errors import AccuracyWarning, InputError, require_nonnegative
 
-__all__ = ["LocalLaw", "consistent_law"]
+__all__ = ["LocalLaw", "OverfullModesError", "consistent_law"]
 
 _FAIR_SHARE = 0.2
 """Share of the compliance below which the law leans on a small difference of large numbers."""
 
 _POWERS = (1.0, 2.0)
 """Exponents F ~ delta^n that the beginning of a smooth contact can have."""
+
+
+class OverfullModesError(InputError):
+    """The kept modes carry more than the static compliance of a contact: none is left."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,7 +107,7 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
 
     Raises
     ------
-    InputError
+    OverfullModesError
         If the modes carry so much that the rest is not monotone.
     """
     require_nonnegative("consistent law: modal compliance", modal_compliance, "m/N")
@@ -114,7 +118,7 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
     share = indentation / approach
     if np.any(tangent_share <= 0):
         worst = int(np.argmax(tangent_share <= 0))
-        raise InputError(
+        raise OverfullModesError(
             "consistent law",
             got=f"modes that carry more than the static compliance above {force[worst]:.4g} N "
             f"({modal_compliance:.4g} m/N of {approach[-1] / force[-1]:.4g} m/N at the end)",

@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.contact.statics import ReachError
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -586,7 +587,7 @@ class _Run:
         if np.all(_RIM_RESERVE * travel * np.abs(axial) < self.model.beyond[at_rim]):
             return
         at = ", ".join(f"{x * 1e3:.4g}" for x in self.model.points[np.argmax(at_rim)])
-        raise InputError(
+        raise ReachError(
             "interface level: contact",
             got=f"a contact point at the rim of the candidates, at ({at}) mm, that carried",
             expected="contact only inside of the candidates",

@@ -13,6 +13,7 @@ from math import floor, inf, isfinite, log10, nan, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from klack.case.bodies import CaseFile
 from klack.contact.hertz import line_half_width, point_radius
@@ -125,7 +126,7 @@ def check_contact(
         _warn(_coarse(case, pair, static, force, ratio, expected))
     if across < FEWEST_POINTS:
         doubts.append(f"{across} contact points across are too few")
-    if _tell_ends(edges, space, lam, surfaces):
+    if _tell_ends(edges, space.points, space.size, lam, surfaces):
         doubts.append(_OVER_THE_END)
     return ContactCheck(
         half_width=static.half_width_at(force),
@@ -169,10 +170,11 @@ def ends_reached(
     for name, result in levels.items():
         if result.pressure is None:
             continue
-        # of a stop above only the points that follow
-        force = np.max(result.pressure.point_force[:, : space.count], axis=0)
+        record = result.pressure
+        _, nearest = cKDTree(space.points).query(record.points)
+        force = np.max(record.point_force, axis=0)
         with warnings_of(f"level '{name}'"):
-            if _tell_ends(_edges(pair), space, force, surfaces):
+            if _tell_ends(_edges(pair), record.points, space.size[nearest], force, surfaces):
                 return replace(check, doubts=(*check.doubts, _OVER_THE_END))
     return check
 
@@ -330,7 +332,8 @@ def _normal_of(
 
 def _tell_ends(
     sides: tuple[_Side, _Side],
-    space: ContactSpace,
+    points: NDArray[np.float64],
+    size: NDArray[np.float64],
     lam: NDArray[np.floating],
     surfaces: str,
 ) -> bool:
@@ -340,8 +343,8 @@ def _tell_ends(
     for body, surface, edges in sides:
         if not np.any(edges.ends) or not np.any(carries):
             continue
-        distance = edges.distance(space.points[carries])
-        reached = edges.ends & (distance <= _MARGIN * space.size[carries]).any(axis=1)
+        distance = edges.distance(points[carries])
+        reached = edges.ends & (distance <= _MARGIN * size[carries]).any(axis=1)
         names = [edges.neighbour[k] or "" for k in np.flatnonzero(reached)]
         for name in dict.fromkeys(names):
             first = np.flatnonzero(reached)[names.index(name)]

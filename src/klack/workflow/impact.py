@@ -12,6 +12,7 @@ from klack import __version__
 from klack.acoustics.comparison import compare_histories
 from klack.cache.setting import result_cache
 from klack.case.schema import Case, SubmodelLocalLaw
+from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
 from klack.contact.submodel import LocalStiffness
@@ -19,6 +20,7 @@ from klack.elasticity.eigen import Modes
 from klack.errors import InputError
 from klack.reduction.reduce import Correction
 from klack.reduction.transfer import TransferComparison
+from klack.transient.interface_model import InterfaceModel
 from klack.transient.result import FullOrderResult
 from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
@@ -26,10 +28,10 @@ from klack.workflow.contact_check import ContactCheck, check_contact, ends_reach
 from klack.workflow.given_impact import run_given_impact
 from klack.workflow.interface_level import (
     build_guide,
-    build_interface,
     certificate_modes,
     run_interface,
     simulate_case,
+    within_reach,
 )
 from klack.workflow.levels import (
     PARTICIPATION_POOL,
@@ -239,10 +241,13 @@ def _run_interface(
     problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair, clock: StageClock
 ) -> LevelResult:
     clock("interface", 0.0)
-    model = build_interface(problem, pools, ports=own.ports)
-    guide = build_guide(problem, model, pools, ports=own.ports)
-    setup = clock.spent((*_SET_UP[:-1], "interface"))
-    result = run_interface(problem, model, guide, setup_time=setup)
+
+    def run(model: InterfaceModel) -> LevelResult:
+        guide = build_guide(problem, model, pools, ports=own.ports)
+        setup = clock.spent((*_SET_UP[:-1], "interface"))
+        return run_interface(problem, model, guide, setup_time=setup)
+
+    result = within_reach(problem, pools, run, ports=own.ports)
     clock("interface", 1.0)
     return result
 
@@ -273,15 +278,20 @@ def _certificate(
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
     count = certificate_modes(problem.case)
-    model = build_interface(problem, pools, count=count)
-    with warnings_of(f"estimate of the error, {count} modes"):
+
+    def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
         setup = clock.spent((*_SET_UP[:-1], "estimate of the error"))
-        level = run_interface(problem, model, None, setup_time=setup)
+        return model, run_interface(problem, model, None, setup_time=setup)
+
+    def run_again(model: InterfaceModel) -> ImpactHistory:
+        return simulate_case(problem.case, model).history
+
+    with warnings_of(f"estimate of the error, {count} modes"):
+        model, level = within_reach(problem, pools, run, count=count)
     history = level.history
     clock("estimate of the error", 0.5)
-    half = build_interface(problem, pools, count=count // 2)
     with warnings_of(f"estimate of the error, {count // 2} modes"):
-        fewer = simulate_case(problem.case, half).history
+        fewer = within_reach(problem, pools, run_again, count=count // 2)
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("estimate of the error", 1.0)

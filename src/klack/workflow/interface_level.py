@@ -1,7 +1,8 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
-from klack.contact.mortar import ContactSpace
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -40,12 +42,16 @@ __all__ = [
     "exact_gaps",
     "run_interface",
     "simulate_case",
+    "within_reach",
 ]
+
+_Result = TypeVar("_Result")
 
 CONTACT, OPPOSITE = "contact", "opposite"
 """Names of the contact of a case and of that with the stop above."""
 
 _FEWEST = 30
+_REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
 
@@ -120,6 +126,56 @@ def build_interface(
             )
         )
     return interface_model(bodies, contacts)
+
+
+def within_reach(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    run: Callable[[InterfaceModel], _Result],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+) -> _Result:
+    """Run an interface-level model on as many contact points as the motion reaches.
+
+    The static contact bounds the approach of one quasi-static impact; waves, or a body that comes
+    back while its stop still swings, may go further.
+
+    Parameters
+    ----------
+    problem, pools, ports, count
+        As given to :func:`build_interface`.
+    run : callable
+        Given the model; called again, with twice the reach, after a :class:`ReachError`.
+
+    Raises
+    ------
+    ReachError
+        Where the case gives the reach, or has a stop above.
+    """
+    space: ContactSpace | None = None
+    compliance: NDArray[np.float64] | None = None
+    while True:
+        model = build_interface(
+            problem, pools, ports=ports, count=count, space=space, compliance=compliance
+        )
+        try:
+            return run(model)
+        except ReachError:
+            if problem.case.contact.reach is not None or problem.opposite is not None:
+                raise
+            pair, present = problem.pair, problem.space if space is None else space
+            space = contact_space(
+                pair.upper.mesh,
+                pair.upper_surface,
+                pair.lower.mesh,
+                pair.lower_surface,
+                reach=_REACH_GROWTH * present.reach,
+                slave=present.slave,
+            )
+            compliance = extended_compliance(
+                space, problem.static, problem.flexibility_upper, problem.flexibility_lower
+            )
 
 
 def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:

@@ -165,6 +165,7 @@ class StartJson(TypedDict):
     ]
     mass_flow_kg_s: Annotated[dict[str, float], Field(description="By restriction.")]
     residual_force_N: Annotated[dict[str, float], Field(description="What is left, by body.")]
+    notes: Annotated[list[str], Field(description="What has no steady state.")]
 
 
 class VariantJson(TimesJson):
@@ -313,7 +314,8 @@ class DesignNoiseJson(ClickJson):
     run: str
     own_components: OwnComponents
     third_octave: Annotated[list[BandJson], Field(description="Of the force of all stops.")]
-    injected_energy_J: Real
+    injected_energy_J: Annotated[Real, Field(description="Into the bodies, rigidly held.")]
+    support_energy_J: Annotated[Real, Field(description="Into mount and plate.")]
     radiated_energy_J: Real
     radiated_energy_upper_bound_J: Real
     valid_from_Hz: Real

@@ -1,5 +1,6 @@
 """One impact at one level: lumped, reduced in its variants, or full order."""
 
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -24,13 +25,13 @@ from klack.contact.laws import (
     LinearLaw,
     gonthier_coefficient,
 )
-from klack.contact.local_law import LocalLaw, consistent_law
+from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
 from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.submodel import LocalStiffness, local_stiffness
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.reduction.ports import Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -191,17 +192,49 @@ def own_pair(
     stiffness: float,
     recovery: bool = False,
 ) -> ReducedPair:
-    """Reduce both bodies as the case asks for; see :func:`reduce_pair`."""
+    """Reduce both bodies as the case asks for; see :func:`reduce_pair`.
+
+    Warns
+    -----
+    AccuracyWarning
+        When fewer modes than asked for were kept, so that a compliance is left to the local law.
+    """
     reduction = problem.case.reduction
     names = (problem.pair.upper.name, problem.pair.lower.name)
-    return reduce_pair(
-        problem,
-        pools,
-        correction=reduction.correction,
-        selection={name: selection_of(reduction.choice(name)) for name in names},
-        stiffness=stiffness,
-        recovery=recovery,
-    )
+    asked = {name: selection_of(reduction.choice(name)) for name in names}
+    selection = asked
+    while True:
+        try:
+            pair = reduce_pair(
+                problem,
+                pools,
+                correction=reduction.correction,
+                selection=selection,
+                stiffness=stiffness,
+                recovery=recovery,
+            )
+        except OverfullModesError:
+            fewer = {name: _fewer(choice) for name, choice in selection.items()}
+            if fewer == selection:
+                raise
+            selection = fewer
+            continue
+        break
+    if selection != asked:
+        counts = [f"{elastic_count(b)} of '{b.name}'" for b in (pair.upper, pair.lower)]
+        warnings.warn(
+            f"contact: only {' and '.join(counts)} of the modes asked for are kept: more of them "
+            "would carry more than the static compliance of this contact and leave none to the "
+            "local law. The interface level keeps them all.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return pair
+
+
+def _fewer(choice: ModeSelection) -> ModeSelection:
+    """About two thirds of so many lowest modes; another choice as it is."""
+    return ByCount(max(1, 2 * choice.count // 3)) if isinstance(choice, ByCount) else choice
 
 
 def reduce_pair(
