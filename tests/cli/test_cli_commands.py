@@ -370,7 +370,8 @@ def test_full_disk_is_one_clear_error(tmp_path):
     assert contents(tmp_path) == []
 
 
-def test_json_is_whole_or_absent(tmp_path):
+def test_json_is_whole_or_absent(tmp_path, monkeypatch):
+    monkeypatch.setattr("klack.cli.output.json", json)  # this is no result of a command
     target = tmp_path / "x.json"
     write_json(target, {"peak_force_N": 250.0})
 
