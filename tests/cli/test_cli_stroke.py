@@ -138,8 +138,10 @@ def test_two_runs_are_one(run):
     whole = load_stroke(run / "out").variants["dry"].result
     parts = [load_stroke(Path(name)).variants["dry"].result for name in ("first", "second")]
     assert len(parts[0].events) > 3 < len(parts[1].events)
-    found = [(e.stop, e.time, e.peak_force) for part in parts for e in part.events]
-    assert found == [(e.stop, e.time, e.peak_force) for e in whole.events]
+    # the impact in which the first half ends is told again, whole
+    found = {(e.stop, e.time): e for part in parts for e in part.events}
+    last = sorted(found.values(), key=lambda event: event.time)
+    assert repr(last) == repr(list(whole.events))
     lift = "needle.tip displacement"
     np.testing.assert_array_equal(
         whole.channels[lift].values[-500:], parts[1].channels[lift].values[-500:]
