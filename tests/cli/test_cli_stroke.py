@@ -159,8 +159,10 @@ def test_two_runs_are_one(run):
     whole = load_stroke(run / "out").variants["dry"].result
     parts = [load_stroke(Path(name)).variants["dry"].result for name in ("first", "second")]
     assert len(parts[0].events) > 3 < len(parts[1].events)
-    found = [(e.stop, e.time, e.peak_force) for part in parts for e in part.events]
-    assert found == [(e.stop, e.time, e.peak_force) for e in whole.events]
+    # the impact in which the first half ends is told again, whole
+    found = {(e.stop, e.time): e for part in parts for e in part.events}
+    last = sorted(found.values(), key=lambda event: event.time)
+    assert repr(last) == repr(list(whole.events))
     lift = "needle.tip displacement"
     np.testing.assert_array_equal(
         whole.channels[lift].values[-500:], parts[1].channels[lift].values[-500:]
@@ -186,8 +188,8 @@ def test_the_report_of_a_stroke_is_written_again(run, capsys):
 BAD = {
     "duration without unit": (["--duration", "5"], ["--duration", "a unit"]),
     "negative duration": (["--duration=-1 ms"], ["--duration", "above 0 s"]),
-    "endless": (["--duration", "1 min"], ["--duration", "50000000 steps"]),
-    "step too long": (["--step", "1 ms"], ["--step", "10 to 50000000 steps"]),
+    "endless": (["--duration", "1 min"], ["--duration", "2000000 records"]),
+    "step too long": (["--step", "1 ms"], ["--step", "10 to 20000000000 steps"]),
     "unknown variant": (["--variant", "wett"], ["'wett'", "did you mean 'wet'"]),
     "lumped without stiffness": (["--variant", "dry,dry-lumped"], ["lumped: {stiffness: 1e9 N/m}"]),
     "nothing to go on from": (["--continue", "none"], ["none", "result.zarr"]),
