@@ -8,7 +8,9 @@ from klack.case import find_case
 from klack.cli.main import COMMANDS, app, main
 
 
-@pytest.mark.parametrize(("command", "example"), COMMANDS.items(), ids=lambda item: str(item))
+@pytest.mark.parametrize(
+    ("command", "example"), COMMANDS.items(), ids=[command.__name__ for command in COMMANDS]
+)
 def test_the_example_can_be_typed(command, example, capsys):
     name = command.__name__
     assert main([name, "--help"]) == 0
