@@ -75,7 +75,7 @@ def test_a_mesh_in_another_unit_has_the_same_nodes(mesh, unit, tmp_path):
 
     assert np.array_equal(other.node_numbers, same.node_numbers)
     # three roundings: of the division, of the text, of the product
-    np.testing.assert_allclose(other.mesh.points, same.mesh.points, rtol=4e-16, atol=0.0)
+    np.testing.assert_allclose(other.mesh.points, same.mesh.points, rtol=1e-15, atol=0.0)
     for a, b in zip(other.mesh.blocks, same.mesh.blocks, strict=True):
         assert np.array_equal(a.connectivity, b.connectivity)
 

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -115,19 +116,23 @@ def test_report_is_written_again_from_the_store(asked, quick_report, capsys):
     assert "Report in r: report.html, report.pdf" in capsys.readouterr().out
 
 
-def test_ctrl_c_while_writing_leaves_the_former_result(asked, quick_report, monkeypatch, capsys):
+def test_ctrl_c_while_the_report_is_written_keeps_the_result(
+    asked, quick_report, monkeypatch, capsys
+):
     assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 0
-    before = {p: p.stat().st_mtime_ns for p in Path("r").rglob("*")}
+    before = load_study(Path("r")).created
 
     def interrupted(study, path):
         path.write_text("half")
         raise KeyboardInterrupt
 
     monkeypatch.setattr("klack.report.html.write_report", interrupted)
+    asked.study = replace(asked.study, created="later")
     assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 130
 
-    assert {p: p.stat().st_mtime_ns for p in Path("r").rglob("*")} == before
-    assert "stopped" in capsys.readouterr().err
+    assert names(Path("r")) == ["result.zarr"]  # and no report of the run before
+    assert load_study(Path("r")).created == "later" != before
+    assert "stopped; the result is in r; klack report r" in capsys.readouterr().err
 
 
 def test_a_bug_in_a_report_does_not_cost_the_calculation(asked, quick_report, monkeypatch, capsys):

@@ -25,7 +25,8 @@ class DeckNumbers:
         def si(text: str | None, kind: Kind, option: str) -> float | None:
             return None if text is None else parse_quantity(text, kind, option)
 
-        bed = Kind("a pressure per length", "Pa/m", "1e9 MPa/mm", ("MPa/mm", "N/mm^3", "Pa/m"))
+        units = ("MPa/mm", "N/mm^3", "Pa/m")
+        bed = Kind("a pressure per length", "Pa/m", "1e9 MPa/mm", units, largest=1e24)
         self.step = si(step, TIME, "--step")
         self.duration = si(duration, TIME, "--duration")
         self.penalty = si(penalty, bed, "--penalty")
