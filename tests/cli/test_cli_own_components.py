@@ -86,6 +86,7 @@ def test_no_reader_runs_code_that_a_case_names(evil):
     assert not (evil.parent / "it-ran").exists()
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_case_is_no_place_of_modules(evil):
     """Python itself would put the present folder in front of all modules."""
     (evil.parent / "numpy.py").write_text(EVIL)

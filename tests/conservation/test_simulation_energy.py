@@ -105,6 +105,7 @@ def test_clipped_damping_work_is_booked():
     assert abs(history.ledger.residual) < 1e-11
 
 
+@pytest.mark.slow
 def test_two_contacts_at_once_conserve_energy_and_momentum():
     """A needle between two free rods, both contacts closed together much of the time."""
     low, high = seat(name="low", support="free"), seat(name="high", support="free")

@@ -145,6 +145,7 @@ def test_a_run_cannot_go_on_from_a_stored_state(spring_damper_fmu: Build):
         simulate_network(rows_of(part), state=first.state, **options)
 
 
+@pytest.mark.slow
 def test_instances_and_folders_are_given_back(spring_damper_fmu: Build):
     import gc
     from tempfile import gettempdir

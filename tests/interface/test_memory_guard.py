@@ -350,6 +350,7 @@ def test_a_real_limit_is_seen_before_the_factor_is_computed(tmp_path):
     assert "limit of this process" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_AS")
 def test_klack_impact_refuses_and_leaves_nothing(tmp_path):
     text = find_case("demo-valve-axisymmetric").read_text()

@@ -25,7 +25,10 @@ from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, Retu
 from klack.verification.interface_motion import interface_motion
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
+]
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 STEP = 20e-9  # [s]

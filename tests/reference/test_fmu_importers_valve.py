@@ -22,7 +22,10 @@ from klack.workflow.valve import build_valve
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
+]
 
 OPENING = ("contact_force_opening", "peak_contact_force_opening")
 FORCE, DURATION = 20.0, 3e-4  # [N] opening, on the spring face; one impact on the opening stop
