@@ -842,7 +842,8 @@ def run_network(
                     interface_e[c] = e1[c]
                     interface_force[c] = fi[c]
                     interface_contact_loss[c] += lost_contact[c]
-                    interface_film_loss[c] += lost_film[c]
+                    # over the way that the bodies went, not the one that the film saw
+                    interface_film_loss[c] += lost_film[c] + f_film[c] * (gap1[c] - gap)
                     interface_film_before[c] = 0.0
                     if f_contact[c] > 0.0:
                         if not was_closed:
