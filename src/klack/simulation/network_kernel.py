@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import call, first, pointer, shift
+from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.kernel import SEPARATED
@@ -841,9 +842,20 @@ def run_network(
                 if acted or was_closed:
                     interface_e[c] = e1[c]
                     interface_force[c] = fi[c]
+                    # over the way that the bodies went, not the one that film and dashpot saw
+                    ahead = gap - gap1[c]
+                    if interface_chi[c] != 0.0 and ahead != 0.0:
+                        elastic, _, _ = mean_force(
+                            interface_kind[c],
+                            interface_law,
+                            interface_law0[c],
+                            -(gap1[c] + e1[c]),
+                            -(gap + e1[c]),
+                            interface_hint[c],
+                        )
+                        lost_contact[c] += (elastic - f_contact[c]) * ahead
                     interface_contact_loss[c] += lost_contact[c]
-                    # over the way that the bodies went, not the one that the film saw
-                    interface_film_loss[c] += lost_film[c] + f_film[c] * (gap1[c] - gap)
+                    interface_film_loss[c] += lost_film[c] - f_film[c] * ahead
                     interface_film_before[c] = 0.0
                     if f_contact[c] > 0.0:
                         if not was_closed:
