@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from klack.case.valve_reader import read_valve_case
+from klack.errors import AccuracyWarning
+from klack.simulation.network_result import IncompleteRunError
 
 ROOT = Path(__file__).parents[2]
 DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
@@ -40,6 +42,17 @@ def test_what_is_left_of_the_sweeps_is_counted(seed):
     case = read_valve_case(DRAWS["draw"](seed), Path(f"draw{seed}.yaml"))
 
     assert max(DRAWS["residuals"](case).values()) <= 1e-10
+
+
+def test_a_magnet_that_pulls_through_its_stop_ends_the_run_with_gap_and_time():
+    """It pulls harder the deeper it presses: no equation fails before the range is named."""
+    case = read_valve_case(DRAWS["draw"](744), Path("draw744.yaml"))
+
+    with (
+        pytest.warns(AccuracyWarning, match="'coil': at 116.2 us the gap leaves the range"),
+        pytest.raises(IncompleteRunError, match=r"coil: the gap is -14.* um at 118.* us, far out"),
+    ):
+        DRAWS["residuals"](case)
 
 
 BALANCED = """
