@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from klack.case.valve_reader import read_valve_case
+from klack.errors import AccuracyWarning
+from klack.simulation.network_result import IncompleteRunError
 
 ROOT = Path(__file__).parents[2]
 DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
@@ -16,6 +18,10 @@ DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
 # 4, 16: plain ones; 58, 156, 227: no drop at a wide feed when the supply steps; 159: a needle
 # pressed on its seat with far more than what moves it
 SAMPLE = (*range(14), 58, 156, 159, 227)
+
+# 300, 1076: a preloaded needle that ends between two steps; 262, 726: a film that pulls; 195: a
+# dashpot that has let go of its stop, which is still compressed
+UNSEEN = (195, 262, 300, 726, 1076)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -27,6 +33,26 @@ def test_a_random_valve_runs_and_keeps_its_energy(seed):
 
     assert set(residuals) == set(case.run.variants)
     assert max(residuals.values()) <= 1e-9
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", UNSEEN)
+def test_what_is_left_of_the_sweeps_is_counted(seed):
+    """What the sweeps leave is 5e-5 of the way, times the whole force: above 1e-9 uncounted."""
+    case = read_valve_case(DRAWS["draw"](seed), Path(f"draw{seed}.yaml"))
+
+    assert max(DRAWS["residuals"](case).values()) <= 1e-10
+
+
+def test_a_magnet_that_pulls_through_its_stop_ends_the_run_with_gap_and_time():
+    """It pulls harder the deeper it presses: no equation fails before the range is named."""
+    case = read_valve_case(DRAWS["draw"](744), Path("draw744.yaml"))
+
+    with (
+        pytest.warns(AccuracyWarning, match="'coil': at 116.2 us the gap leaves the range"),
+        pytest.raises(IncompleteRunError, match=r"coil: the gap is -14.* um at 118.* us, far out"),
+    ):
+        DRAWS["residuals"](case)
 
 
 BALANCED = """

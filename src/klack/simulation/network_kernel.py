@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import call, first, pointer, shift
+from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.kernel import SEPARATED
@@ -93,13 +94,6 @@ def _copy_state(source: Vector, target: Vector, start: Index, count: Index) -> N
         for i in range(count[k]):
             target[s + i] = source[s + i]
             target[s + ROW + i] = source[s + ROW + i]
-
-
-@njit(cache=True)
-def _stop(W: Vector, start: Index, count: Index) -> None:
-    for k in range(count.size):
-        s = start[k] + ROW
-        W[s : s + count[k]] = 0.0
 
 
 @njit(cache=True)
@@ -273,7 +267,6 @@ def run_network(
     M: int,
     h: float,
     allow_coarse: bool,
-    settle: bool,
     bodies: Bodies,
     elements: StepRows,
     branches: StepRows,
@@ -292,8 +285,7 @@ def run_network(
 
     ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
     ``record0`` is the first record to fill; ``report`` gets the row of a failure, its status and
-    its time.  With ``settle`` the velocities are taken out after every step and nothing but the
-    bodies moves: the static start.
+    its time.
     """
     S = first(bodies.at)
     ports = bodies.first.size - 1
@@ -446,9 +438,7 @@ def run_network(
 
     for _macro in range(macros):
         level = 0
-        if settle:
-            level = 1
-        elif allow_coarse:
+        if allow_coarse:
             level = 1
             Hc = M * h
             for c in range(count_interfaces):
@@ -467,12 +457,12 @@ def run_network(
                     if film > interface_film_small[c] and not creeping:
                         level = 0
         done = 0
-        if level == 1 and not settle:
+        if level == 1:
             _copy_state(body_fine, body_coarse, body_start, body_modes)
         while done < M:
             m = M if level == 1 else 1
             H = m * h
-            t = -H if settle else step * h  # the start knows the forces before it
+            t = step * h
             inverse_H = inverse_h if level == 0 else inverse_h / M
             # 1. modes
             for i in range(width):
@@ -490,7 +480,7 @@ def run_network(
                     shift(S, FREE),
                 )
             # guesses from the past
-            if level == last_level and not settle:
+            if level == last_level:
                 for i in range(width):
                     S[FORCE + i] = 2.0 * S[LAST + i] - S[BEFORE + i]
                     S[BEFORE + i] = S[LAST + i]
@@ -505,7 +495,7 @@ def run_network(
             for i in range(volumes, count_nodes):
                 k = i - volumes
                 p[i] = _table(node_time, node_pressure, node_table0[k], node_table0[k + 1], t + H)
-            if ends > 0 and not settle:
+            if ends > 0:
                 lines_incoming(lines, line_state, m, c_end, Z_end)
             # 2. sweeps
             for sweep in range(_MOST_SWEEPS):
@@ -544,8 +534,6 @@ def run_network(
                         if i < volumes:
                             V_used[i] += node_wall_area[w] * S[USED + node_wall_port[w]]
                     for iteration in range(_MOST_NEWTON):
-                        if settle:
-                            break
                         for i in range(count_nodes):
                             if i < volumes or p[i] != known[i]:
                                 rho[i], slope[i], g[i], node_hint[i] = fluid_at(
@@ -641,42 +629,40 @@ def run_network(
                                 if abs(r[i]) / max(p[i], node_ambient) == worst:
                                     report[0] = i
                             return STATUS_PRESSURES
-                    if not settle:
-                        # the last Newton step, taken with the slopes: mass is conserved exactly
-                        for k in range(count_branches):
-                            a, b = branch_a[k], branch_b[k]
-                            if a < volumes:
-                                mdot[k] += slope_a[k] * r[a]
-                            if b < volumes:
-                                mdot[k] += slope_b[k] * r[b]
-                            if branch_books[k] > 0:
-                                # what it stores has to follow from the pressures that do the work
-                                i0, o0 = branch_input0[k], branch_output0[k]
-                                branch_inputs[i0 + 2] = p[a]
-                                branch_inputs[i0 + 3] = p[b]
-                                status = call(
-                                    branch_function[k],
-                                    shift(branch_parameters, branch_parameter0[k]),
-                                    shift(branch_state, branch_state0[k]),
-                                    shift(branch_inputs, i0),
-                                    shift(branch_outputs, o0),
-                                )
-                                if status != 0:
-                                    report[0], report[1], report[2] = k, status, t
-                                    return STATUS_BRANCH
-                                mdot[k] = branch_outputs[o0]
-                        for i in range(volumes):
-                            V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
+                    # the last Newton step, taken with the slopes: mass is conserved exactly
+                    for k in range(count_branches):
+                        a, b = branch_a[k], branch_b[k]
+                        if a < volumes:
+                            mdot[k] += slope_a[k] * r[a]
+                        if b < volumes:
+                            mdot[k] += slope_b[k] * r[b]
+                        if branch_books[k] > 0:
+                            # what it stores has to follow from the pressures that do the work
+                            i0, o0 = branch_input0[k], branch_output0[k]
+                            branch_inputs[i0 + 2] = p[a]
+                            branch_inputs[i0 + 3] = p[b]
+                            status = call(
+                                branch_function[k],
+                                shift(branch_parameters, branch_parameter0[k]),
+                                shift(branch_state, branch_state0[k]),
+                                shift(branch_inputs, i0),
+                                shift(branch_outputs, o0),
+                            )
+                            if status != 0:
+                                report[0], report[1], report[2] = k, status, t
+                                return STATUS_BRANCH
+                            mdot[k] = branch_outputs[o0]
+                    for i in range(volumes):
+                        V[i] = V_used[i] + node_gamma[level * gammas + i] * (p[i] - p_used[i])
                     for w in range(nodes.wall_node.size):
                         S[FORCE + node_wall_port[w]] += node_wall_area[w] * (
                             p[node_wall_node[w]] - node_ambient
                         )
-                    if not settle:
-                        for k in range(count_branches):
-                            o0 = branch_output0[k] + 3
-                            q0, q1 = branch_port0[k], branch_port0[k + 1]
-                            for j in range(q0, q1):
-                                S[FORCE + branch_ports[j]] += branch_outputs[o0 + j - q0]
+                    for k in range(count_branches):
+                        o0 = branch_output0[k] + 3
+                        q0, q1 = branch_port0[k], branch_port0[k + 1]
+                        for j in range(q0, q1):
+                            S[FORCE + branch_ports[j]] += branch_outputs[o0 + j - q0]
                 for i in range(ports):
                     S[ELEMENTS + i] = S[FORCE + i]
                 # interfaces
@@ -750,14 +736,14 @@ def run_network(
                     )
                 if settled:
                     break
-                if level == 1 and sweep >= _COARSE_SWEEPS and not settle:
+                if level == 1 and sweep >= _COARSE_SWEEPS:
                     break
                 if sweep == _MOST_SWEEPS - 1 or (sweep == 0 and not _finite(S, ports)):
                     report[0], report[2] = moved, t
                     return STATUS_FORCES
             S[FORCE + ports] = 0.0  # what pushes the ground moves nothing
             # a coarse step may not meet what it cannot see
-            if level == 1 and not settle:
+            if level == 1:
                 fits = settled
                 for c in range(count_interfaces):
                     closed = interface_since[c] < np.inf
@@ -775,92 +761,101 @@ def run_network(
                         fi[c] = interface_force[c]
                     continue
             # 3. commit
-            if not settle:
-                for k in range(count_elements):
-                    o0 = element_output0[k]
-                    q0, q1 = element_port0[k], element_port0[k + 1]
+            for k in range(count_elements):
+                o0 = element_output0[k]
+                q0, q1 = element_port0[k], element_port0[k + 1]
+                for j in range(q0, q1):
+                    sums[j] += H * element_outputs[o0 + j - q0]
+                o0 += q1 - q0
+                for j in range(element_states[k]):
+                    element_state[element_state0[k] + j] = element_outputs[o0 + j]
+                o0 += element_states[k]
+                for j in range(element_books[k]):
+                    book = element_book0[k] + j
+                    if book_kind[book] == STORE:
+                        books[book] = element_outputs[o0 + j]
+                    else:
+                        books[book] += element_outputs[o0 + j]
+            if count_nodes > 0:
+                for i in range(count_nodes):
+                    inflow[i] = 0.0
+                for i in range(volumes):
+                    # r is the last Newton step: g to second order in it
+                    g[i] += r[i] / rho[i] * (1.0 - 0.5 * r[i] * slope[i] / rho[i])
+                for k in range(count_branches):
+                    a, b = branch_a[k], branch_b[k]
+                    inflow[a] -= H * mdot[k]
+                    inflow[b] += H * mdot[k]
+                    sums[element_forces + k] += H * mdot[k]
+                    o0 = branch_output0[k] + 3
+                    q0, q1 = branch_port0[k], branch_port0[k + 1]
+                    power = (g[a] - g[b]) * mdot[k] * H
                     for j in range(q0, q1):
-                        sums[j] += H * element_outputs[o0 + j - q0]
+                        port = branch_ports[j]
+                        power -= branch_outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
                     o0 += q1 - q0
-                    for j in range(element_states[k]):
-                        element_state[element_state0[k] + j] = element_outputs[o0 + j]
-                    o0 += element_states[k]
-                    for j in range(element_books[k]):
-                        book = element_book0[k] + j
+                    for j in range(branch_states[k]):
+                        branch_state[branch_state0[k] + j] = branch_outputs[o0 + j]
+                    o0 += branch_states[k]
+                    for j in range(branch_books[k]):
+                        book = branch_book0[k] + j
+                        value = branch_outputs[o0 + j]
                         if book_kind[book] == STORE:
-                            books[book] = element_outputs[o0 + j]
-                        else:
-                            books[book] += element_outputs[o0 + j]
-                if count_nodes > 0:
-                    for i in range(count_nodes):
-                        inflow[i] = 0.0
-                    for i in range(volumes):
-                        # r is the last Newton step: g to second order in it
-                        g[i] += r[i] / rho[i] * (1.0 - 0.5 * r[i] * slope[i] / rho[i])
-                    for k in range(count_branches):
-                        a, b = branch_a[k], branch_b[k]
-                        inflow[a] -= H * mdot[k]
-                        inflow[b] += H * mdot[k]
-                        sums[element_forces + k] += H * mdot[k]
-                        o0 = branch_output0[k] + 3
-                        q0, q1 = branch_port0[k], branch_port0[k + 1]
-                        power = (g[a] - g[b]) * mdot[k] * H
-                        for j in range(q0, q1):
-                            port = branch_ports[j]
-                            power -= branch_outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
-                        o0 += q1 - q0
-                        for j in range(branch_states[k]):
-                            branch_state[branch_state0[k] + j] = branch_outputs[o0 + j]
-                        o0 += branch_states[k]
-                        for j in range(branch_books[k]):
-                            book = branch_book0[k] + j
-                            value = branch_outputs[o0 + j]
-                            if book_kind[book] == STORE:
-                                power -= value - books[book]
-                                books[book] = value
-                        if branch_supply[k] >= 0:
-                            books[branch_supply[k]] -= power
-                        else:
-                            books[branch_loss[k]] += power
-                    for e in range(ends):
-                        i = node_end_node[e]
-                        # the pressures of the last Newton step belong to these flows
-                        q = q_end[e]
-                        if i < volumes:
-                            q += node_density / rho[i] / Z_end[e] * r[i]
-                        q_end[e] = q
-                        inflow[i] -= H * node_density * q
-                    if ends > 0:
-                        lines_commit(lines, line_state, m, q_end, line_books)
-                    for i in range(volumes):
-                        mass = node_mass[i] + inflow[i]
-                        excess = p[i] - node_ambient
-                        stored = mass * g[i] - excess * V[i]
-                        was = node_mass[i] * node_g[i]
-                        was -= (node_p[i] - node_ambient) * node_held[i]
-                        work = excess * (V[i] - node_held[i])
-                        node_numeric[i] += was - stored + g[i] * inflow[i] - work
-                        node_mass[i] = mass
-                        node_held[i] = V[i]
-                    for i in range(volumes, count_nodes):
-                        node_supply[i - volumes] -= g[i] * inflow[i]
-                    for i in range(count_nodes):
-                        node_before[i] = node_p[i]
-                        node_p[i] = p[i]
-                        node_g[i] = g[i]
+                            power -= value - books[book]
+                            books[book] = value
+                    if branch_supply[k] >= 0:
+                        books[branch_supply[k]] -= power
+                    else:
+                        books[branch_loss[k]] += power
+                for e in range(ends):
+                    i = node_end_node[e]
+                    # the pressures of the last Newton step belong to these flows
+                    q = q_end[e]
+                    if i < volumes:
+                        q += node_density / rho[i] / Z_end[e] * r[i]
+                    q_end[e] = q
+                    inflow[i] -= H * node_density * q
+                if ends > 0:
+                    lines_commit(lines, line_state, m, q_end, line_books)
+                for i in range(volumes):
+                    mass = node_mass[i] + inflow[i]
+                    excess = p[i] - node_ambient
+                    stored = mass * g[i] - excess * V[i]
+                    was = node_mass[i] * node_g[i]
+                    was -= (node_p[i] - node_ambient) * node_held[i]
+                    work = excess * (V[i] - node_held[i])
+                    node_numeric[i] += was - stored + g[i] * inflow[i] - work
+                    node_mass[i] = mass
+                    node_held[i] = V[i]
+                for i in range(volumes, count_nodes):
+                    node_supply[i - volumes] -= g[i] * inflow[i]
+                for i in range(count_nodes):
+                    node_before[i] = node_p[i]
+                    node_p[i] = p[i]
+                    node_g[i] = g[i]
             for c in range(count_interfaces):
                 gap = interface_gap0[c] + S[Y1 + interface_upper[c]] - S[Y1 + interface_lower[c]]
                 interface_rate[c] = (gap - interface_gap[c]) * inverse_H
                 interface_gap[c] = gap
                 was_closed = interface_since[c] < np.inf
                 acted = f_contact[c] != 0.0 or f_film[c] != 0.0 or lost_contact[c] != 0.0
-                if settle or acted or was_closed:
+                if acted or was_closed:
                     interface_e[c] = e1[c]
                     interface_force[c] = fi[c]
-                    if settle:
-                        continue
+                    # over the way that the bodies went, not the one that film and dashpot saw
+                    ahead = gap - gap1[c]
+                    if interface_chi[c] != 0.0 and ahead != 0.0:
+                        elastic, _, _ = mean_force(
+                            interface_kind[c],
+                            interface_law,
+                            interface_law0[c],
+                            -(gap1[c] + e1[c]),
+                            -(gap + e1[c]),
+                            interface_hint[c],
+                        )
+                        lost_contact[c] += (elastic - f_contact[c]) * ahead
                     interface_contact_loss[c] += lost_contact[c]
-                    interface_film_loss[c] += lost_film[c]
+                    interface_film_loss[c] += lost_film[c] - f_film[c] * ahead
                     interface_film_before[c] = 0.0
                     if f_contact[c] > 0.0:
                         if not was_closed:
@@ -913,9 +908,6 @@ def run_network(
             )
         for i in range(width):
             S[PENDING + i] = 0.0
-        if settle:
-            _stop(body_coarse, body_start, body_modes)
-            continue
         if level == 1:
             _copy_state(body_coarse, body_fine, body_start, body_modes)
         in_record += 1

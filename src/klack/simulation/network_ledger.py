@@ -3,10 +3,19 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
-from klack.simulation.network_arrays import PORTS, STORE, SUPPLY, WORK
+from klack.simulation.network_arrays import (
+    ELEMENTS_BEFORE,
+    PORTS,
+    SEEN,
+    STORE,
+    SUPPLY,
+    WORK,
+    Y0,
+)
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
 
@@ -14,21 +23,40 @@ __all__ = ["energy_books", "energy_stores", "reset_books"]
 
 
 def reset_books(network: CompiledNetwork) -> None:
-    """Begin new books: all supplies, losses and works are zero."""
+    """Begin new books: all supplies and losses are zero, works what elements have still to see."""
     nodes, interfaces = network.nodes, network.interfaces
     work = network.bodies.at[WORK : WORK + PORTS]
     accounts = (network.books, network.line_books, work, nodes.numeric)
     for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
         account[:] = 0.0
+    work[:] = _unseen_work(network)
+
+
+def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
+    """Work [J] of the last forces, port by port, that elements and fluid see in the next step.
+
+    They live on the displacements of the last sweep, short of those of the bodies by what was left
+    of its change.  The differences of the forces times it cancel or are small; at the ends of a run
+    the whole force counts, and of a preloaded needle that is far more than what moves it.
+    """
+    at = network.bodies.at
+    force, end, seen = (at[row : row + PORTS] for row in (ELEMENTS_BEFORE, Y0, SEEN))
+    return np.asarray(force * (end - seen), dtype=float)
 
 
 def energy_stores(network: CompiledNetwork) -> dict[str, float]:
-    """Energy [J] that each part holds now, by name."""
+    """Energy [J] that each part holds now, by name.
+
+    Of a body without the work that elements have still to see.
+    """
     rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
     stores = {}
+    unseen, place = _unseen_work(network), 0
     for b, row in enumerate(rows.bodies):
         kinetic, strain = body_energy(row.body, *modal_state(network, b))
-        stores[f"{row.component} {BODY_STORE}"] = kinetic + strain
+        ahead = float(unseen[place : place + len(row.ports)].sum())
+        place += len(row.ports)
+        stores[f"{row.component} {BODY_STORE}"] = kinetic + strain - ahead
     for i, kind in enumerate(network.book_kind):
         if kind == STORE:
             stores[network.book_names[i]] = float(network.books[i])
@@ -78,9 +106,10 @@ def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Energ
     for k, line in enumerate(rows.lines):
         for j, what in enumerate(LINE_LOSSES):
             losses[f"{line.component} {what}"] = float(network.line_books[k, j])
+    works = network.bodies.at[WORK : WORK + PORTS] - _unseen_work(network)
     place = 0
     for row in rows.bodies:
-        work = float(network.bodies.at[WORK + place : WORK + place + len(row.ports)].sum())
+        work = float(works[place : place + len(row.ports)].sum())
         place += len(row.ports)
         if np.any(row.body.damping > 0.0):
             name = f"{row.component} {BODY_STORE}"

@@ -363,7 +363,6 @@ def _advance(
         block,
         step,
         allow_coarse,
-        False,
         network.bodies,
         network.elements,
         network.branches,
