@@ -31,7 +31,7 @@ from klack.report.wording import (
     which_contact,
 )
 from klack.workflow.study import BodySummary, ImpactStudy, LevelResult
-from klack.workflow.summary import no_estimate
+from klack.workflow.summary import no_estimate, restitution_text
 
 __all__ = [
     "Content",
@@ -264,7 +264,7 @@ _KEY_NUMBERS: tuple[
     ),
     (
         "restitution",
-        lambda r: f"{r.measures.restitution:.4f}" if np.isfinite(r.measures.restitution) else "–",
+        lambda r: restitution_text(r.measures),
         ("restitution", lambda value: signed(value, 4)),
     ),
     ("speed at first touch", lambda r: quantity(r.measures.approach_speed, "m/s"), None),

@@ -1,6 +1,7 @@
 """A stored impact beside that of another program: the numbers of both, and how far apart."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 from klack.acoustics.comparison import compare_histories
 from klack.contact.history import EnergyLedger, ImpactHistory
@@ -8,6 +9,7 @@ from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
 from klack.workflow.json_results import CalculixJson, ProgramJson
 from klack.workflow.study import ImpactStudy, LevelResult
+from klack.workflow.summary import restitution_text
 
 __all__ = [
     "COMPARISON_COLUMNS",
@@ -174,7 +176,7 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
             f"{100 * deviation.peak_force:+.2f} %",
             f"{100 * deviation.contact_time:+.2f} %",
             f"{100 * deviation.impulse:+.3f} %",
-            f"{deviation.restitution:+.4f}",
+            f"{deviation.restitution:+.4f}" if isfinite(deviation.restitution) else "–",
             "",
             "",
             "" if ratio is None else f"1/{ratio:.3g}",
@@ -195,7 +197,7 @@ def _row(
         f"{measures.peak_force:.3f}",
         f"{1e6 * measures.contact_time:.3f}",
         f"{1e3 * measures.impulse:.4f}",
-        f"{measures.restitution:.4f}",
+        restitution_text(measures),
         "" if balance is None else f"{balance:+.1e}",
         f"{steps}",
         "" if wall_time is None else f"{wall_time:.3g}",

@@ -1,5 +1,7 @@
 """The few numbers of a study that a script or a terminal wants."""
 
+from math import isfinite
+
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.workflow.json_results import DeviationJson, ImpactJson, LevelJson
 from klack.workflow.study import ImpactStudy, LevelResult
@@ -9,6 +11,7 @@ __all__ = [
     "answer_line",
     "estimate_lines",
     "no_estimate",
+    "restitution_text",
     "study_to_json",
     "summary_rows",
 ]
@@ -119,13 +122,18 @@ def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
             _peak(result.measures, result.measures.peak_force),
             _first(result.measures, 1e6 * result.measures.contact_time),
             f"{1e3 * result.measures.impulse:.4f}{_cut(result.measures)}",
-            f"{result.measures.restitution:.4f}",
+            restitution_text(result.measures),
             f"{result.energy_residual:.1e}",
             f"{result.degrees_of_freedom}",
             f"{result.wall_time:.3g}",
         )
         for name, result in study.levels.items()
     )
+
+
+def restitution_text(measures: ImpactMeasures) -> str:
+    """Restitution; a dash where the bodies have not parted."""
+    return f"{measures.restitution:.4f}" if isfinite(measures.restitution) else "–"
 
 
 def _peak(measures: ImpactMeasures, value: float, unit: str = "") -> str:
