@@ -313,7 +313,7 @@ _VARIANT_ROWS: tuple[tuple[str, Callable[[StrokeVariant], str]], ...] = (
     ("opening time", lambda v: _moment(v.needle_times.opening.touch)),
     ("closing time", lambda v: _moment(v.needle_times.closing.touch)),
     ("impacts", lambda v: count(len(v.result.events))),
-    ("start", lambda v: start_text(v).removeprefix("start ") or "goes on, or free"),
+    ("start", lambda v: start_text(v).removeprefix("start ") or "continued, or free"),
 )
 
 _RUN_ROWS: tuple[tuple[str, Callable[[StrokeVariant], str]], ...] = (

@@ -166,15 +166,20 @@ def start_text(variant: StrokeVariant) -> str:
     start = variant.result.start
     if start is None:
         return ""
-    places: dict[tuple[str, float], list[str]] = {}
-    for name, y in start.displacement.items():  # points of a rigid body are at one place
-        body, _, port = name.partition(".")
-        places.setdefault((body, y), []).append(port)
-    parts = [f"{body} {format_si(y, 'm', 3)}" for (body, y) in places]
+    places: dict[str, list[float]] = {}
+    for name, y in start.displacement.items():
+        places.setdefault(name.partition(".")[0], []).append(y)
+    parts = [f"{body} {_from_to(ys)}" for body, ys in places.items()]
     for name, p in start.pressure.items():
         parts.append(f"{name} {p / 1e5:.5g} bar" + (" (stated)" if start.stated[name] else ""))
     left = max((abs(force) for force in start.residual.values()), default=0.0)
     return f"start at rest: {', '.join(parts)}; forces balance to {format_si(left, 'N', 1)}"
+
+
+def _from_to(displacements: list[float]) -> str:
+    """Where the points of a body are: one displacement if it is rigid."""
+    ends = dict.fromkeys((min(displacements), max(displacements)))
+    return " to ".join(format_si(y, "m", 3) for y in ends)
 
 
 def real_time_factor(variant: StrokeVariant) -> float:
