@@ -121,7 +121,7 @@ class ImpactFinder:
     def events(self) -> tuple[ImpactEvent, ...]:
         """All impacts so far, in order of time, each as far as it is known.
 
-        One that is not over yet is reported again, whole, by a finder that goes on from
+        One that is not over yet is reported again, whole, by a finder that resumes from
         :attr:`state`; it has the same stop and the same time.
         """
         out = np.empty((2, len(_EVENT)))
