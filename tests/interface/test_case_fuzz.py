@@ -88,6 +88,17 @@ def test_mutated_cases(batch: int, tmp_path: Path):
         outcome(lambda path=path: load_any_case(path))
 
 
+@pytest.mark.parametrize("name", ["a" * 5_000, "b/" * 3_000, "case.yaml/x"])
+def test_a_file_name_that_the_system_refuses_is_one_error(name: str):
+    """Truth = the key of the case in the message, whatever the system says about the name."""
+    path = shipped_cases()["needle-from-inp"]
+    tree = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    place = next(place for place in leaves(tree) if place[-1] == "file")
+    with pytest.raises(InputError, match=r"file: got '[^\n]*file that") as caught:
+        read_any_case(changed(tree, place, name), path.with_name("case.yaml"))
+    assert len(str(caught.value)) < 1500
+
+
 HOSTILE = {
     "laughs": "a: &a [x, x, x, x, x, x, x, x, x]\n"
     + "".join(f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n" for a, b in pairwise("abcdefghi")),

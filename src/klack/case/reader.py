@@ -22,6 +22,7 @@ from klack.case.field_example import fitting_example
 from klack.case.schema import Case
 from klack.case.yaml_limits import UnboundedTree, bounded_yaml
 from klack.errors import InputError
+from klack.input.existing_file import instead_of_file
 from klack.input.problem import CaseProblem, Key, key_text, nearest
 from klack.units import QuantityError
 
@@ -130,8 +131,7 @@ def schema_of(kind: type[CaseFile]) -> dict[str, Any]:
 def text_of(path: Path) -> str:
     """Text of a case file, of reasonable size and in UTF-8."""
     hint = "klack impact demo-valve runs a shipped case; its file is a good start."
-    if not path.is_file():
-        got = "a folder" if path.is_dir() else "a file that does not exist"
+    if got := instead_of_file(path):
         raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint)
     try:
         with path.open("rb") as file:

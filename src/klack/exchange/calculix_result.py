@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import InputError
 from klack.exchange.calculix_deck import LOWER, UPPER
+from klack.input.existing_file import instead_of_file
 from klack.workflow.compare import OtherRun
 
 __all__ = ["CalculixResult", "other_run", "read_calculix"]
@@ -160,8 +161,7 @@ def read_calculix(path: Path) -> CalculixResult:
 
 
 def _require_file(path: Path) -> None:
-    if not path.is_file():
-        got = "a folder" if path.is_dir() else "a file that does not exist"
+    if got := instead_of_file(path):
         raise _refuse(path, got, "the .dat file of a run of CalculiX")
     size = path.stat().st_size
     if size > _LARGEST:

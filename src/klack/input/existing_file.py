@@ -1,5 +1,6 @@
 """The name of a file in a case, looked for relative to the folder of the case."""
 
+import stat
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,8 +9,9 @@ from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
 
-__all__ = ["InputPath", "refuse_lfs_pointer"]
+__all__ = ["InputPath", "instead_of_file", "refuse_lfs_pointer"]
 
+_LONGEST = 300  # characters of a name that a message repeats
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
@@ -32,6 +34,22 @@ def refuse_lfs_pointer(path: Path) -> None:
         )
 
 
+def instead_of_file(path: Path) -> str:
+    """What stands where a file should be, in words; empty for a file.
+
+    A name may also be too long for the system, or lie in a folder that is closed to this user.
+    """
+    try:
+        if stat.S_ISREG(path.stat().st_mode):
+            return ""
+        return "a folder" if path.is_dir() else "no plain file"
+    except (FileNotFoundError, NotADirectoryError):
+        return "a file that does not exist"
+    except (OSError, ValueError) as error:  # a null character in the name
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        return f"a file that cannot be reached ({reason})"
+
+
 def _existing_file(value: Any, info: ValidationInfo) -> Path:
     """Resolve a path relative to the folder of the case; it must be a file."""
     if isinstance(value, Path):
@@ -40,17 +58,17 @@ def _existing_file(value: Any, info: ValidationInfo) -> Path:
         got, hint = f"'{value}'", "write the name of a file, relative to the case file."
         raise CaseProblem((), got=got, expected="a file name", hint=hint)
     folder = info.context.get("folder", Path()) if info.context else Path()
+    name = value if len(value) <= _LONGEST else f"{value[:_LONGEST]}..."
     try:
         path = (folder / Path(value).expanduser()).resolve()
     except (OSError, RuntimeError) as error:  # the present folder is gone; links in a circle
         hint = "write the whole path of the file."
-        got = f"'{value}', which leads nowhere ({error})"
+        got = f"'{name}', which leads nowhere ({error})"
         raise CaseProblem((), got=got, expected="an existing file", hint=hint) from None
-    if not path.is_file():
-        kind = "a folder" if path.is_dir() else "a file that does not exist"
+    if kind := instead_of_file(path):
         raise CaseProblem(
             (),
-            got=f"'{value}', {kind} ({path})",
+            got=f"'{name}', {kind}" + (f" ({path})" if name == value else ""),
             expected="an existing file, relative to the folder of the case",
             hint="check the spelling and the folder.",
         )
