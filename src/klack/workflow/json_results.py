@@ -76,6 +76,10 @@ class ImpactJson(TypedDict):
 
     schema: Literal["klack-impact/1"]
     case: str
+    complete: Annotated[bool, Field(description="False: a level failed.")]
+    failures: Annotated[
+        dict[str, str], Field(description="Why a level has no numbers, by its name.")
+    ]
     answer: Annotated[str, Field(description="Name of the best level.")]
     levels: Annotated[dict[str, LevelJson], Field(description="By the name of the level.")]
     deviation: Annotated[

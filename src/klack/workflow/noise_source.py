@@ -18,6 +18,7 @@ from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.workflow.impact import run_impact
+from klack.workflow.incomplete import failure_notes
 from klack.workflow.noise_force import (
     before_impact,
     impact_force,
@@ -169,10 +170,11 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
     """
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
+    notes = tuple(f"The impact is incomplete: {note}" for note in failure_notes(study.failures))
     noise, given, materials = _noise_section(study.case_text)
     found = []
     for name in wanted:
-        _require("level", name, study.levels)
+        _require("level", name, study.levels, study.why_missing(name))
         result = study.levels[name]
         touched = bool(np.any(result.history.force > 0.0))
         force = impact_force(result.history)
@@ -197,6 +199,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
                 noise=noise,
                 given=given,
                 materials=materials,
+                notes=notes,
             )
         )
     return tuple(found)
@@ -341,7 +344,7 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
         )
 
 
-def _require(what: str, name: str, held: Mapping[str, object]) -> None:
+def _require(what: str, name: str, held: Mapping[str, object], why: str = "") -> None:
     if name in held:
         return
     hint = nearest(name, held, f"run the case with --{what} {name} first.")
@@ -351,7 +354,7 @@ def _require(what: str, name: str, held: Mapping[str, object]) -> None:
         hint = f"strokes have variants, levels are of impacts: --variant {next(iter(held))}."
     raise InputError(
         what,
-        got=f"'{name}', which the result does not hold",
+        got=f"'{name}', which the result does not hold{why}",
         expected=f"one of: {one_of(held)}",
         hint=hint,
     )

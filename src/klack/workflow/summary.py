@@ -34,10 +34,11 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
     Returns
     -------
     dict
-        ``case``; ``answer``: the level whose numbers to take; ``levels``: per level the numbers of
-        the impact, with ``doubts`` that make it no reference; ``deviation``: of ``reduced``
-        against the reference, None when there is nothing to compare; ``deviations``: of every level
-        that is not the reference; ``estimated_error``: of every reduced level, by an
+        ``case``; ``complete`` and ``failures``: why levels have no numbers; ``answer``: the level
+        whose numbers to take; ``levels``: per level the numbers of the impact, with ``doubts`` that
+        make it no reference; ``deviation``: of ``reduced`` against the reference, None when there
+        is nothing to compare; ``deviations``: of every level that is not the reference;
+        ``estimated_error``: of every reduced level, by an
         interface-level run, None where that is no reference; ``warnings``.  Numbers that do not
         exist (nan) are None, and so are peak force, contact time and impulse of a run that ends in
         contact (``cut_off``): ``highest_force_N`` is what it had reached.
@@ -46,6 +47,8 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
     return {
         "schema": "klack-impact/1",
         "case": study.case,
+        "complete": not study.failures,
+        "failures": dict(study.failures),
         "answer": study.reference,
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
