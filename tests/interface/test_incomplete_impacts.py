@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from klack.transient import full_order, interface_run
 from klack.workflow.compare import level_of
 from klack.workflow.impact import run_impact
 from klack.workflow.incomplete import IncompleteImpactError
-from klack.workflow.noise_source import load_sources
+from klack.workflow.noise_source import impact_sources, load_sources
 from klack.workflow.store import load_study
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
@@ -116,6 +117,16 @@ def test_noise_and_comparison_of_an_incomplete_result(stored):
         load_sources(stored, ("full",))
     with pytest.raises(InputError, match=why):
         level_of(load_study(stored), "full")
+
+
+def test_noise_says_what_speaks_against_the_contact(stored):
+    study = load_study(stored)
+    contact = replace(study.contact, doubts=("it lies on a sharp edge",))
+
+    (source,) = impact_sources(replace(study, contact=contact))
+
+    said = "The contact ball.tip on block.face cannot be relied on: it lies on a sharp edge."
+    assert source.notes[-1] == said
 
 
 def test_a_level_that_fails_costs_no_later_one(monkeypatch):

@@ -108,14 +108,16 @@ def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr:
     from klack.workflow.summary import (
         SUMMARY_COLUMNS,
         answer_line,
+        contact_doubt,
         estimate_lines,
         summary_rows,
     )
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for line in (answer_line(study), *estimate_lines(study)):
-        print(line, file=stream)
+    for line in (answer_line(study), contact_doubt(study.contact), *estimate_lines(study)):
+        if line:
+            print(line, file=stream)
     print_notes(study.warnings, to_stderr=to_stderr)
     if cached := stages_with_cached(study.stage_times):
         print(f"With cached results (klack cache): {', '.join(cached)}", file=stream)

@@ -318,6 +318,8 @@ def _computed(study: ImpactStudy) -> Section:
                 "element size over half width",
                 f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
             ),
+            ("contact points across", str(contact.points_across or "–")),
+            ("doubts about the contact", "\n".join(contact.doubts) or "–"),
         ]
     facts.append(("local law", law.kind))
     return Section(

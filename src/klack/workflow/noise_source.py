@@ -30,9 +30,10 @@ from klack.workflow.record_store import stored_format
 from klack.workflow.store import IMPACT_FORMAT, load_study
 from klack.workflow.stroke import run_stroke
 from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
-from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.stroke_study import StopSummary, StrokeStudy, StrokeVariant
 from klack.workflow.structures import IMPACT_STOP
-from klack.workflow.study import BodySummary, ImpactStudy
+from klack.workflow.study import BodySummary, ContactSummary, ImpactStudy
+from klack.workflow.summary import contact_doubt
 
 __all__ = [
     "NoiseSource",
@@ -170,7 +171,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
     """
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
-    notes = tuple(f"The impact is incomplete: {note}" for note in failure_notes(study.failures))
+    failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
     noise, given, materials = _noise_section(study.case_text)
     found = []
     for name in wanted:
@@ -199,7 +200,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
                 noise=noise,
                 given=given,
                 materials=materials,
-                notes=notes,
+                notes=(*failed, *_contact_notes([study.contact] if name != "lumped" else ())),
             )
         )
     return tuple(found)
@@ -234,7 +235,10 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 given=given,
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
-                notes=_notes(variant, last),
+                notes=(
+                    *_notes(variant, last),
+                    *_contact_notes(study.stops if variant.flexible else ()),
+                ),
                 own_components=study.own_components,
             )
         )
@@ -330,6 +334,11 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
 
 
 # --------------------------------------------------------------------------- what both share
+
+
+def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[str, ...]:
+    """What speaks against the contacts that the forces come from."""
+    return tuple(filter(None, map(contact_doubt, contacts)))
 
 
 def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
