@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
-"""What a calculation may end with that is no mistake in klack."""
+"""What a calculation may end with that is no internal error."""
 
 LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 """Distributions whose versions belong to a result."""
