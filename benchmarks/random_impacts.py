@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from klack.acoustics.comparison import compare_histories
 from klack.case import read_case
 from klack.case.schema import Case
 from klack.contact.hertz import line_half_width, point_radius
@@ -36,6 +37,7 @@ MATERIALS: Mapping[str, tuple[float, float, float]] = {
 }
 """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
 
+_DEVIATION = ("peak_force", "contact_time", "history_l2")
 _STEPS = (150, 500)  # of the contact time; the usual number is 500
 
 
@@ -255,15 +257,17 @@ def outcome(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def numbers(study: ImpactStudy) -> dict[str, Any]:
     """What a draw is judged by."""
-    deviation = study.deviations["reduced"]
-    estimate = study.estimates["reduced"]
+    # also where both have doubts, and the study gives no deviation
+    histories = (study.levels[name].history for name in ("interface", "reduced"))
+    deviation = compare_histories(*histories)
+    estimate = study.estimates.get("reduced")
     return {
         "peak": {name: level.measures.peak_force for name, level in study.levels.items()},
         "time": {name: level.measures.contact_time for name, level in study.levels.items()},
         "restitution": {n: level.measures.restitution for n, level in study.levels.items()},
         "residual": {name: level.energy_residual for name, level in study.levels.items()},
-        "deviation": [deviation.peak_force, deviation.contact_time, deviation.history_l2],
-        "estimate": [estimate.peak_force, estimate.contact_time, estimate.history_l2],
+        "deviation": [getattr(deviation, name) for name in _DEVIATION],
+        "estimate": estimate and [getattr(estimate, name) for name in _DEVIATION],
         "settled": study.estimates_settled,
         "ratio": study.contact.size_ratio,
         "half_width": study.contact.half_width,

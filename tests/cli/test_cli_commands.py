@@ -216,8 +216,8 @@ def test_several_levels_in_one_option(words, monkeypatch):
         (ConvergenceError("the contact did not settle in 50 rounds"), 1, "50 rounds"),
         (InputError("mesh", got="a", expected="b", hint="c"), 2, "mesh: got a, expected b."),
         (MemoryError(), 2, "memory"),
-        (ZeroDivisionError("bug"), 70, "a mistake of klack itself"),
-        (FileNotFoundError(2, "lost", "x"), 70, "a mistake of klack itself"),
+        (ZeroDivisionError("bug"), 70, "klack impact: internal error"),
+        (FileNotFoundError(2, "lost", "x"), 70, "klack impact: internal error"),
     ],
     ids=lambda value: type(value).__name__,
 )

@@ -14,9 +14,10 @@ import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 SEED = 17
-SAMPLE = (1, 2, 64, 73, 178, 207, 242, 245, 267, 279)
+SAMPLE = (1, 2, 7, 39, 64, 73, 128, 178, 207, 242, 245, 267, 279)
 """Tiny ones: most left 1e-9 to 3e-5 of their energy unpaid before the last step of a contact did;
-279 goes beyond the reach of its static contact, 64 asks for more modes than its contact spares."""
+7, 39 and 128 lost 2e-9 to 2e-8 to a spring that took the start of a step for all of it; 279 goes
+beyond the reach of its static contact, 64 asks for more modes than its contact spares."""
 
 
 @pytest.fixture(scope="module")

@@ -16,10 +16,12 @@ from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
+from klack.workflow.contact_check import check_contact
 from klack.workflow.impact import run_impact
 from klack.workflow.stops import split_law
 from klack.workflow.stroke import run_stroke
 from klack.workflow.stroke_study import StrokeStudy
+from klack.workflow.stroke_summary import stroke_to_json
 from klack.workflow.valve import Valve, build_valve
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
@@ -83,6 +85,16 @@ def test_the_stroke_opens_and_closes(study: StrokeStudy):
         assert 99e-6 < lift.values.max() < 107e-6
     assert study.lift == 1e-4
     assert [stop.kind for stop in study.stops] == ["consistent", "consistent"]
+
+
+def test_stops_keep_what_was_found_about_their_contact(study: StrokeStudy, valve: Valve):
+    said = stroke_to_json(study)["stops"]
+    for stop in study.stops:
+        contact = valve.contacts[stop.name]
+        found = check_contact(valve.case, contact.pair, contact.static, contact.pattern_force, "")
+        assert stop.doubts == found.doubts
+        assert said[stop.name]["doubts"] == list(found.doubts)
+        assert said[stop.name]["points_across"] == stop.points_across == found.points_across > 0
 
 
 def test_a_rigid_needle_rebounds_as_the_case_says(study: StrokeStudy):

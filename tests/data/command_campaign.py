@@ -233,7 +233,7 @@ def faults(code: int | None, said: str, made: Path) -> list[str]:
     found = []
     if code not in (0, 1, 2):
         found.append(f"exit code {code}")
-    if "Traceback (most recent" in said or "mistake of klack" in said:
+    if "Traceback (most recent" in said or "internal error" in said:
         found.append("traceback")
     if re.search(r"\w+Warning: ", said):
         found.append("warning of Python")

@@ -174,17 +174,18 @@ def test_an_end_beside_the_contact_is_not_told():
     assert found.doubts == ()
 
 
-def test_levels_with_contact_points_tell_the_end_as_well():
+@pytest.mark.parametrize("level", ["interface", "full"])
+def test_levels_with_contact_points_tell_the_end_as_well(level):
     asked = case(split(np.pi / 4), CONE, 0.005, extent=0.05)
     problem = build_problem(asked, silent)
-    study = run_impact(asked, levels=("interface",))
+    study = run_impact(asked, levels=(level,))
     unseen = ContactCheck(half_width=1e-5, size_ratio=0.5, points_across=9, expected=1e-5)
 
-    with pytest.warns(AccuracyWarning, match=r"level 'interface': .*add 'needle\.flank'"):
+    with pytest.warns(AccuracyWarning, match=rf"level '{level}': .*add 'needle\.flank'"):
         seen = ends_reached(unseen, problem.pair, problem.space, study.levels, "tip on seat")
 
     assert seen.doubts == ("it runs over the end of a named surface",)
-    blind = {"interface": replace(study.levels["interface"], pressure=None)}
+    blind = {level: replace(study.levels[level], pressure=None)}
     assert ends_reached(unseen, problem.pair, problem.space, blind, "") is unseen
     assert any("add 'needle.flank'" in note for note in study.warnings)
     assert set(seen.doubts) <= set(study.contact.doubts)

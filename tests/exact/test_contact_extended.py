@@ -1,11 +1,27 @@
-"""Compliance of more points than were solved for; truth = all of them solved for at once."""
+"""More contact points than were prepared; truth = all of them prepared at once."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from klack.contact.statics import contact_compliance, extended_compliance, static_contact
+from klack.case import load_case
+from klack.contact.history import ImpactHistory
+from klack.contact.mortar import ContactSpace
+from klack.contact.statics import (
+    ReachError,
+    contact_compliance,
+    extended_compliance,
+    static_contact,
+)
 from klack.elasticity.statics import Flexibility
 from klack.verification.indentation import half_spaces, parabola
+from klack.workflow.levels import kept_modes, mode_pools, run_full
+from klack.workflow.problem import build_problem
+from klack.workflow.progress import silent
+
+BALL = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 
 
 def test_new_points_join_the_known_ones():
@@ -22,3 +38,26 @@ def test_new_points_join_the_known_ones():
     assert 0 < known.space.count < problem.space.count - 1
     # round-off of the triangular solves
     assert extended == pytest.approx(whole, rel=1e-10, abs=1e-12 * np.abs(whole).max())
+
+
+def test_the_full_order_goes_on_to_as_many_points_as_it_reaches():
+    """As the interface level does: the static contact bounds one quasi-static impact only."""
+    problem = build_problem(load_case(BALL), silent)
+    pools = mode_pools(problem, at_least=1, progress=silent)
+    kept = kept_modes(problem, pools)
+    problem.close()
+    near = problem.space.gap < np.sort(problem.space.gap)[3]
+    narrow = replace(problem.space.restricted(near), reach=problem.space.reach / 3.0)
+
+    def run(space: ContactSpace, **contact: float) -> ImpactHistory:
+        changed = problem.case.contact.model_copy(update=contact)
+        asked = problem.case.model_copy(update={"contact": changed})
+        given = replace(problem, space=space, case=asked)
+        return run_full(given, pools, kept=kept, progress=silent, threads=1)[0].history
+
+    expected = run(problem.space).force
+
+    # the clock starts at the same placement; round-off of the solves, grown in some 250 steps
+    assert run(narrow).force == pytest.approx(expected, rel=1e-6, abs=1e-9 * expected.max())
+    with pytest.raises(ReachError, match="at the rim of the candidates, at"):
+        run(narrow, reach=1e-6)

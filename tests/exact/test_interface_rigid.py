@@ -134,8 +134,7 @@ def test_spring_to_ground_swings_in_its_own_period():
 
     assert run.motion.position[-1, 2] == pytest.approx(-0.5 / omega, rel=1e-5)
     assert run.motion.velocity[-1, 2] == pytest.approx(0.0, abs=1e-3)  # last step of 1e-7 s
-    # leapfrog: (omega h)^2 / 4 of the energy at a quarter of the period, 0 again at a half
-    assert run.energy.residual == pytest.approx(-((omega * 1e-7) ** 2) / 4.0, rel=1e-2)
+    assert abs(run.energy.residual) < 1e-12  # round-off of some 2700 steps
 
 
 @pytest.mark.parametrize("arm", [0.0, 1e-3, 4e-3])

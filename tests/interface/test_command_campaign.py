@@ -33,7 +33,7 @@ def test_commands_answer_or_say_why_not(tmp_path: Path):
     ("code", "said", "made", "fault"),
     [
         (None, "", "{}", "hang"),
-        (70, "klack: this is a mistake of klack itself", None, "exit code 70"),
+        (70, "klack: internal error", None, "exit code 70"),
         (-11, "", None, "exit code -11"),
         (0, "peak force nan N", "{}", "no number in the words"),
         (0, "", '{"peak": {"force": Infinity}}', "no number in ['.peak.force']"),

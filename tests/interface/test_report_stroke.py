@@ -437,6 +437,22 @@ def test_short_and_broken_curves_stay_as_they_are():
     assert (inside[0], inside[-1]) == (10.0, 20.0)
 
 
+def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: Path):
+    doubts = ("it lies on a sharp edge", "2 contact points across are too few")
+    seat = replace(study.stops[1], points_across=2, doubts=doubts)
+    doubtful = replace(study, stops=(study.stops[0], seat))
+    save_stroke(doubtful, tmp_path)
+    said = stroke_to_json(load_stroke(tmp_path))["stops"]
+
+    assert said[seat.name]["doubts"] == list(doubts)
+    assert said[seat.name]["points_across"] == 2
+    assert (said[study.stops[0].name]["doubts"], seat.half_width) == ([], 40e-6)
+    tables = [table for section in stroke_content(doubtful).sections for table in section.tables]
+    rows = {row[0]: row[1:] for table in tables for row in table.rows if table.columns[0] == "stop"}
+    assert rows["doubts about the contact"] == ("–", "\n".join(doubts))
+    assert rows["contact points across"] == ("–", "2")
+
+
 def test_numbers_of_a_study_are_pure_json(study: StrokeStudy):
     numbers = stroke_to_json(lonely(study))
 

@@ -8,7 +8,13 @@ import pytest
 from klack.report.content import report_content
 from klack.report.wording import answer, listed, quantity, share, signed, signed_share
 from klack.workflow.study import ImpactStudy
-from klack.workflow.summary import SUMMARY_COLUMNS, answer_line, study_to_json, summary_rows
+from klack.workflow.summary import (
+    SUMMARY_COLUMNS,
+    answer_line,
+    contact_doubt,
+    study_to_json,
+    summary_rows,
+)
 
 
 def plain(text: str) -> str:
@@ -56,6 +62,22 @@ def test_summary_in_plain_numbers(impact_study: ImpactStudy, lonely_study: Impac
         *("third_octave_max_dB", "third_octave_up_to_Hz"),
     }
     assert study_to_json(lonely_study)["deviation"] is None
+    assert (summary["complete"], summary["failures"]) == (True, {})
+
+
+def test_a_doubtful_contact_goes_with_every_number(impact_study: ImpactStudy) -> None:
+    assert study_to_json(impact_study)["contact"]["doubts"] == []
+    assert contact_doubt(impact_study.contact) == ""
+    doubts = ("its elements are too coarse", "2 contact points across are too few")
+    contact = replace(impact_study.contact, points_across=2, doubts=doubts)
+    study = replace(impact_study, contact=contact)
+    words = "cannot be relied on: its elements are too coarse and 2 contact points across are too"
+
+    said = study_to_json(study)["contact"]
+    assert (said["doubts"], said["points_across"]) == (list(doubts), 2)
+    assert said["half_width_m"] == contact.half_width
+    assert words in contact_doubt(contact)
+    assert words in answer(study)
 
 
 def test_summary_rows_fit_their_columns(impact_study: ImpactStudy) -> None:

@@ -307,10 +307,12 @@ def _with_calculix(
     from klack.report.figures import force_chart
     from klack.report.printed import svg_chart
     from klack.workflow.compare import compare_with, comparison_to_json, level_of, with_other
+    from klack.workflow.incomplete import missing_in
     from klack.workflow.store import load_study
 
     study = load_study(result)
     require_folder(folder)
+    print_notes(missing_in(study), to_stderr=True)
     history = level_of(study, level).history
     comparison = compare_with(study, level, other_run(read_calculix(calculix), history))
     with staged_folder(folder) as stage:

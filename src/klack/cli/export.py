@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from klack.cli.notes import print_notes
 from klack.cli.options import Components, Json, Out, Quiet, Threads, imported, require_threads
 from klack.cli.output import Written, require_folder, require_json_target, write_json
 from klack.cli.stored import is_result
@@ -223,10 +224,12 @@ def _export_stored(source: Path, to: str, out: Path | None) -> tuple[str, Writte
         )
     from klack.cli.export_results import export_result
     from klack.cli.stored import load_stored
+    from klack.workflow.incomplete import missing_in
 
     folder = out if out is not None else source
     require_folder(folder)
     study = load_stored(source)
+    print_notes(missing_in(study), to_stderr=True)
     return study.case, export_result(study, to, folder)
 
 

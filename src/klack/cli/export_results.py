@@ -55,21 +55,22 @@ def run_and_export(
     """Run a case as it asks for, write what came out, and hand on why a run ended early."""
     from klack.case.schema import Case
     from klack.workflow.impact import run_impact
+    from klack.workflow.incomplete import IncompleteImpactError
     from klack.workflow.stroke import run_stroke
     from klack.workflow.stroke_study import IncompleteStrokeError
 
     study: Any
     incomplete: Exception | None = None
     with show_progress(quiet) as progress:
-        if isinstance(case, Case):
-            study = run_impact(
-                case, levels=case.run.levels, certify=False, progress=progress, threads=threads
-            )
-        else:
-            try:
+        try:
+            if isinstance(case, Case):
+                study = run_impact(
+                    case, levels=case.run.levels, certify=False, progress=progress, threads=threads
+                )
+            else:
                 study = run_stroke(case, progress=progress, threads=threads)
-            except IncompleteStrokeError as error:
-                study, incomplete = error.study, error
+        except (IncompleteImpactError, IncompleteStrokeError) as error:
+            study, incomplete = error.study, error
     return export_result(study, to, folder), incomplete
 
 

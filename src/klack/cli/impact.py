@@ -76,13 +76,18 @@ def run_case(
         require_folder(folder)
 
         from klack.workflow.impact import run_impact
+        from klack.workflow.incomplete import IncompleteImpactError
         from klack.workflow.store import save_study
         from klack.workflow.summary import study_to_json
 
     with show_progress(quiet) as progress:
-        study = run_impact(
-            checked, levels=levels, certify=certify, progress=progress, threads=threads
-        )
+        incomplete: Exception | None = None
+        try:
+            study = run_impact(
+                checked, levels=levels, certify=certify, progress=progress, threads=threads
+            )
+        except IncompleteImpactError as error:
+            study, incomplete = error.study, error
         failure = write_result(study, folder, save_study, report=report, progress=progress)
     if not quiet:
         made = report and failure is None
@@ -91,6 +96,8 @@ def run_case(
         print_notes(study.warnings, to_stderr=True)
     if json is not None:
         write_json(json, study_to_json(study))
+    if incomplete:
+        raise incomplete
     if failure:
         raise failure
     return folder
@@ -101,14 +108,16 @@ def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr:
     from klack.workflow.summary import (
         SUMMARY_COLUMNS,
         answer_line,
+        contact_doubt,
         estimate_lines,
         summary_rows,
     )
 
     print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for line in (answer_line(study), *estimate_lines(study)):
-        print(line, file=stream)
+    for line in (answer_line(study), contact_doubt(study.contact), *estimate_lines(study)):
+        if line:
+            print(line, file=stream)
     print_notes(study.warnings, to_stderr=to_stderr)
     if cached := stages_with_cached(study.stage_times):
         print(f"With cached results (klack cache): {', '.join(cached)}", file=stream)

@@ -8,7 +8,7 @@ code  meaning
 0     done
 1     a check failed, or an iteration did not converge
 2     bad input: one message that names file, line, key, what came, what was expected
-70    a mistake of klack itself; the traceback is printed
+70    internal error; the traceback is printed
 130   stopped by Ctrl-C; nothing half written is left
 143   stopped by SIGTERM; the same
 ===== =================================================================================
@@ -151,7 +151,7 @@ def _run(arguments: list[str], name: str) -> int:
 
 def _bug(name: str) -> int:
     traceback.print_exc()
-    text = "this is a mistake of klack itself, not of your input; please report the text above."
+    text = "internal error, not caused by your input; please report the text above."
     return _complain(f"{name}: {text}", EXIT_BUG)
 
 

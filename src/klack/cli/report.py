@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.notes import print_notes
 from klack.cli.options import Json, Quiet
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 
@@ -31,6 +32,7 @@ def report(
     """Write report.html and report.pdf of a stored result."""
     from klack.cli.reports import REPORTS, beside_result, write_reports
     from klack.cli.stored import load_stored
+    from klack.workflow.incomplete import missing_in
 
     require_json_target(json)
     folder = out if out is not None else result
@@ -39,6 +41,7 @@ def report(
     require_folder(folder)
     with staged_folder(folder, beside) as stage:
         write_reports(study, stage)
+    print_notes(missing_in(study), to_stderr=True)
     if not quiet:
         stream = sys.stderr if str(json) == "-" else sys.stdout
         print(f"Report in {folder}: {', '.join(REPORTS)}", file=stream)

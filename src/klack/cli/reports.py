@@ -45,8 +45,8 @@ def write_result(
     """Put a result into a folder, and then, if wanted, its report beside it.
 
     Whatever happens to the report costs no calculation: the result stands, with no report of an
-    earlier one beside it.  A mistake in a picture is returned; Ctrl-C goes on its way with a note
-    that says what is kept.
+    earlier one beside it.  An internal error in a picture is returned; Ctrl-C goes on its way with
+    a note that says what is kept.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _report(study: "Study", folder: Path, mark: Mark | None) -> Exception | None
     except InputError as error:
         cause = error.__cause__
         return _no_report(folder, cause) if isinstance(cause, OSError) else error
-    except Exception as error:
+    except Exception as error:  # of whatever kind: the result stands, the command ends with it
         return error
     return None
 

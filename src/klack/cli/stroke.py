@@ -167,6 +167,7 @@ def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr:
         time_rows,
         variant_rows,
     )
+    from klack.workflow.summary import contact_doubt
 
     print_table(study.title, VARIANT_COLUMNS, variant_rows(study), to_stderr=to_stderr)
     times = time_rows(study)
@@ -176,6 +177,9 @@ def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr:
     for variant in study.variants.values():
         _print_impacts(variant, to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
+    for stop in study.stops:
+        if doubt := contact_doubt(stop):
+            print(f"Impacts on '{stop.name}': {doubt}", file=stream)
     print_notes(study.warnings, to_stderr=to_stderr)
     made = ["result.zarr", *(REPORTS if report else ())]
     print(f"Results in {folder}: {', '.join(made)}", file=stream)

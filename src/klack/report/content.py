@@ -167,11 +167,14 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
     title = "The bodies at peak force"
     if study.sections:
         return Section(title=title, picture=section_figure(study))
-    text = (
-        "No picture: the displacement of the whole bodies is known at the level 'full' only, which "
-        "was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies with a "
-        "mesh."
-    )
+    text = "No picture: the displacement of the whole bodies is known at the level 'full' only, "
+    if "full" in study.failures:
+        text += "which failed; see the warnings."
+    else:
+        text += (
+            "which was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies "
+            "with a mesh."
+        )
     return Section(title=title, paragraphs=(text,))
 
 
@@ -315,6 +318,8 @@ def _computed(study: ImpactStudy) -> Section:
                 "element size over half width",
                 f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
             ),
+            ("contact points across", str(contact.points_across or "–")),
+            ("doubts about the contact", "\n".join(contact.doubts) or "–"),
         ]
     facts.append(("local law", law.kind))
     return Section(

@@ -248,6 +248,8 @@ def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
                 else "–"
             ),
         ),
+        ("contact points across", lambda stop: str(stop.points_across or "–")),
+        ("doubts about the contact", lambda stop: "\n".join(stop.doubts) or "–"),
     )
     return Table(
         columns=("stop", *(stop.name for stop in stops)),

@@ -5,6 +5,7 @@ from math import floor, isfinite, log10
 
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.workflow.study import ImpactStudy, LevelResult
+from klack.workflow.summary import contact_doubt
 
 __all__ = [
     "answer",
@@ -149,6 +150,8 @@ def answer(study: ImpactStudy) -> str:
     elif study.reference == "interface":
         text += ", which keeps the bodies as modes and decides the contact point by point"
     text += "."
+    if doubt := contact_doubt(study.contact):
+        text += f" {doubt}"
     if "reduced" in study.deviations:
         text += f" {verdict(study.levels['reduced'], study.deviations['reduced'])}"
     elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:

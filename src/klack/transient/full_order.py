@@ -45,6 +45,7 @@ from klack import energy_balance
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
+from klack.contact.statics import ReachError
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
@@ -711,12 +712,12 @@ def _check_rim(run: _Run) -> None:
     beyond = run.space.rim & (run.lam > 0.0)
     if np.any(beyond) and not run.space.complete_at(_RIM_RESERVE * run.travel):
         at = ", ".join(f"{x * 1e3:.4g}" for x in run.space.points[np.argmax(beyond)])
-        raise InputError(
+        raise ReachError(
             "simulate_full_order: contact space",
             got=f"a contact point at the rim of the candidates, at ({at}) mm, that closed "
             f"{run.steps * run.step * 1e6:.4g} us after the start of the record",
             expected="contact only inside of the candidates",
-            hint="build the contact space with a larger reach.",
+            hint="build the contact space with a larger reach; in a case, enlarge contact.reach.",
         )
 
 

@@ -18,6 +18,16 @@ the same step: some 1e-6 of the force, at most 1e-3, and as much as it takes in 
 last step of a contact, which are closed for a part only.  What is left is owed to the next step
 and never adds up.
 
+A spring that holds the moving body at :math:`y = p^T q` pulls with its mean force over the step,
+:math:`-k (y_0 + y_1) / 2`, so that its work is exactly what its energy changes by.  As :math:`y_1`
+follows from all forces of the step, each force comes with the answer of the spring,
+
+.. math:: f \to f - p \, \kappa \, p^T B_1 f, \qquad
+    \kappa = \frac{k / 2}{1 + \tfrac{k}{2} p^T B_1 p} ,
+
+and the matrix of the complementarity problem loses
+:math:`\tfrac12 \kappa (\Phi B_1 p) (\Phi B_1 p)^T` (:func:`contact_compliance`).
+
 The inverse of the active block of that matrix is carried along: a point that closes borders it, a
 point that opens takes a row out, each at the cost of one product with it.
 """
@@ -26,7 +36,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["FAILED", "FINISHED", "OPEN", "TURNED", "march", "safe_flight", "solve_active"]
+__all__ = [
+    "FAILED",
+    "FINISHED",
+    "OPEN",
+    "TURNED",
+    "contact_compliance",
+    "march",
+    "safe_flight",
+    "solve_active",
+]
 
 FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 """Why :func:`march` returned.
@@ -43,6 +62,47 @@ _PAY_LIMIT = 1e-3
 """Share of a contact force that may always pay the energy debt.
 
 More may, where the debt is more than that share of the energy that the contact holds."""
+
+
+def contact_compliance(
+    local: NDArray, traces: NDArray, B1: NDArray, push: NDArray, spring: float
+) -> NDArray:
+    """Matrix A of :func:`march`: gaps at the end of a step per contact force there, (n, n) [m/N].
+
+    Parameters
+    ----------
+    local : array, shape (n, n) [m/N]
+        Of what the modes do not carry.
+    traces, B1, push, spring
+        As in :func:`march`.
+    """
+    A = local + 0.5 * (traces * B1) @ traces.T
+    if spring > 0.0:
+        pull = traces @ (B1 * push)
+        A -= 0.5 * _spring_share(B1, push, spring) * np.outer(pull, pull)
+    return np.ascontiguousarray(A)
+
+
+@njit(cache=True)
+def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
+    """Force of the spring per displacement that the step would have without it [N/m]."""
+    yields = 0.0
+    for i in range(len(push)):
+        yields += push[i] * push[i] * B1[i]
+    return 0.5 * spring / (1.0 + 0.5 * spring * yields)
+
+
+@njit(cache=True)
+def _hold(kick: NDArray, push: NDArray, B1: NDArray, share: float) -> float:
+    """Let the spring answer a force; returns its part [N]."""
+    if share == 0.0:
+        return 0.0
+    moved = 0.0
+    for i in range(len(push)):
+        moved += push[i] * B1[i] * kick[i]
+    for i in range(len(push)):
+        kick[i] -= push[i] * share * moved
+    return -share * moved
 
 
 @njit(cache=True)
@@ -339,7 +399,7 @@ def march(
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
     step : float [s]
     A : array, shape (n, n) [m/N]
-        ``C_l + Phi diag(B1) Phi^T / 2``; n = 0: flight, no contact is looked at.
+        Of :func:`contact_compliance`; n = 0: flight, no contact is looked at.
     traces, gap0, axial : array, shape (n, M), (n,), (n,)
     drift : array, shape (bodies, M)
         Centres of mass.
@@ -390,6 +450,7 @@ def march(
     bodies = drift.shape[0]
     guides = len(guide_clearance)
     A11, A12, A21, A22, B1, B2 = propagator
+    share = _spring_share(B1, push, spring)
     diagonal = 0.0
     for k in range(n):
         diagonal += A[k, k] / n
@@ -426,11 +487,6 @@ def march(
     for taken in range(steps):
         # forces known before the step
         outside = constant
-        if spring > 0.0:
-            lift = 0.0
-            for i in range(modes):
-                lift += push[i] * (q[i] + 0.5 * step * v[i])
-            outside -= spring * lift
         for i in range(modes):
             before[i] = q[i]
             f[i] = push[i] * outside
@@ -458,6 +514,15 @@ def march(
                 a = 0.5 * lam[k]
                 for i in range(modes):
                     kick[i] += a * traces[k, i]
+        if spring > 0.0:  # its mean force under all forces that are known by now
+            rest = 0.0
+            for i in range(modes):
+                moved = (A11[i] + 1.0) * q[i] + A12[i] * v[i] + B1[i] * (f[i] + kick[i])
+                rest += push[i] * moved
+            pull = -share * rest
+            outside += pull
+            for i in range(modes):
+                f[i] += push[i] * pull
         for i in range(modes):
             whole[i] = f[i] + kick[i]
             qf[i] = A11[i] * q[i] + A12[i] * v[i] + B1[i] * whole[i]
@@ -485,13 +550,15 @@ def march(
                 normal[k, 0] = -press * nx
                 normal[k, 1] = -press * ny
                 for i in range(modes):
-                    t = 0.5 * (
+                    kick[i] = 0.5 * (
                         normal[k, 0] * guide_traces[k, 0, i] + normal[k, 1] * guide_traces[k, 1, i]
                     )
-                    f[i] += t
-                    whole[i] += t
-                    qf[i] += B1[i] * t
-                    vf[i] += B2[i] * t
+                outside += _hold(kick, push, B1, share)
+                for i in range(modes):
+                    f[i] += kick[i]
+                    whole[i] += kick[i]
+                    qf[i] += B1[i] * kick[i]
+                    vf[i] += B2[i] * kick[i]
         # contact
         touching = counts[0] > 0
         if n:
@@ -502,6 +569,7 @@ def march(
                     touching = True
         least = 0.0
         mean_force = 0.0
+        answer = 0.0  # of the spring to the forces of the contact
         if touching:
             widest = 0.0
             for k in range(n):
@@ -537,6 +605,7 @@ def march(
                     a = 0.5 * new[k]
                     for i in range(modes):
                         kick[i] += a * traces[k, i]
+            answer += _hold(kick, push, B1, share)
             for i in range(modes):
                 whole[i] += kick[i]
                 qf[i] += B1[i] * kick[i]
@@ -569,6 +638,8 @@ def march(
                         a = 0.5 * pay * (lam[k] + new[k])
                         for i in range(modes):
                             kick[i] += a * traces[k, i]
+                back = _hold(kick, push, B1, share)
+                answer += back
                 for i in range(modes):
                     whole[i] += kick[i]
                     qf[i] += B1[i] * kick[i]
@@ -582,6 +653,7 @@ def march(
                     exact = _payment(owed, work + work_slope + stored_slope, work_slope)
                     exact = min(max(exact, -limit), limit)
                     more = exact / pay - 1.0
+                    answer += more * back
                     for i in range(modes):
                         whole[i] += more * kick[i]
                         qf[i] += more * B1[i] * kick[i]
@@ -640,7 +712,7 @@ def march(
         out_force[taken] = mean_force
         out_gap[taken] = 0.5 * (least + smallest) if taken else least
         smallest = least
-        out_outside[taken] = outside + braking
+        out_outside[taken] = outside + answer + braking
         books[3] = debt
         if wait and books[5] > wait:
             return taken + 1, OPEN

@@ -23,7 +23,14 @@ from klack.errors import ConvergenceError, InputError, require_nonnegative, requ
 from klack.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import FAILED, OPEN, TURNED, march, safe_flight
+from klack.transient.interface_kernel import (
+    FAILED,
+    OPEN,
+    TURNED,
+    contact_compliance,
+    march,
+    safe_flight,
+)
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import (
     ImpactSegment,
@@ -188,9 +195,9 @@ class _Run:
         self.constant, self.spring = -force, spring
         n, M = model.count, model.mode_count
         self.steppers: dict[int, _Stepper] = {}
-        self.A = np.ascontiguousarray(
-            model.compliance + 0.5 * (model.traces * self.stepper(0).propagator[4]) @ model.traces.T
-        )
+        B1 = self.stepper(0).propagator[4]
+        self.push = np.ascontiguousarray(model.rigid[2])
+        self.A = contact_compliance(model.compliance, model.traces, B1, self.push, spring)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.gap0 = np.array(model.gap)
         below = model.axial > 1e-6
@@ -211,7 +218,6 @@ class _Run:
         self.arm = np.zeros(3)
         if gaps is not None:
             self.arm = model.points[first:last].mean(axis=0) - model.centre
-        self.push = np.ascontiguousarray(model.rigid[2])
         self.time = 0.0
         self.segments: list[ImpactSegment] = []
         self.motion: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []

@@ -115,7 +115,7 @@ def _free_blocks() -> list[Check]:
             "two free blocks, oblique impact: change of linear momentum [relative]",
             expected=0.0,
             computed=float(np.max(np.abs(later[0] - before[0])) / np.max(np.abs(before[0]))),
-            tolerance=2e-13,
+            tolerance=1e-13,
             source=source,
         ),
         compare(
@@ -431,7 +431,7 @@ def _metal_bar() -> list[Check]:
             "rigid metal bar of 9.300 g on a rigid wall: rebound [m/s]",
             expected=227.00,
             computed=rebound,
-            tolerance=5e-11,
+            tolerance=4e-12,
             source=source,
         ),
         compare(
@@ -439,7 +439,7 @@ def _metal_bar() -> list[Check]:
             "rigid metal bar of 9.300 g on a rigid wall: energy after impact [J]",
             expected=239.61,
             computed=0.5 * mass * rebound**2,
-            tolerance=1e-10,
+            tolerance=8e-12,
             source=source,
         ),
         compare(
@@ -447,7 +447,7 @@ def _metal_bar() -> list[Check]:
             "elastic copper bar without lateral strain, 227 m/s: energy after impact [J]",
             expected=0.5 * elastic.mass * speed**2,
             computed=ring.energy.final,
-            tolerance=5e-12,
+            tolerance=1e-13,
             source="conservation of energy; kinetic and strain energy of the bar",
         ),
     ]
@@ -588,7 +588,7 @@ def _two_stops() -> list[Check]:
             "rod between two walls: energy over some 80 impacts, largest deviation [relative]",
             expected=0.0,
             computed=_largest_deviation(run, 0.0),
-            tolerance=1e-5,
+            tolerance=1e-11,
             source="conservation of energy",
         ),
         compare(
@@ -623,7 +623,7 @@ def _many_impacts() -> list[Check]:
             "needle pressed on its seat, 1000 impacts: energy, largest deviation [relative]",
             expected=0.0,
             computed=_largest_deviation(pressed, press),
-            tolerance=5e-6,
+            tolerance=2e-9,
             source=source,
         ),
         compare(
@@ -631,7 +631,7 @@ def _many_impacts() -> list[Check]:
             "ball under 20 times its weight, 100 impacts: energy, largest deviation [relative]",
             expected=0.0,
             computed=_largest_deviation(bouncing, weight),
-            tolerance=1e-5,
+            tolerance=5e-10,
             source=source,
         ),
     ]

@@ -16,7 +16,7 @@ from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_kernel import march
+from klack.transient.interface_kernel import contact_compliance, march
 from klack.transient.interface_model import (
     InterfaceBody,
     InterfaceContact,
@@ -250,21 +250,21 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
     """Take ``steps`` steps of the compiled loop from an open contact, without outside forces."""
     n, modes = model.count, model.mode_count
     P = modal_propagator(model.omega, model.damping, step)
-    A = model.compliance + 0.5 * (model.traces * P.B1) @ model.traces.T
+    push = np.ascontiguousarray(model.rigid[2])
     q, v, lam = np.array(q, dtype=float), np.array(v, dtype=float), np.zeros(n)
     out = np.zeros((3, steps))
     march(
         steps,
         0,
         step,
-        np.ascontiguousarray(A),
+        contact_compliance(model.compliance, model.traces, P.B1, push, 0.0),
         model.traces,
         model.gap,
         model.axial,
         model.drift,
         np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]),
         np.zeros((0, modes)),
-        np.ascontiguousarray(model.rigid[2]),
+        push,
         0.0,
         0.0,
         np.zeros((0, 2, modes)),

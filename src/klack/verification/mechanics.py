@@ -162,7 +162,7 @@ def _pushed() -> list[Check]:
             "over the hill of a tabulated force, speed behind it [m/s]",
             sqrt(1.0 - held),
             _speed(escape)[-1],
-            2e-10,
+            2e-13,
             "energy: area of a triangle",
         ),
     ]
@@ -193,7 +193,7 @@ def _two_bodies() -> list[Check]:
             "two masses on a spring, drift of their momentum [-]",
             0.0,
             float(np.abs(momentum / (MASS * 0.5) - 1.0).max()),
-            5e-13,
+            2e-13,
             "conservation",
         ),
     ]
@@ -217,7 +217,7 @@ def _balances() -> list[Check]:
             "all of them at one mass, energy residual over throughput [-]",
             0.0,
             books.relative_residual,
-            1e-12,
+            2e-13,
             "energy books: every element balances to round-off",
         )
     ]

@@ -71,7 +71,7 @@ def iterate_checks(
             checks = list(module.checks())
         except KlackError as error:
             checks = [_stopped(group, str(error))]
-        except Exception as error:  # a mistake in klack may not cost the other groups
+        except Exception as error:  # an internal error may not cost the other groups
             checks = [_stopped(group, f"{type(error).__name__}: {error}", _place(error))]
         yield group, checks or [_stopped(group, "the group has no checks")]
 

@@ -103,7 +103,7 @@ def level_of(study: ImpactStudy, name: str) -> LevelResult:
     if name not in study.levels:
         raise InputError(
             f"result of case '{study.case}'",
-            got=f"no level '{name}'",
+            got=f"no level '{name}'{study.why_missing(name)}",
             expected=f"one of: {', '.join(study.levels)}",
             hint=f"run `klack impact {study.case} --level {name}`, or choose with --level.",
         )

@@ -22,6 +22,7 @@ from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.simulation.impact import simulate_impact
 from klack.workflow.given_pair import GivenPair, build_given_pair
+from klack.workflow.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.workflow.levels import deviations, elastic_count, level_result, lumped_level
 from klack.workflow.progress import Progress
 from klack.workflow.stages import LIBRARIES, StageClock, collected_warnings
@@ -55,22 +56,25 @@ def run_given_impact(
     begin = perf_counter()
     wanted = _checked(case, levels)
     clock = StageClock(progress, result_cache())
+    attempts = Attempts()
     with collected_warnings() as notes:
         pair = build_given_pair(case, clock, threads=threads)
         clock("reduced", 0.0)
         results: dict[str, LevelResult] = {}
         for level in wanted:
-            if level == "lumped":
-                sides = (pair.upper, pair.lower)
-                masses = {b.name: b.mass if b.rigid_count else None for b in sides}
-                results[level] = lumped_level(case, masses)
-            else:
-                results[level] = _reduced(case, pair, clock.spent(("bodies",)))
+            with attempts.at(level):
+                if level == "lumped":
+                    sides = (pair.upper, pair.lower)
+                    masses = {b.name: b.mass if b.rigid_count else None for b in sides}
+                    results[level] = lumped_level(case, masses)
+                else:
+                    results[level] = _reduced(case, pair, clock.spent(("bodies",)))
         clock("reduced", 1.0)
+    attempts.require_one(results)
     reference = best_level(results)
     compared = deviations(results, reference)
     peak = results[reference].measures.peak_force
-    return ImpactStudy(
+    study = ImpactStudy(
         case=case.name,
         title=case.title,
         description=case.description.strip(),
@@ -88,8 +92,16 @@ def run_given_impact(
         levels=results,
         reference=reference,
         deviations=compared,
-        warnings=(*notes, *trust_notes(results, reference, compared)),
+        warnings=(
+            *failure_notes(attempts.texts),
+            *notes,
+            *trust_notes(results, reference, compared),
+        ),
+        failures=attempts.texts,
     )
+    if study.failures:
+        raise IncompleteImpactError(study)
+    return study
 
 
 def _checked(case: Case, levels: Sequence[str]) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from klack.units import format_si
 from klack.workflow.body_summary import summarise_body
 from klack.workflow.contact_check import ContactCheck, check_contact, ends_reached
 from klack.workflow.given_impact import run_given_impact
+from klack.workflow.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.workflow.interface_level import (
     build_guide,
     certificate_modes,
@@ -113,6 +114,11 @@ def run_impact(
     Returns
     -------
     ImpactStudy
+
+    Raises
+    ------
+    IncompleteImpactError
+        When a level fails: with the study of those that did not.
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
@@ -120,6 +126,7 @@ def run_impact(
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
     clock = StageClock(progress, result_cache())
+    attempts = Attempts()
     with collected_warnings() as notes:
         problem = build_problem(case, clock, threads=threads)
         _require_time_to_touch(case, problem.case.contact.gap)
@@ -144,18 +151,23 @@ def run_impact(
         else:
             what = "the stiffness of the contact zone alone"
             classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
+        clock("radiating surfaces", 0.0)
+        structures = impact_structures(problem, pools, own)
+        clock("radiating surfaces", 1.0)
+        clock("reduced", 0.5)
         results: dict[str, LevelResult] = {}
         for level in wanted:
             if level == "lumped":
-                results[level] = run_lumped(problem)
+                with attempts.at(level):
+                    results[level] = run_lumped(problem)
             elif level.startswith("reduced"):
-                pair = own if level == "reduced" else _variant(level, problem, pools)
-                setup = clock.spent(_SET_UP)
-                with warnings_of(f"level '{level}'"):
+                with attempts.at(level), warnings_of(f"level '{level}'"):
+                    pair = own if level == "reduced" else _variant(level, problem, pools)
+                    setup = clock.spent(_SET_UP)
                     results[level] = _run_variant(case, level, pair, setup_time=setup)
         clock("reduced", 1.0)
         if "interface" in wanted:
-            with warnings_of("level 'interface'"):
+            with attempts.at("interface"), warnings_of("level 'interface'"):
                 results["interface"] = _run_interface(problem, pools, own, clock)
         certificate = None
         if certify and reduced:
@@ -171,14 +183,11 @@ def run_impact(
                 lambda: compare_transfer(problem, pools, own.ports, progress=clock),
             )
             transfer = found or ()
-        clock("radiating surfaces", 0.0)
-        structures = impact_structures(problem, pools, own)
-        clock("radiating surfaces", 1.0)
         check = check_contact(case, problem.pair, problem.static, peak, _surfaces(case))
         problem.close()
         sections: tuple[SectionPicture, ...] = ()
         if "full" in wanted:
-            with warnings_of("level 'full'"):
+            with attempts.at("full"), warnings_of("level 'full'"):
                 results["full"], run = run_full(
                     problem,
                     pools,
@@ -186,12 +195,14 @@ def run_impact(
                     progress=clock,
                     threads=threads,
                 )
-            sections = _sections(problem, run)
+                sections = _sections(problem, run)
+        attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
     _take_better(results, certificate)
     reference = best_level(results)
     compared = deviations(results, reference)
-    return ImpactStudy(
+    missing = failure_notes(attempts.texts)
+    study = ImpactStudy(
         case=case.name,
         title=case.title,
         description=case.description.strip(),
@@ -211,13 +222,17 @@ def run_impact(
         deviations=compared,
         transfer=transfer,
         sections=sections,
-        warnings=(*notes, *trust_notes(results, reference, compared)),
+        warnings=(*missing, *notes, *trust_notes(results, reference, compared)),
+        failures=attempts.texts,
         estimates=certificate.estimates,
         estimate_basis=certificate.basis,
         estimate_spread=certificate.spread,
         estimate_doubt=certificate.doubt,
         structures=structures,
     )
+    if study.failures:
+        raise IncompleteImpactError(study)
+    return study
 
 
 def _require_time_to_touch(case: Case, gap: float | None) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
-from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -51,7 +51,6 @@ CONTACT, OPPOSITE = "contact", "opposite"
 """Names of the contact of a case and of that with the stop above."""
 
 _FEWEST = 30
-_REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
 
@@ -161,18 +160,8 @@ def within_reach(
         )
         try:
             return run(model)
-        except ReachError:
-            if problem.case.contact.reach is not None or problem.opposite is not None:
-                raise
-            pair, present = problem.pair, problem.space if space is None else space
-            space = contact_space(
-                pair.upper.mesh,
-                pair.upper_surface,
-                pair.lower.mesh,
-                pair.lower_surface,
-                reach=_REACH_GROWTH * present.reach,
-                slave=present.slave,
-            )
+        except ReachError as error:
+            space = problem.wider(problem.space if space is None else space, error)
             compliance = extended_compliance(
                 space, problem.static, problem.flexibility_upper, problem.flexibility_lower
             )

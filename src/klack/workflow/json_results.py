@@ -71,11 +71,27 @@ class LevelJson(TypedDict):
     wall_time_s: Real
 
 
+class ContactJson(TypedDict):
+    """Mesh of a contact at the force of the impact; null without a mesh."""
+
+    surfaces: Annotated[str, Field(description="Empty for a stop without surfaces.")]
+    half_width_m: Real
+    size_over_half_width: Annotated[Real, Field(description="Good up to 1, doubtful above 1.5.")]
+    points_across: Annotated[int | None, Field(description="Too few below 5.")]
+    doubts: Annotated[
+        list[str], Field(description="Why no error of impacts there can be judged; empty if none.")
+    ]
+
+
 class ImpactJson(TypedDict):
     """``klack impact`` and ``klack demo``."""
 
     schema: Literal["klack-impact/1"]
     case: str
+    complete: Annotated[bool, Field(description="False: a level failed.")]
+    failures: Annotated[
+        dict[str, str], Field(description="Why a level has no numbers, by its name.")
+    ]
     answer: Annotated[str, Field(description="Name of the best level.")]
     levels: Annotated[dict[str, LevelJson], Field(description="By the name of the level.")]
     deviation: Annotated[
@@ -88,6 +104,7 @@ class ImpactJson(TypedDict):
         dict[str, DeviationJson | None],
         Field(description="Of every reduced level, by a run at the interface level."),
     ]
+    contact: Annotated[ContactJson, Field(description="All levels but lumped share it.")]
     warnings: list[str]
 
 
@@ -208,6 +225,10 @@ class StrokeJson(VariantJson):
     own_components: OwnComponents
     variant: Annotated[str, Field(description="Name of the reference variant.")]
     variants: Annotated[dict[str, VariantJson], Field(description="All of them by name.")]
+    stops: Annotated[
+        dict[str, ContactJson],
+        Field(description="By the name of the end stop; all variants but lumped ones share them."),
+    ]
 
 
 class ShotJson(TypedDict):

@@ -26,7 +26,9 @@ from klack.contact.laws import (
     gonthier_coefficient,
 )
 from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
+from klack.contact.mortar import ContactSpace
 from klack.contact.restitution import Deviation, measure_impact
+from klack.contact.statics import ReachError
 from klack.contact.submodel import LocalStiffness, local_stiffness
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
@@ -461,6 +463,7 @@ def simulate_in_full(
     kept: Mapping[str, Modes],
     progress: Progress,
     threads: int | None,
+    space: ContactSpace | None = None,
     longest_period: float = 0.0,
     snapshots: Snapshots | None = None,
 ) -> FullOrderResult:
@@ -474,9 +477,16 @@ def simulate_in_full(
         there.  Only damped bodies are looked up.
     progress : callable
     threads : int or None
+    space : ContactSpace, optional
+        Other contact points of the same surfaces than those of the static contact.
     longest_period : float [s]
     snapshots : Snapshots, optional
         Both as in :func:`klack.transient.full_order.simulate_full_order`.
+
+    Raises
+    ------
+    ReachError
+        Where the motion reaches farther than the contact points.
     """
     case, pair = problem.case, problem.pair
     spring = case.motion.spring
@@ -485,7 +495,7 @@ def simulate_in_full(
     return simulate_full_order(
         pair.upper,
         pair.lower,
-        problem.space,
+        problem.space if space is None else space,
         speed=case.motion.speed,
         duration=case.run.duration,
         step=case.run.full_step,
@@ -546,15 +556,25 @@ def run_full(
     progress: Progress,
     threads: int | None,
 ) -> tuple[LevelResult, FullOrderResult]:
-    """Impact with every degree of freedom; ``kept`` as in :func:`simulate_in_full`."""
-    case, pair = problem.case, problem.pair
-    result = simulate_in_full(
-        problem,
-        kept=kept,
-        longest_period=_longest_period(pools[pair.upper.name]),
-        progress=progress,
-        threads=threads,
-    )
+    """Impact with every degree of freedom, on as many contact points as the motion reaches.
+
+    ``kept`` as in :func:`simulate_in_full`.
+    """
+    case, pair, space = problem.case, problem.pair, problem.space
+    while True:
+        try:
+            result = simulate_in_full(
+                problem,
+                kept=kept,
+                space=space,
+                longest_period=_longest_period(pools[pair.upper.name]),
+                progress=progress,
+                threads=threads,
+            )
+        except ReachError as error:
+            space = problem.wider(space, error)
+        else:
+            break
     history = replace(
         result.history,
         ledger=replace(
@@ -576,9 +596,7 @@ def run_full(
         step=case.run.full_step,
         wall_time=statistics.loop_time,
         setup_time=statistics.set_up_time,
-        pressure=pressure_record(
-            history, result.point_force, problem.space.points, problem.space.area
-        ),
+        pressure=pressure_record(history, result.point_force, space.points, space.area),
     )
     return level, result
 

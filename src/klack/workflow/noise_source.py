@@ -18,6 +18,7 @@ from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.workflow.impact import run_impact
+from klack.workflow.incomplete import failure_notes
 from klack.workflow.noise_force import (
     before_impact,
     impact_force,
@@ -29,9 +30,10 @@ from klack.workflow.record_store import stored_format
 from klack.workflow.store import IMPACT_FORMAT, load_study
 from klack.workflow.stroke import run_stroke
 from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
-from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
+from klack.workflow.stroke_study import StopSummary, StrokeStudy, StrokeVariant
 from klack.workflow.structures import IMPACT_STOP
-from klack.workflow.study import BodySummary, ImpactStudy
+from klack.workflow.study import BodySummary, ContactSummary, ImpactStudy
+from klack.workflow.summary import contact_doubt
 
 __all__ = [
     "NoiseSource",
@@ -169,10 +171,11 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
     """
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
+    failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
     noise, given, materials = _noise_section(study.case_text)
     found = []
     for name in wanted:
-        _require("level", name, study.levels)
+        _require("level", name, study.levels, study.why_missing(name))
         result = study.levels[name]
         touched = bool(np.any(result.history.force > 0.0))
         force = impact_force(result.history)
@@ -197,6 +200,7 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
                 noise=noise,
                 given=given,
                 materials=materials,
+                notes=(*failed, *_contact_notes([study.contact] if name != "lumped" else ())),
             )
         )
     return tuple(found)
@@ -231,7 +235,10 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 given=given,
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
-                notes=_notes(variant, last),
+                notes=(
+                    *_notes(variant, last),
+                    *_contact_notes(study.stops if variant.flexible else ()),
+                ),
                 own_components=study.own_components,
             )
         )
@@ -329,6 +336,11 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
 # --------------------------------------------------------------------------- what both share
 
 
+def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[str, ...]:
+    """What speaks against the contacts that the forces come from."""
+    return tuple(filter(None, map(contact_doubt, contacts)))
+
+
 def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
     """Refuse a result with held bodies whose modes were not stored."""
     held = [body.name for body in study.bodies if body.support != "free"]
@@ -341,7 +353,7 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
         )
 
 
-def _require(what: str, name: str, held: Mapping[str, object]) -> None:
+def _require(what: str, name: str, held: Mapping[str, object], why: str = "") -> None:
     if name in held:
         return
     hint = nearest(name, held, f"run the case with --{what} {name} first.")
@@ -351,7 +363,7 @@ def _require(what: str, name: str, held: Mapping[str, object]) -> None:
         hint = f"strokes have variants, levels are of impacts: --variant {next(iter(held))}."
     raise InputError(
         what,
-        got=f"'{name}', which the result does not hold",
+        got=f"'{name}', which the result does not hold{why}",
         expected=f"one of: {one_of(held)}",
         hint=hint,
     )

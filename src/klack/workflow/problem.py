@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
-from klack.contact.mortar import ContactSpace
+from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
-from klack.contact.statics import StaticContact
+from klack.contact.statics import ReachError, StaticContact
 from klack.elasticity.statics import Flexibility
 from klack.workflow.bodies import BodyPair, build_bodies
 from klack.workflow.ladder import closing_force, impact_energy, static_ladder
@@ -14,6 +14,8 @@ from klack.workflow.opposite import OppositeStop, build_opposite
 from klack.workflow.progress import Progress
 
 __all__ = ["ContactProblem", "build_problem"]
+
+_REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,6 +44,28 @@ class ContactProblem:
     flexibility_lower: Flexibility
     static: StaticContact
     opposite: OppositeStop | None = None
+
+    def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
+        """Contact points of the same surfaces that reach twice as far.
+
+        Parameters
+        ----------
+        space : ContactSpace
+            Those that did not reach far enough.
+        error : ReachError
+            Raised again where the case gives the reach, or has a stop above.
+        """
+        if self.case.contact.reach is not None or self.opposite is not None:
+            raise error
+        pair = self.pair
+        return contact_space(
+            pair.upper.mesh,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+            reach=_REACH_GROWTH * space.reach,
+            slave=space.slave,
+        )
 
     def close(self) -> None:
         """Free the factorisations."""

@@ -15,6 +15,7 @@ from klack.workflow.progress import Progress
 Found = TypeVar("Found")
 
 __all__ = [
+    "FAILURES",
     "LIBRARIES",
     "WITH_CACHED",
     "StageClock",
@@ -25,6 +26,9 @@ __all__ = [
     "trial",
     "warnings_of",
 ]
+
+FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
+"""What a calculation may end with that is no internal error."""
 
 LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 """Distributions whose versions belong to a result."""
@@ -132,7 +136,7 @@ def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
         return compute()
     except InputError as error:
         reason = error.got  # not where: a key that the case may not have
-    except (KlackError, np.linalg.LinAlgError, MemoryError) as error:
+    except FAILURES as error:
         reason = str(error) or type(error).__name__
     warnings.warn(
         f"{what} was left out, which is for comparison only: {reason}",

@@ -351,6 +351,8 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         pattern_force=contact.pattern_force if contact else nan,
         half_width=check.half_width if check else nan,
         size_ratio=check.size_ratio if check else nan,
+        points_across=check.points_across if check else 0,
+        doubts=check.doubts if check else (),
     )
 
 

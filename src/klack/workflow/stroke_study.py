@@ -107,6 +107,10 @@ class StopSummary:
         Of the contact at that force.
     size_ratio : float [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    points_across : int
+        Contact points that carry across the whole width then; 0 where nobody knows.
+    doubts : tuple of str
+        Why no error of impacts on this stop can be judged, each in a few words.
     """
 
     name: str
@@ -123,6 +127,8 @@ class StopSummary:
     pattern_force: float
     half_width: float
     size_ratio: float
+    points_across: int = 0
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from klack.workflow.json_results import (
 from klack.workflow.stroke_missing import cut_records
 from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 from klack.workflow.stroke_times import LiftTimes, Passage
+from klack.workflow.summary import contact_to_json
 
 __all__ = [
     "IMPACT_COLUMNS",
@@ -82,6 +83,7 @@ def stroke_to_json(study: StrokeStudy) -> StrokeJson:
         "variant": reference,
         **variants[reference],
         "variants": variants,
+        "stops": {stop.name: contact_to_json(stop) for stop in study.stops},
     }
 
 

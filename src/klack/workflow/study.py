@@ -264,6 +264,8 @@ class ImpactStudy:
     transfer : tuple of TransferComparison
     sections : tuple of SectionPicture
     warnings : tuple of str
+    failures : mapping of str to str
+        Why a level that was asked for has no result, by its name.
     """
 
     case: str
@@ -291,6 +293,7 @@ class ImpactStudy:
     estimate_spread: float = 0.0
     structures: tuple[Structure, ...] = ()
     estimate_doubt: str = ""
+    failures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def estimates_settled(self) -> bool:
@@ -303,3 +306,8 @@ class ImpactStudy:
         best = (self.reference, "interface", "reduced")
         first = dict.fromkeys(name for name in best if name in self.levels)
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
+
+    def why_missing(self, name: str) -> str:
+        """Words behind "no result of this name": why it failed; empty if it was not asked for."""
+        text = self.failures.get(name, "")
+        return f": it failed ({' '.join(text.split())})" if text else ""

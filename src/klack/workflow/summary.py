@@ -3,12 +3,15 @@
 from math import isfinite
 
 from klack.contact.restitution import Deviation, ImpactMeasures
-from klack.workflow.json_results import DeviationJson, ImpactJson, LevelJson
-from klack.workflow.study import ImpactStudy, LevelResult
+from klack.workflow.json_results import ContactJson, DeviationJson, ImpactJson, LevelJson
+from klack.workflow.stroke_study import StopSummary
+from klack.workflow.study import ContactSummary, ImpactStudy, LevelResult
 
 __all__ = [
     "SUMMARY_COLUMNS",
     "answer_line",
+    "contact_doubt",
+    "contact_to_json",
     "estimate_lines",
     "no_estimate",
     "restitution_text",
@@ -34,18 +37,21 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
     Returns
     -------
     dict
-        ``case``; ``answer``: the level whose numbers to take; ``levels``: per level the numbers of
-        the impact, with ``doubts`` that make it no reference; ``deviation``: of ``reduced``
-        against the reference, None when there is nothing to compare; ``deviations``: of every level
-        that is not the reference; ``estimated_error``: of every reduced level, by an
-        interface-level run, None where that is no reference; ``warnings``.  Numbers that do not
-        exist (nan) are None, and so are peak force, contact time and impulse of a run that ends in
-        contact (``cut_off``): ``highest_force_N`` is what it had reached.
+        ``case``; ``complete`` and ``failures``: why levels have no numbers; ``answer``: the level
+        whose numbers to take; ``levels``: per level the numbers of the impact, with ``doubts`` that
+        make it no reference; ``deviation``: of ``reduced`` against the reference, None when there
+        is nothing to compare; ``deviations``: of every level that is not the reference;
+        ``estimated_error``: of every reduced level, by an interface-level run, None where that is
+        no reference; ``contact``: its mesh, with ``doubts`` that concern all levels; ``warnings``.
+        Numbers that do not exist (nan) are None, and so are peak force, contact time and impulse of
+        a run that ends in contact (``cut_off``): ``highest_force_N`` is what it had reached.
     """
     deviations = {name: _deviation(item) for name, item in study.deviations.items()}
     return {
         "schema": "klack-impact/1",
         "case": study.case,
+        "complete": not study.failures,
+        "failures": dict(study.failures),
         "answer": study.reference,
         "levels": {name: _level(result) for name, result in study.levels.items()},
         "deviation": deviations.get("reduced"),
@@ -54,8 +60,26 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
             name: _deviation(item) if study.estimates_settled else None
             for name, item in study.estimates.items()
         },
+        "contact": contact_to_json(study.contact),
         "warnings": list(study.warnings),
     }
+
+
+def contact_to_json(contact: ContactSummary | StopSummary) -> ContactJson:
+    """How a contact is meshed, and what makes its numbers doubtful."""
+    return {
+        "surfaces": contact.surfaces,
+        "half_width_m": _number(contact.half_width),
+        "size_over_half_width": _number(contact.size_ratio),
+        "points_across": contact.points_across or None,
+        "doubts": list(contact.doubts),
+    }
+
+
+def contact_doubt(contact: ContactSummary | StopSummary) -> str:
+    """Say in one sentence why the numbers of a contact are doubtful; empty if they are not."""
+    doubts = " and ".join(contact.doubts)
+    return f"The contact {contact.surfaces} cannot be relied on: {doubts}." if doubts else ""
 
 
 def answer_line(study: ImpactStudy) -> str:

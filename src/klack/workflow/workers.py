@@ -215,7 +215,7 @@ def _work(connection: Connection, start: Callable[[object], None]) -> None:
 def _attempt(compute: Callable[[Item], Result], item: Item) -> tuple[Result | None, Any]:
     try:
         return compute(item), None
-    except Exception as error:  # a mistake of ours, to be seen where it was asked for
+    except Exception as error:  # an internal error, to be seen where the work was asked for
         error.add_note(f"In a worker process:\n{traceback.format_exc()}")
         return None, error
 

@@ -173,7 +173,7 @@ def _opened(path: Path, file: Any) -> Any:
         try:
             # of an open file asammdf reads only the records that are asked for
             return MDF(file, raise_on_multiple_occurrences=False)
-        except Exception as error:
+        except Exception as error:  # of any kind, and on its way again below
             _forget_half_open(error)
             raise
 
