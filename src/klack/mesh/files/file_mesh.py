@@ -5,7 +5,7 @@ Every reader hands over what its file holds, in the numbers of the file and in t
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +15,12 @@ from klack.errors import InputError, require_positive
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import LOOSE, MarkedFaces, loose_faces, named_faces
-from klack.mesh.files.plausible import SAY_UNIT
+from klack.mesh.files.sound_mesh import require_near, require_right_of_axis, require_sound
 from klack.mesh.mesh import ElementBlock, Mesh
-from klack.mesh.quality import require_positive_jacobians
 
-__all__ = ["FileElements", "FileMesh", "mesh_model", "require_unit"]
+__all__ = ["FileElements", "FileMesh", "mesh_model"]
 
 Ints = NDArray[np.int64]
-
-_CHUNK = 50_000
-_FARTHEST = 1e4  # [m] of a node from the origin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +119,7 @@ def mesh_model(
     new = np.cumsum(used) - 1
     new[~used] = -1
     points = raw.points[nodes.order][used, :dimension] * unit_length
-    _require_near(path, points, nodes.sorted[used])
+    require_near(path, points, nodes.sorted[used])
     blocks = tuple(
         _turned(points, ElementBlock(b.family, new[b.connectivity], b.solid)) for b in blocks
     )
@@ -136,8 +132,8 @@ def mesh_model(
         all_solids=wanted is None and not (raw.loose_faces or raw.solids_only),
     )
     mesh = Mesh(points=points, blocks=blocks, surfaces=surfaces, node_sets={**inner, **sets})
-    _require_right_of_axis(path, mesh, nodes.sorted[used])
-    _require_positive_jacobians(path, mesh, numbers)
+    require_right_of_axis(path, mesh, nodes.sorted[used])
+    require_sound(path, mesh, numbers)
     return MeshModel(
         mesh=mesh,
         node_numbers=nodes.sorted[used],
@@ -282,53 +278,3 @@ def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:
     nodes = block.connectivity.copy()
     nodes[backward] = nodes[backward][:, _MIRRORED[block.family]]
     return ElementBlock(block.family, nodes, block.solid)
-
-
-def _require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None:
-    far = np.abs(points).max(axis=1) > _FARTHEST
-    if far.any():
-        at = int(np.argmax(far))
-        raise InputError(
-            f"{path}: node {numbers[at]}",
-            got=f"a coordinate of {np.abs(points[at]).max():.3g} m",
-            expected=f"coordinates within {_FARTHEST:g} m",
-            hint="check the unit, and the columns of this node.",
-        )
-
-
-def _require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
-    if mesh.dimension != 2:
-        return
-    lowest = int(np.argmin(mesh.points[:, 0]))
-    if mesh.points[lowest, 0] < 0:
-        raise InputError(
-            f"{path}: node {numbers[lowest]}",
-            got=f"r = x = {mesh.points[lowest, 0] * 1e3:.6g} mm",
-            expected="r >= 0: the axis of an axisymmetric mesh is x = 0",
-            hint="draw the half of the section that lies at positive x.",
-        )
-
-
-def _require_positive_jacobians(path: Path, mesh: Mesh, numbers: tuple[Ints, ...]) -> None:
-    """Check the shape of some elements at a time, which bounds the memory."""
-    blocks, labels = [], []
-    for block, own in zip(mesh.blocks, numbers, strict=True):
-        for begin in range(0, len(own), _CHUNK):
-            part = slice(begin, begin + _CHUNK)
-            blocks.append(ElementBlock(block.family, block.connectivity[part], block.solid))
-            labels.append(own[part])
-    parts = replace(mesh, blocks=tuple(blocks))
-    with np.errstate(all="ignore"):  # damaged numbers: what is not above 0 is refused
-        require_positive_jacobians(str(path), parts, numbers=labels)
-
-
-def require_unit(path: Path, unit_length: float | None) -> float:
-    """Unit of length that the user gave; raise where the file names none either."""
-    if unit_length is None:
-        raise InputError(
-            str(path),
-            got="no unit of length",
-            expected="the unit of its coordinates: such files do not say",
-            hint=SAY_UNIT,
-        )
-    return unit_length

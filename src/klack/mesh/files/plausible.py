@@ -1,4 +1,6 @@
-"""Check of the size of a body: the usual sign of a wrong unit of length."""
+"""Unit of length of a mesh file, and the size of its body: the usual sign of a wrong unit."""
+
+from pathlib import Path
 
 import numpy as np
 
@@ -6,7 +8,7 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.units import format_si
 
-__all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size"]
+__all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size", "require_unit"]
 
 SAY_UNIT = "add 'unit: mm' (or your unit) beside the file; for klack inspect, --unit mm."
 """What to do about a mesh file that names no unit of length."""
@@ -55,3 +57,15 @@ def _likely_unit(extent: float) -> str:
         if 1e-3 <= extent * _UNITS[name] <= 0.5:
             return name
     return ""
+
+
+def require_unit(path: Path, unit_length: float | None) -> float:
+    """Unit of length that the user gave; raise where the file names none either."""
+    if unit_length is None:
+        raise InputError(
+            str(path),
+            got="no unit of length",
+            expected="the unit of its coordinates: such files do not say",
+            hint=SAY_UNIT,
+        )
+    return unit_length

@@ -6,7 +6,6 @@ wrong.
 """
 
 import re
-import warnings
 from array import array
 from collections.abc import Iterator
 from typing import NoReturn
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.input.plain_numbers import plain_numbers
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
 
 __all__ = [
@@ -207,14 +207,5 @@ def _block(piece: bytes, kind: type) -> tuple[NDArray, Integers, bytes] | None:
     separators = signs[(signs == ord(",")) | (signs == ord("\n"))]
     ends = np.append(np.flatnonzero(separators == ord("\n")) + 1, len(separators) + 1)
     # with the blanks of the file, so that two numbers in one field count as two
-    values = _numbers(piece.translate(_TO_BLANKS), kind)
+    values = plain_numbers(piece.translate(_TO_BLANKS), kind)
     return None if values is None or len(values) != ends[-1] else (values, ends, text)
-
-
-def _numbers(text: bytes, kind: type) -> NDArray | None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # unreadable rest, NumPy before 2.4
-        try:
-            return np.fromstring(text, dtype=kind, sep=" ")
-        except (ValueError, DeprecationWarning):
-            return None

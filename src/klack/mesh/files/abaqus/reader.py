@@ -20,14 +20,12 @@ from klack.mesh.files.abaqus.elements import ElementGroup
 from klack.mesh.files.abaqus.faces import FaceFinder, RowBlock, left_out
 from klack.mesh.files.abaqus.numbering import distinct
 from klack.mesh.files.abaqus.scope import Scope
-from klack.mesh.files.file_mesh import require_unit
 from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.files.plausible import require_unit
+from klack.mesh.files.sound_mesh import require_right_of_axis, require_sound
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
-from klack.mesh.quality import require_positive_jacobians
 
 __all__ = ["read_abaqus", "read_abaqus_model"]
-
-_CHECKED = 50_000  # elements at a time
 
 
 def read_abaqus(
@@ -107,9 +105,9 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
             name: kept for name, nodes in node_sets.items() if len(kept := _present(new, nodes))
         },
     )
-    _require_right_of_axis(path, mesh, labels[used])
+    require_right_of_axis(path, mesh, labels[used])
     numbers = np.concatenate([group.numbers for group in scope.groups])
-    _require_sound(path, mesh, [numbers[block.rows] for block in blocks])
+    require_sound(path, mesh, [numbers[block.rows] for block in blocks])
     rows, sizes = np.concatenate([b.rows for b in blocks]), [len(b.rows) for b in blocks]
     return MeshModel(
         mesh=mesh,
@@ -264,17 +262,6 @@ def _renumbered_block(block: ElementBlock, new: NDArray[np.int64]) -> ElementBlo
     return ElementBlock(block.family, new[block.connectivity], block.solid)
 
 
-def _require_sound(path: Path, mesh: Mesh, numbers: Sequence[NDArray[np.int64]]) -> None:
-    """No element is inverted; checked some thousand at a time to save memory."""
-    for block, part in zip(mesh.blocks, numbers, strict=True):
-        for start in range(0, len(part), _CHECKED):
-            cut = slice(start, start + _CHECKED)
-            piece = ElementBlock(block.family, block.connectivity[cut], block.solid)
-            require_positive_jacobians(
-                str(path), Mesh(points=mesh.points, blocks=(piece,)), numbers=[part[cut]]
-            )
-
-
 def _present(new: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     kept = new[nodes]
     return kept[kept >= 0]
@@ -283,16 +270,3 @@ def _present(new: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int
 def _renumbered(surface: Surface, new: NDArray[np.int64]) -> Surface:
     blocks = tuple(FaceBlock(b.family, new[b.connectivity]) for b in surface.blocks)
     return Surface(surface.name, blocks)
-
-
-def _require_right_of_axis(path: Path, mesh: Mesh, labels: NDArray[np.int64]) -> None:
-    if mesh.dimension != 2:
-        return
-    lowest = int(np.argmin(mesh.points[:, 0]))
-    if mesh.points[lowest, 0] < 0:
-        raise InputError(
-            f"{path}: node {labels[lowest]}",
-            got=f"r = x = {mesh.points[lowest, 0] * 1e3:.6g} mm",
-            expected="r >= 0: the axis of axisymmetric elements is x = 0",
-            hint="draw the half of the section that lies at positive x.",
-        )

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
-from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model, require_unit
+from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.gmsh.sections import GmshContent, GmshElements, read_content
 from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.files.plausible import require_unit
 
 __all__ = ["read_gmsh"]
 

@@ -136,7 +136,6 @@ class _Reader:
         match = _FORMAT.match(self._data, start, start + 80)
         if not match:
             refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
-        assert match is not None
         version = match[1].decode()
         if version not in ("2", "2.1", "2.2", "4", "4.1"):
             raise InputError(

@@ -1,12 +1,12 @@
 """Numbers of a section of a Gmsh file, one after the other, from text or bytes."""
 
-import warnings
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.input.plain_numbers import plain_numbers
 
 __all__ = ["BinaryStream", "Stream", "TextStream", "refuse", "whole_of"]
 
@@ -31,12 +31,10 @@ class TextStream:
 
     def __init__(self, place: str, text: bytes) -> None:
         self._place = place
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            try:
-                self._values = np.fromstring(text.decode("latin-1"), dtype=np.float64, sep=" ")
-            except (ValueError, DeprecationWarning):
-                refuse(place, "what is no number", "numbers between blanks")
+        values = plain_numbers(text)
+        if values is None:
+            refuse(place, "what is no number", "numbers between blanks")
+        self._values = values
         self._at = 0
 
     @property
@@ -109,7 +107,7 @@ def whole_of(place: str, values: NDArray[np.float64]) -> Ints:
     return values.astype(np.int64)
 
 
-def refuse(place: str, got: str, expected: str) -> None:
+def refuse(place: str, got: str, expected: str) -> NoReturn:
     """Raise for a file that is cut off or damaged."""
     raise InputError(
         place, got=got, expected=expected, hint="the file may be cut off: save it again from Gmsh."

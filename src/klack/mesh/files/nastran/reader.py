@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
-from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model, require_unit
+from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import ALSO_OTHERS
 from klack.mesh.files.nastran.cards import BulkData, read_bulk
 from klack.mesh.files.nastran.frames import Frames
 from klack.mesh.files.nastran.sets import names_in_comments, node_sets
+from klack.mesh.files.plausible import require_unit
 from klack.mesh.files.text_columns import integers, reals
 
 __all__ = ["read_nastran"]

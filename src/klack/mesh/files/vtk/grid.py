@@ -1,6 +1,5 @@
 """An unstructured grid of VTK as its files hold it, and numbers in their text."""
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NoReturn
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.input.plain_numbers import plain_numbers
 
 __all__ = ["VtkGrid", "numbers_in_text", "refuse"]
 
@@ -47,16 +47,9 @@ def refuse(where: str, got: str, expected: str, hint: str = "") -> NoReturn:
     )
 
 
-def numbers_in_text(where: str, text: str, kind: np.dtype) -> np.ndarray:
+def numbers_in_text(where: str, text: bytes, kind: np.dtype) -> np.ndarray:
     """Numbers between blanks; raise for anything else."""
-    if not text.strip():
-        return np.empty(0, dtype=kind)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            if kind.kind == "f":
-                return np.fromstring(text, dtype=np.float64, sep=" ")
-            values = np.fromstring(text, dtype=np.int64, sep=" ")
-        except (ValueError, DeprecationWarning, OverflowError):
-            refuse(where, "what is no number", f"numbers of type {kind.name}")
+    values = plain_numbers(text, float if kind.kind == "f" else int)
+    if values is None:
+        refuse(where, "what is no number", f"numbers of type {kind.name}")
     return values

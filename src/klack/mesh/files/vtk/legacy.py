@@ -117,9 +117,8 @@ class _Reader:
         if not self._binary:
             ahead = _WORD_AHEAD.search(self._data, self._at)
             end = ahead.start() if ahead else len(self._data)
-            text = self._data[self._at : end].decode("latin-1")
+            values = numbers_in_text(self._where, self._data[self._at : end], kind)
             self._at = end
-            values = numbers_in_text(self._where, text, kind)
             if len(values) != count:
                 refuse(self._where, f"{len(values)} numbers", f"{count}, as its count says")
             return self._finite(values)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
-from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model, require_unit
+from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.named_faces import ALSO_OTHERS
+from klack.mesh.files.plausible import require_unit
 from klack.mesh.files.vtk.grid import VtkGrid, refuse
 from klack.mesh.files.vtk.legacy import read_legacy
 from klack.mesh.files.vtk.xml import read_xml

@@ -128,7 +128,7 @@ class _Reader:
         kind = np.dtype(self._order + _TYPES[name])
         form = array.get("format", "ascii")
         if form == "ascii":
-            values = numbers_in_text(where, array.text or "", kind)
+            values = numbers_in_text(where, (array.text or "").encode(), kind)
             if len(values) != count:
                 refuse(where, f"{len(values)} numbers", f"{count}, as the piece says")
             return values
