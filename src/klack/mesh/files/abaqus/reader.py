@@ -4,6 +4,9 @@ Read are nodes, solid and axisymmetric elements, sets, surfaces, instances of pa
 information, elastic materials and sections.  Steps, loads and constraints are passed over.  A set
 of surface elements (membranes, shells, plane elements: what gmsh and most preprocessors write for
 a named surface) becomes a surface, provided that every one of them lies on a solid element.
+
+Read by hand: meshio (5.3.5) reads one of two instances of a part and no surfaces, and refuses
+axisymmetric elements and numbers such as ``1.D0``.
 """
 
 from collections.abc import Sequence

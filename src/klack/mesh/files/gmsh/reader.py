@@ -2,6 +2,11 @@
 
 Physical groups name the parts: those of volumes are solids, those of surfaces on them are
 surfaces; all others are node sets.  A plane mesh in z = 0 is an axisymmetric body: x is r, y is z.
+
+Read by hand, not by meshio (5.3.5): that loses the numbers of the nodes and all physical groups of
+an entity but the first, takes another node for one that the file does not define, and reads no
+quadratic wedges and no file in which an entity has no group.  Nor is it faster (477 000 tetrahedra:
+3.5 s against 2.3 s as text, 0.4 s against 0.1 s binary).
 """
 
 from collections.abc import Sequence

@@ -4,6 +4,9 @@ Read are GRID in any coordinate system, the solids CTETRA, CHEXA and CPENTA (lin
 quadratic), PSOLID, MAT1, the surface elements CTRIA3, CTRIA6, CQUAD4 and CQUAD8 (each property of
 theirs becomes a surface), and sets of nodes.  Loads, constraints and solution control are passed
 over.
+
+Read by hand: meshio (5.3.5) takes points in a local coordinate system for global ones without a
+word, and reads no sets and names.
 """
 
 from collections.abc import Sequence

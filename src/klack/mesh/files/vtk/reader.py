@@ -3,6 +3,10 @@
 VTK has no names for parts.  An integer array of the cells tells the solids (``solid``,
 ``material``, ...) or surfaces apart, and arrays of 0 and 1 are sets.  A plane grid in z = 0 is an
 axisymmetric body: x is r, y is z.
+
+Read by hand: the reader of VTK (9.7, 560 MB installed) ends the process on a legacy file in which a
+line is missing; meshio (5.3.5) does not know the integers of type ``long`` that VTK writes into
+legacy files, and leaves out pixels and voxels.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
