@@ -11,6 +11,9 @@ A process that is killed before step 2 changes nothing.  Killed after it, the ne
 user that reads or writes the folder brings step 3 to its end first (:func:`completed`), unless
 somebody has replaced the files since.  What stands in the folder is the one truth for all readers:
 nothing is ever read from a stage.
+
+Written by hand: packages for atomic writing replace one file; here several that belong together
+change at once, and what a killed process left half done is finished by the next.
 """
 
 import errno

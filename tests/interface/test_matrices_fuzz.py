@@ -293,3 +293,17 @@ def test_rows_must_belong_to_the_nodes(tmp_path):
     plain = write_matrices("NumPy, csr", tmp_path, K, M, node, direction)
     with pytest.raises(InputError, match="21 rows for 5 nodes"):
         on_nodes(read_system(plain.stiffness, plain.mass), np.arange(5), 3)
+
+
+@pytest.mark.parametrize(
+    ("word", "value"), [("1.5D+03", 1500.0), ("2x", None), ("0x10", None), ("1.01e", None)]
+)
+def test_a_number_of_matrix_market_is_read_to_its_end(word, value, tmp_path):
+    """A reader that stops at the first other letter finds 1.5, 2, 0 and 1.01 here."""
+    path = tmp_path / "a.mtx"
+    path.write_text(f"%%MatrixMarket matrix coordinate real general\n2 2 2\n2 2 1\n1 1 {word}")
+    if value is None:
+        with pytest.raises(InputError, match=r"a\.mtx:4"):
+            read_matrix(path)
+    else:
+        assert read_matrix(path).matrix[0, 0] == value

@@ -20,6 +20,9 @@ so a rigid translation of both bodies changes no gap and the two resultants canc
 
 These multipliers pass the patch test; nodes as contact points do not, and dual hats have negative
 weights on quadratic faces, which create energy in impacts (Popp et al. 2012 on the latter).
+
+Written by hand: the packages for mortar weights are in C++ and Julia and part of other programs;
+none was found that Python could call on two free meshes.
 """
 
 from dataclasses import dataclass, replace

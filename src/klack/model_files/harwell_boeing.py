@@ -3,6 +3,9 @@
 Columns of the matrix are stored one after another: pointers, row numbers, values, each in a
 Fortran format that the heading names.  ``RSA`` is a real symmetric assembled matrix (its lower
 triangle), ``RUA`` an unsymmetric one, which must then hold both triangles.
+
+Read by hand, not by ``scipy.io.hb_read``: SciPy 1.17 refuses symmetric matrices, which is what
+HBMAT writes of K and M, right-hand sides, ``D`` exponents and numbers without a blank between.
 """
 
 from pathlib import Path

@@ -3,6 +3,9 @@
 Columns are stored one after another, each either whole from its first to its last non-zero row, or
 as strings of non-zeros.  The head of a string packs length and first row into one integer (up to
 65 535 rows), or holds them in two (BIGMAT).  Single and double precision are read.
+
+Read by hand: SciPy has no reader, and every count of a damaged file is checked against its bytes
+before memory is asked for.
 """
 
 from pathlib import Path
