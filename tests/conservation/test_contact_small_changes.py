@@ -39,7 +39,7 @@ def test_mean_of_a_power_law_keeps_its_digits(exponent, change, sign):
         a, b, n = Decimal(d0), Decimal(d1), Decimal(exponent) + 1
         expected = Decimal(7.5e9) / n * (b**n - a**n) / (b - a)
     # just above 1 % the difference of the potentials has lost two digits; exponents are doubles
-    assert mean == pytest.approx(float(expected), rel=2e-13)
+    assert mean == pytest.approx(float(expected), rel=2e-13, abs=0.0)
 
 
 @pytest.mark.parametrize("share", np.array([-0.96, -0.5, -0.1, 0.1, 0.5, 0.96, 1.04]) * 0.05)
@@ -51,7 +51,7 @@ def test_mean_shear_of_a_film_keeps_its_digits(share):
     force = film_force(0.0, 4e-12, 1e-7, h, x0 - 1e-7, x1 - 1e-7)
 
     # six terms leave 2/13 of the sixth power of 0.05^2 over 2: 2e-17; the gaps have lost a digit
-    assert force == pytest.approx(4e-12 * np.log1p(2.0 * share / (1.0 - share)) / h, rel=4e-14)
+    assert force == pytest.approx(4e-12 * np.log1p(2.0 * share / (1.0 - share)) / h, rel=4e-14, abs=0.0)
 
 
 @pytest.mark.parametrize("G", [1e-12, 1e-10, 1e-8])  # [m/N]
@@ -78,7 +78,7 @@ def test_a_damped_step_books_what_the_store_does_not_get(name, chi_over_h, G):
             if chi_over_h * (d1 - d0) <= -1.0 and before > 0.0:
                 clipped += 1
                 assert force == 0.0
-                assert loss == pytest.approx(before - after, rel=1e-12)
+                assert loss == pytest.approx(before - after, rel=1e-12, abs=0.0)
     if chi_over_h == 1e8:
         assert clipped >= 8
 
@@ -98,4 +98,4 @@ def test_a_clipped_contact_in_a_network_books_its_store(name, series):
 
     assert (contact, film, film_loss) == (0.0, 0.0, 0.0)
     assert before > after > 0.0
-    assert lost == pytest.approx(before - after, rel=1e-12)
+    assert lost == pytest.approx(before - after, rel=1e-12, abs=0.0)
