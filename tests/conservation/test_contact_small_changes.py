@@ -37,7 +37,7 @@ def test_mean_of_a_power_law_keeps_its_digits(exponent, change, sign):
     with localcontext() as exact:
         exact.prec = 40
         a, b, n = Decimal(d0), Decimal(d1), Decimal(exponent) + 1
-        expected = Decimal(7.5e9) / n * (b**n - a**n) / (b - a)
+        expected = Decimal("7.5e9") / n * (b**n - a**n) / (b - a)
     # just above 1 % the difference of the potentials has lost two digits; exponents are doubles
     assert mean == pytest.approx(float(expected), rel=2e-13, abs=0.0)
 
@@ -51,7 +51,9 @@ def test_mean_shear_of_a_film_keeps_its_digits(share):
     force = film_force(0.0, 4e-12, 1e-7, h, x0 - 1e-7, x1 - 1e-7)
 
     # six terms leave 2/13 of the sixth power of 0.05^2 over 2: 2e-17; the gaps have lost a digit
-    assert force == pytest.approx(4e-12 * np.log1p(2.0 * share / (1.0 - share)) / h, rel=4e-14, abs=0.0)
+    assert force == pytest.approx(
+        4e-12 * np.log1p(2.0 * share / (1.0 - share)) / h, rel=4e-14, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("G", [1e-12, 1e-10, 1e-8])  # [m/N]
