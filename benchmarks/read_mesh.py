@@ -21,7 +21,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.mesh.abaqus import read_abaqus
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import corner_volume
 from klack.verification.lattice import lattice_mesh

@@ -13,7 +13,7 @@ import warnings
 from pathlib import Path
 
 from klack.errors import InputError
-from klack.measurement.recording import open_recording
+from klack.measurement.files.opening import open_recording
 
 warnings.simplefilter("ignore")
 

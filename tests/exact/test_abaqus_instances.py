@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from klack.errors import AccuracyWarning
-from klack.mesh.abaqus import read_abaqus, read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
+from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Surface
-from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume
 
 MM = 1e-3

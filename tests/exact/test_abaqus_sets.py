@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.mesh.abaqus import read_abaqus, read_abaqus_model
-from klack.mesh.abaqus_deck import read_deck
+from klack.mesh.files.abaqus.deck import read_deck
+from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import corner_volume
 
@@ -174,7 +174,7 @@ def test_blocks_longer_than_a_piece(tmp_path, monkeypatch):
     """Records that are cut by the end of a piece are put together again."""
     whole = read(tmp_path / "x.inp", ROW)
     for size in (1, 7, 40, 90):
-        monkeypatch.setattr("klack.mesh.abaqus_keywords._PIECE", size)
+        monkeypatch.setattr("klack.mesh.files.abaqus.keywords._PIECE", size)
         cut = read(tmp_path / "x.inp", ROW)
 
         np.testing.assert_array_equal(cut.points, whole.points)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.mesh.abaqus import read_abaqus, read_abaqus_model
 from klack.mesh.families import FAMILIES
+from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.quality import corner_volume
 

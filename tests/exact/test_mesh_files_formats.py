@@ -16,9 +16,9 @@ from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.materials import Material
 from klack.mesh.families import FAMILIES
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.mesh_file import read_mesh_file
-from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume
 
 MM = 1e-3

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh
-from klack.mesh.mesh_file import read_mesh_file
 from klack.mesh.quality import corner_volume
 
 MM = 1e-3

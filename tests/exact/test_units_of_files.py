@@ -17,7 +17,7 @@ from klack.case.valve_reader import read_any_case
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.materials import Material
-from klack.mesh.mesh_file import read_mesh_file
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, write_step_revolved

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.mesh.abaqus import read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus_model
 
 DATA = Path(__file__).parents[1] / "data"
 BOX = (DATA / "block.inp").read_bytes()

@@ -25,9 +25,9 @@ from klack.exchange.calculix_deck import (
     write_deck,
 )
 from klack.materials import Material
-from klack.mesh.abaqus import read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus_model
+from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.mesh_model import MeshModel
 from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
 from klack.workflow.progress import silent

@@ -8,9 +8,9 @@ import pytest
 
 from klack.errors import AccuracyWarning, InputError
 from klack.measurement.channels import ChannelChoice
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import common_time, read_channels, windows
-from klack.measurement.recording import open_recording
 from klack.measurement.unit_text import roles_of_unit, unit_factor
 from klack.units import TIME
 

@@ -3,7 +3,7 @@
 import pytest
 
 from klack.errors import InputError
-from klack.mesh.abaqus import read_abaqus
+from klack.mesh.files.abaqus.reader import read_abaqus
 
 NODES = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n"
 TET = NODES + "*ELEMENT, TYPE=C3D4, ELSET=body\n1, 1, 2, 3, 4\n"
@@ -198,7 +198,7 @@ def test_unknown_solid_lists_the_known_ones(tmp_path):
 
 
 def test_size_of_all_files_is_limited(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.mesh.abaqus_keywords.LARGEST_BYTES", 100)
+    monkeypatch.setattr("klack.mesh.files.abaqus.keywords.LARGEST_BYTES", 100)
     (tmp_path / "x.inp").write_text(TET + "**" + 80 * "x")
 
     with pytest.raises(InputError, match="with all includes"):
@@ -206,7 +206,7 @@ def test_size_of_all_files_is_limited(tmp_path, monkeypatch):
 
 
 def test_members_of_all_sets_are_limited(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.mesh.abaqus_sets.LARGEST_MEMBERS", 5)
+    monkeypatch.setattr("klack.mesh.files.abaqus.sets.LARGEST_MEMBERS", 5)
     (tmp_path / "x.inp").write_text(TET + "*NSET, NSET=a\n1, 2\n*NSET, NSET=b, ELSET=body\n")
 
     with pytest.raises(InputError, match=r"x.inp:10: got sets of 6 members"):
@@ -214,7 +214,7 @@ def test_members_of_all_sets_are_limited(tmp_path, monkeypatch):
 
 
 def test_nodes_of_all_instances_are_limited(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.mesh.abaqus_instances.LARGEST_NODES", 7)
+    monkeypatch.setattr("klack.mesh.files.abaqus.instances.LARGEST_NODES", 7)
     again = INSTANCE.replace("NAME=i", "NAME=j")
     (tmp_path / "x.inp").write_text(PART + INSTANCE + again)
 

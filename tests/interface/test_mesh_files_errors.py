@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.mesh.mesh_file import read_mesh_file
+from klack.mesh.files.mesh_file import read_mesh_file
 
 MM = 1e-3
 

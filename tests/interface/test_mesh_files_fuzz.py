@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
 
 CDB = """/COM,ANSYS RELEASE
 /UNITS,MPA

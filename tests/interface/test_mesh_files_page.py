@@ -6,7 +6,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 from klack.case.geometry import Geometry
-from klack.mesh.mesh_file import MESH_FORMATS
+from klack.mesh.files.catalogue import MESH_FORMATS
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/bring-a-mesh.md").read_text()
 

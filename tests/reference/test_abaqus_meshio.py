@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from klack.mesh.abaqus import read_abaqus, read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
 from klack.mesh.quality import corner_volume
 from klack.verification.lattice import lattice_mesh
 

@@ -18,9 +18,9 @@ from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.exchange.calculix_run import find_calculix, run_calculix
 from klack.materials import Material
-from klack.mesh.ansys_archive import read_ansys_archive
+from klack.mesh.files.ansys.reader import read_ansys_archive
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh
-from klack.mesh.mesh_file import read_mesh_file
 from klack.model_files.system import on_nodes, read_system
 from klack.unit_systems import unit_system
 from klack.verification.lattice import lattice_mesh

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.mesh.ansys_archive import read_ansys_archive
+from klack.mesh.files.ansys.reader import read_ansys_archive
 from klack.mesh.quality import corner_volume
 
 mapdl_archive = pytest.importorskip("mapdl_archive")

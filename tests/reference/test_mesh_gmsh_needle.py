@@ -11,7 +11,7 @@ import pytest
 
 from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
-from klack.mesh.abaqus import read_abaqus
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import mesh_summary, require_connected
 

@@ -1,22 +1,19 @@
 """Checks that need more than one section of a case."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from klack.case.bodies import CaseFile, SurfaceName
 from klack.case.given_consistency import check_given, check_port
+from klack.case.impact_sections import ImpactSections
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
-
-if TYPE_CHECKING:
-    from klack.case.bodies import CaseFile, SurfaceName
-    from klack.case.schema import Case
 
 __all__ = ["check_body", "check_consistency", "check_surface", "require_known"]
 
 
-def check_consistency(case: "Case") -> None:
+def check_consistency(case: ImpactSections) -> None:
     """Raise :class:`CaseProblem` for the first contradiction between sections."""
     _check_bodies(case)
     for i, surface in enumerate(case.contact.between):
@@ -57,7 +54,7 @@ def require_known(
         )
 
 
-def _check_bodies(case: "Case") -> None:
+def _check_bodies(case: ImpactSections) -> None:
     count, words = (2, "two") if case.opposite is None else (3, "three")
     if len(case.bodies) != count:
         raise CaseProblem(
@@ -68,7 +65,7 @@ def _check_bodies(case: "Case") -> None:
         )
 
 
-def check_surface(case: "CaseFile", key: Key, surface: "SurfaceName") -> None:
+def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
     """Check that a body has the surface that ``key`` names, as far as a drawing tells."""
     require_known(key, surface.body, case.bodies, "body")
     body = case.bodies[surface.body]
@@ -79,7 +76,7 @@ def check_surface(case: "CaseFile", key: Key, surface: "SurfaceName") -> None:
         require_known(key, surface.surface, profile.surfaces, f"surface of {surface.body}")
 
 
-def _check_roles(case: "Case") -> None:
+def _check_roles(case: ImpactSections) -> None:
     moving, stop = case.contact.between
     if moving.body == stop.body:
         raise CaseProblem(
@@ -107,13 +104,13 @@ def _check_roles(case: "Case") -> None:
         )
 
 
-def check_body(case: "CaseFile", name: str) -> None:
+def check_body(case: CaseFile, name: str) -> None:
     """Check the materials of a body and the surfaces that its supports and mesh name."""
     _check_materials(case, name)
     _check_surfaces(case, name)
 
 
-def _check_materials(case: "CaseFile", name: str) -> None:
+def _check_materials(case: CaseFile, name: str) -> None:
     body = case.bodies[name]
     key: Key = ("bodies", name, "material")
     if isinstance(body.material, str):
@@ -137,7 +134,7 @@ def _check_materials(case: "CaseFile", name: str) -> None:
                 )
 
 
-def _check_surfaces(case: "CaseFile", name: str) -> None:
+def _check_surfaces(case: CaseFile, name: str) -> None:
     body = case.bodies[name]
     if body.geometry.profile is None:
         return  # the names are inside the file; the mesh says which are missing
@@ -150,7 +147,7 @@ def _check_surfaces(case: "CaseFile", name: str) -> None:
         require_known(key, surface, known, f"surface of {name}", on_key=True)
 
 
-def _check_local_law(case: "Case") -> None:
+def _check_local_law(case: ImpactSections) -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
     if not case.has_surfaces:
         return  # in given_consistency
@@ -171,7 +168,7 @@ def _check_local_law(case: "Case") -> None:
         )
 
 
-def _check_opposite(case: "Case") -> None:
+def _check_opposite(case: ImpactSections) -> None:
     if case.opposite is None:
         return
     for i, surface in enumerate(case.opposite.between):
@@ -194,7 +191,7 @@ def _check_opposite(case: "Case") -> None:
         )
 
 
-def _check_solid_only(case: "Case") -> None:
+def _check_solid_only(case: ImpactSections) -> None:
     """Refuse what breaks the symmetry of axisymmetric bodies."""
     if case.dimension == 3:
         return
@@ -215,7 +212,7 @@ def _check_solid_only(case: "Case") -> None:
         )
 
 
-def _check_guide(case: "Case") -> None:
+def _check_guide(case: ImpactSections) -> None:
     guide = case.guide
     profile = case.moving_body.geometry.profile
     if guide is None or profile is None:
@@ -238,7 +235,7 @@ def _check_guide(case: "Case") -> None:
             )
 
 
-def _check_shots(case: "Case") -> None:
+def _check_shots(case: ImpactSections) -> None:
     shots = case.shots
     if shots is None:
         return

@@ -4,13 +4,9 @@ Such bodies meet at one port each.  What needs faces (point by point contact, pl
 sound) is refused here, before anything is read.
 """
 
-from typing import TYPE_CHECKING
-
+from klack.case.bodies import CaseBody, CaseFile, SurfaceName
+from klack.case.impact_sections import ImpactSections
 from klack.input.problem import CaseProblem, Key, nearest, one_of
-
-if TYPE_CHECKING:
-    from klack.case.bodies import CaseBody, CaseFile, SurfaceName
-    from klack.case.schema import Case
 
 __all__ = ["GIVEN_LEVELS", "check_given", "check_port", "require_surfaces"]
 
@@ -20,7 +16,7 @@ GIVEN_LEVELS = ("lumped", "reduced")
 _ON_SURFACES = ("guide", "opposite", "shots", "noise", "measurement")
 
 
-def check_port(key: Key, surface: "SurfaceName", body: "CaseBody") -> None:
+def check_port(key: Key, surface: SurfaceName, body: CaseBody) -> None:
     """Check that a body without surfaces has a port or node set of that name."""
     if body.reduced is not None:
         known, what = list(body.reduced.ports), "port"
@@ -37,7 +33,7 @@ def check_port(key: Key, surface: "SurfaceName", body: "CaseBody") -> None:
         )
 
 
-def require_surfaces(case: "CaseFile", name: str) -> None:
+def require_surfaces(case: CaseFile, name: str) -> None:
     """Refuse a body without surfaces in a whole valve, whose stops solve their static contact."""
     body = case.bodies[name]
     if not body.has_surfaces:
@@ -52,7 +48,7 @@ def require_surfaces(case: "CaseFile", name: str) -> None:
         )
 
 
-def check_given(case: "Case") -> None:
+def check_given(case: ImpactSections) -> None:
     """Raise :class:`CaseProblem` for what needs the surfaces that a body does not have."""
     name = next(name for name, body in case.bodies.items() if not body.has_surfaces)
     what = "a reduced model" if case.bodies[name].reduced is not None else "nodes alone"
@@ -92,7 +88,7 @@ def check_given(case: "Case") -> None:
             )
 
 
-def _check_law(case: "Case", name: str, what: str) -> None:
+def _check_law(case: ImpactSections, name: str, what: str) -> None:
     law = case.contact.local_law
     if law.kind not in ("linear", "hertz"):
         raise CaseProblem(

@@ -1,28 +1,22 @@
 """Checks of the section ``noise`` against the bodies and materials of its case."""
 
-from typing import TYPE_CHECKING, cast
-
 from klack.case.consistency import check_surface, require_known
+from klack.case.impact_sections import ImpactSections
 from klack.case.valve_roles import find_roles
+from klack.case.valve_sections import ValveSections
 from klack.input.problem import CaseProblem, Key, one_of
-
-if TYPE_CHECKING:
-    from klack.case.schema import Case
-    from klack.case.valve import ValveCase
 
 __all__ = ["check_noise"]
 
 
-def _moving(case: "Case | ValveCase") -> str:
+def _moving(case: ImpactSections | ValveSections) -> str:
     """Body that makes sense without a support: the one that hits, or the needle."""
-    contact = getattr(case, "contact", None)
-    if contact is not None:
-        return str(contact.moving.body)
-    valve = cast("ValveCase", case)
-    return str(getattr(valve.network.components[find_roles(valve).needle], "body", ""))
+    if isinstance(case, ImpactSections):
+        return case.contact.moving.body
+    return str(getattr(case.network.components[find_roles(case).needle], "body", ""))
 
 
-def check_noise(case: "Case | ValveCase") -> None:
+def check_noise(case: ImpactSections | ValveSections) -> None:
     """Raise :class:`CaseProblem` if the noise section names what the case does not have."""
     noise = case.noise
     if noise is None:

@@ -1,19 +1,16 @@
 """A case: two bodies, their contact, and what shall be computed.
 
-The classes are the YAML file, key by key, in SI.  Checks that need more than one section are in
-:mod:`klack.case.consistency`.
+Its sections are the YAML file, key by key, in SI: :mod:`klack.case.impact_sections`.
 """
 
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Literal, Self
+from collections.abc import Iterable
+from typing import Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import model_validator
 
 from klack.case.bodies import (
     BodyDamping,
-    BodySurface,
     CaseBody,
-    CaseFile,
     CaseMaterial,
     ModeChoice,
     RayleighCoefficients,
@@ -22,26 +19,28 @@ from klack.case.bodies import (
 )
 from klack.case.consistency import check_consistency
 from klack.case.guide import CaseGuide
-from klack.case.measurement import CaseMeasurement
-from klack.case.noise import CaseNoise
+from klack.case.impact_sections import (
+    LEVELS,
+    CaseContact,
+    ConsistentLocalLaw,
+    HertzLocalLaw,
+    ImpactSections,
+    Level,
+    LinearLocalLaw,
+    LocalLaw,
+    Lumped,
+    Motion,
+    Run,
+    Spring,
+    SubmodelLocalLaw,
+    TransferSweep,
+)
 from klack.case.noise_consistency import check_noise
 from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
-from klack.input.section import Count, Name, Section
-from klack.units import (
-    Force,
-    Frequency,
-    Length,
-    Modulus,
-    Ratio,
-    Speed,
-    Stiffness,
-    Time,
-    format_si,
-)
+from klack.input.problem import nearest, one_of
 
 __all__ = [
     "LEVELS",
@@ -71,247 +70,15 @@ __all__ = [
     "TransferSweep",
 ]
 
-Level = Literal[
-    "lumped",
-    "reduced",
-    "reduced-attachment",
-    "reduced-none",
-    "reduced-participation",
-    "interface",
-    "full",
-]
-LEVELS: tuple[Level, ...] = (
-    "lumped",
-    "reduced",
-    "reduced-attachment",
-    "reduced-none",
-    "reduced-participation",
-    "interface",
-    "full",
-)
-_MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
-_STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
-
-class ConsistentLocalLaw(Section):
-    """Massless law that carries exactly the compliance that the kept modes miss."""
-
-    kind: Literal["consistent"] = Field(description="Which law: consistent.")
-
-
-class LinearLocalLaw(Section):
-    """Constant local stiffness."""
-
-    kind: Literal["linear"] = Field(description="Which law: linear.")
-    stiffness: Stiffness = Field(
-        examples=["1e10 N/m"], gt=0, description="Stiffness of the contact zone alone."
-    )
-
-
-class HertzLocalLaw(Section):
-    """Hertz (1882) for smooth curved bodies, F = 4/3 E* sqrt(R) d^(3/2)."""
-
-    kind: Literal["hertz"] = Field(description="Which law: hertz.")
-    radius: Length = Field(gt=0, description="Effective radius R: 1/R = 1/R1 + 1/R2.")
-    modulus: Modulus | None = Field(
-        default=None,
-        gt=0,
-        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; that of the "
-        "materials without.",
-    )
-
-
-class SubmodelLocalLaw(Section):
-    """Constant stiffness from a static model of the contact zone alone."""
-
-    kind: Literal["submodel"] = Field(description="Which law: submodel.")
-    size: Length = Field(gt=0, description="Radius of the zone around the first touch.")
-
-
-LocalLaw = Annotated[
-    ConsistentLocalLaw | LinearLocalLaw | HertzLocalLaw | SubmodelLocalLaw,
-    Field(discriminator="kind"),
-]
-
-
-class CaseContact(Section):
-    """Which surfaces meet, and how."""
-
-    between: tuple[BodySurface, BodySurface] = Field(
-        description="Surface of the moving upper body, then surface of the body that it hits."
-    )
-    gap: Length | None = Field(
-        default=None,
-        description="Distance to first touch along z at the start; without it, as drawn.",
-    )
-    reach: Length | None = Field(
-        default=None, gt=0, description="Largest gap of points that may come into contact."
-    )
-    local_law: LocalLaw = Field(
-        default=ConsistentLocalLaw(kind="consistent"), description="Local law of the reduced level."
-    )
-
-    @field_validator("gap", mode="after")
-    @classmethod
-    def _not_penetrated(cls, gap: float | None) -> float | None:
-        if gap is not None and gap < 0:
-            raise CaseProblem(
-                (),
-                got=f"a gap of {format_si(gap, 'm')}: the bodies penetrate already",
-                expected="0 or more",
-                hint="give the distance to first touch; the upper body is moved there.",
-            )
-        return gap
-
-    @property
-    def moving(self) -> SurfaceName:
-        """Surface of the upper body, which moves in -z."""
-        return self.between[0]
-
-    @property
-    def stop(self) -> SurfaceName:
-        """Surface of the lower body."""
-        return self.between[1]
-
-
-class Spring(Section):
-    """Massless spring that closes: it pushes the moving body down onto the stop."""
-
-    stiffness: Stiffness = Field(gt=0, description="Spring rate.")
-    preload: Force = Field(ge=0, description="Force at first touch.")
-
-
-class Motion(Section):
-    """How the moving body arrives."""
-
-    speed: Speed = Field(gt=0, description="Speed in -z at the start, towards the stop.")
-    force: Force = Field(
-        default=0.0, description="Constant force on the moving body, positive in -z (closing)."
-    )
-    spring: Spring | None = Field(default=None, description="Closing spring.")
-    placement: Placement = Field(
-        default=Placement(), description="Off the axis or leaning; centred and upright without."
-    )
-
-    @property
-    def closing_force(self) -> float:
-        """Force that presses the bodies together at first touch [N]."""
-        return self.force + (self.spring.preload if self.spring else 0.0)
-
-
-class TransferSweep(Section):
-    """Frequencies of the transfer functions that klack reduce compares."""
-
-    lowest: Frequency = Field(alias="from", gt=0, description="Lowest frequency.")
-    highest: Frequency = Field(alias="to", gt=0, description="Highest frequency.")
-    points: Count = Field(
-        default=200, ge=2, le=5000, description="Number of frequencies, logarithmic."
-    )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.highest <= self.lowest:
-            raise CaseProblem(
-                ("to",),
-                got=format_si(self.highest, "Hz"),
-                expected=f"a frequency above 'from' ({format_si(self.lowest, 'Hz')})",
-                hint="swap them.",
-            )
-        return self
-
-
-class Run(Section):
-    """What is computed."""
-
-    duration: Time = Field(
-        examples=["50 us"], gt=0, description="Time to compute, from the start of the motion."
-    )
-    reduced_step: Time = Field(default=20e-9, gt=0, description="Time step of the reduced levels.")
-    interface_step: Time = Field(
-        default=40e-9, gt=0, description="Time step of the interface level."
-    )
-    full_step: Time = Field(default=50e-9, gt=0, description="Time step of the full order.")
-    levels: tuple[Level, ...] = Field(
-        default=("reduced", "full"), min_length=1, description="Levels that klack impact runs."
-    )
-    transfer: TransferSweep | None = Field(
-        default=None, description="Transfer functions to compare."
-    )
-
-    @model_validator(mode="after")
-    def _steps(self) -> Self:
-        for name, most in _MOST_STEPS.items():
-            step = getattr(self, name)
-            used = _STEP_OF_LEVEL.get(name, self.levels[0]) in self.levels
-            if used and not 4 * step <= self.duration <= most * step:
-                raise CaseProblem(
-                    ("duration",),
-                    got=f"{self.duration / step:.4g} steps of {format_si(step, 's')} ({name})",
-                    expected=f"4 to {most} steps",
-                    hint="impacts of steel parts last 5 to 50 us; steps of 20 to 50 ns are usual.",
-                )
-        return self
-
-
-class Lumped(Section):
-    """Rigid masses on one spring: the baseline."""
-
-    stiffness: Stiffness = Field(gt=0, description="Contact spring; 1e9 N/m is usual.")
-    restitution: Ratio | None = Field(
-        default=None,
-        gt=0,
-        le=1,
-        description="Dashpot in parallel (Hunt and Crossley 1975), given by the speed ratio that "
-        "it leaves; no loss without.",
-    )
-
-
-class Case(CaseFile):
+class Case(ImpactSections):
     """One impact of two bodies, from geometry to results."""
-
-    bodies: Mapping[Name, CaseBody] = Field(description="name: body; exactly two.")
-    contact: CaseContact = Field(description="Which surfaces meet.")
-    motion: Motion = Field(description="How the moving body arrives.")
-    guide: CaseGuide | None = Field(default=None, description="Guide of the moving body.")
-    opposite: CaseOpposite | None = Field(
-        default=None, description="Stop above, a third body, for bounces between both ends."
-    )
-    reduction: Reduction = Field(
-        default=Reduction(), description="Kept modes and their correction."
-    )
-    run: Run = Field(description="Levels, steps, duration.")
-    lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
-    shots: Shots | None = Field(default=None, description="What klack shots draws.")
-    measurement: CaseMeasurement | None = Field(
-        default=None, description="How drops of this valve were measured."
-    )
-    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         check_consistency(self)
         check_noise(self)
         return self
-
-    @property
-    def moving_body(self) -> CaseBody:
-        """Upper body."""
-        return self.bodies[self.contact.moving.body]
-
-    @property
-    def stop_body(self) -> CaseBody:
-        """Body that is hit."""
-        return self.bodies[self.contact.stop.body]
-
-    @property
-    def dimension(self) -> int:
-        """2 if both bodies are axisymmetric, else 3."""
-        return self.moving_body.geometry.dimension
-
-    @property
-    def has_surfaces(self) -> bool:
-        """False where a body is a reduced model or nodes alone; see :class:`CaseBody`."""
-        return all(body.has_surfaces for body in self.bodies.values())
 
     def require_levels(self, levels: Iterable[str]) -> tuple[Level, ...]:
         """Check that this case can run the levels; return them without repetition."""

@@ -1,20 +1,16 @@
 """Checks of a case of a whole valve that need more than one section."""
 
-from typing import TYPE_CHECKING
-
 from klack.case.consistency import check_body, check_surface, require_known
 from klack.case.given_consistency import require_surfaces
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
+from klack.case.valve_sections import ValveSections
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.network.component import Component
-
-if TYPE_CHECKING:
-    from klack.case.valve import ValveCase
 
 __all__ = ["check_valve", "is_consistent"]
 
 
-def check_valve(case: "ValveCase") -> None:
+def check_valve(case: ValveSections) -> None:
     """Raise :class:`CaseProblem` for the first contradiction between sections."""
     for name in case.bodies:
         require_surfaces(case, name)
@@ -39,7 +35,7 @@ def check_valve(case: "ValveCase") -> None:
     find_roles(case)
 
 
-def _check_ports(case: "ValveCase", name: str) -> None:
+def _check_ports(case: ValveSections, name: str) -> None:
     body = case.bodies[name]
     for port, place in body.ports.items():
         key: Key = ("bodies", name, "ports", port)
@@ -57,7 +53,7 @@ def _check_ports(case: "ValveCase", name: str) -> None:
             )
 
 
-def _check_flexible_bodies(case: "ValveCase") -> None:
+def _check_flexible_bodies(case: ValveSections) -> None:
     """Every flexible body of the network is a body of the case, once, at points that it has."""
     used: dict[str, str] = {}
     for name, part in case.network.components.items():
@@ -89,13 +85,13 @@ def _check_flexible_bodies(case: "ValveCase") -> None:
             )
 
 
-def _points(case: "ValveCase", body: str) -> tuple[str, ...] | None:
+def _points(case: ValveSections, body: str) -> tuple[str, ...] | None:
     """Names of the points of a body; None when only its mesh can tell."""
     profile = case.bodies[body].geometry.profile
     return None if profile is None else (*case.bodies[body].ports, *profile.surfaces)
 
 
-def _check_stop(case: "ValveCase", name: str, meetings: dict[str, Meeting]) -> None:
+def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) -> None:
     key: Key = ("stops", name)
     stop = case.stops[name]
     for i, surface in enumerate(stop.between):
@@ -137,7 +133,7 @@ def _check_stop(case: "ValveCase", name: str, meetings: dict[str, Meeting]) -> N
             )
 
 
-def _check_laws(case: "ValveCase") -> None:
+def _check_laws(case: ValveSections) -> None:
     """A consistent law needs surfaces, and a correction that leaves something to it."""
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):

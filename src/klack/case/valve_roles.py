@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from klack.case.valve_sections import ValveSections
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.travel import StopBound, Travel
-
-if TYPE_CHECKING:
-    from klack.case.valve import ValveCase
 
 __all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
 
@@ -60,7 +57,7 @@ def find_meetings(network: Network) -> dict[str, Meeting]:
     }
 
 
-def find_roles(case: "ValveCase") -> ValveRoles:
+def find_roles(case: ValveSections) -> ValveRoles:
     """Find needle, seat and opening stop of a case.
 
     Raises
@@ -91,7 +88,7 @@ def find_roles(case: "ValveCase") -> ValveRoles:
     return ValveRoles(needle=needle, point=point, seat=seat, opening_stop=opening)
 
 
-def _travel(case: "ValveCase", network: Network, meetings: Mapping[str, Meeting]) -> Travel:
+def _travel(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:
     """How far the end stops that have a law let the free bodies go."""
 
     def free(side: tuple[str, str] | None) -> str | None:
@@ -106,7 +103,7 @@ def _travel(case: "ValveCase", network: Network, meetings: Mapping[str, Meeting]
     return Travel(bounds)
 
 
-def _needle(case: "ValveCase", points: dict[str, tuple[str, ...]]) -> str:
+def _needle(case: ValveSections, points: dict[str, tuple[str, ...]]) -> str:
     """Component that moves: named by the lift, or the only one that nothing fixes."""
     lift = case.run.lift
     if lift is not None:
@@ -133,7 +130,7 @@ def _needle(case: "ValveCase", points: dict[str, tuple[str, ...]]) -> str:
     return free[0]
 
 
-def _held(case: "ValveCase", name: str) -> bool:
+def _held(case: ValveSections, name: str) -> bool:
     part = case.network.components[name]
     body = str(getattr(part, "body", "")) if part.type == FLEXIBLE_BODY else ""
     return body in case.bodies and bool(case.bodies[body].fixed)

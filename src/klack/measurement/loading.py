@@ -12,10 +12,11 @@ from klack.errors import InputError
 from klack.measurement.alignment import common_axis, covers, onto_axis
 from klack.measurement.channels import Channels
 from klack.measurement.cutting import Piece, cut_strokes, trigger_level, whole_piece
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import FoundChannel, find_channels
 from klack.measurement.outliers import find_outliers
 from klack.measurement.read_channels import common_time, read_channels, windows
-from klack.measurement.recording import Recording, open_recording
+from klack.measurement.recording import Recording
 from klack.measurement.roles import ROLES, Role
 from klack.measurement.stroke_set import MeasuredStroke, Rejection, StrokeSet
 from klack.measurement.trigger import Trigger

@@ -1,1 +1,1 @@
-"""Meshes of bodies: families, named surfaces, profiles, sweeping, CAD, readers."""
+"""Meshes of bodies: families, named surfaces, profiles, sweeping, CAD."""

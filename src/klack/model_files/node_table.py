@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.model_files.number_lines import number_rows, numbers_in, whole_numbers
 
 __all__ = ["read_node_numbers", "read_node_table"]

@@ -3,13 +3,13 @@
 Numbers stand between blanks, tabs, commas or semicolons; ``1.5D+03`` of Fortran is a number.
 """
 
-import warnings
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.input.plain_numbers import plain_numbers
 
 __all__ = ["number_rows", "numbers_in", "whole_numbers"]
 
@@ -22,15 +22,7 @@ _SHOWN = 40
 
 def numbers_in(text: bytes) -> NDArray[np.float64] | None:
     """All numbers of a text, or None if there is anything else in it."""
-    plain = text.translate(_PLAIN)
-    if not plain.strip():
-        return np.empty(0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            return np.fromstring(plain, sep=" ")
-        except (ValueError, DeprecationWarning):
-            return None
+    return plain_numbers(text.translate(_PLAIN))
 
 
 def number_rows(

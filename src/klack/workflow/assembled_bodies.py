@@ -13,8 +13,8 @@ from klack.case.geometry import NodeTable
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.given_matrices import MatrixReport, checked_body
 from klack.errors import AccuracyWarning, InputError
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh
-from klack.mesh.mesh_file import read_mesh_file
 from klack.model_files.node_table import read_node_numbers, read_node_table
 from klack.model_files.system import NodeSystem, on_nodes, read_system
 from klack.workflow.held_nodes import held_nodes

@@ -14,8 +14,8 @@ from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.mesh_file import read_mesh_file
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.units import format_si

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from klack.case.calibration import free_parameters
 from klack.case.case_tree import CaseTree
+from klack.case.free_parameters import free_parameters
 from klack.case.rewriting import moved_files, rewritten, written_quantity
 from klack.case.valve_reader import read_valve_case
 from klack.units import format_si

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import __version__
-from klack.case.calibration import CaseCalibration, FreeParameter, free_parameters
+from klack.case.calibration import CaseCalibration
 from klack.case.case_tree import CaseTree
+from klack.case.free_parameters import FreeParameter, free_parameters
 from klack.case.key_path import written_at
 from klack.case.measurement import CaseMeasurement
 from klack.case.valve import ValveCase

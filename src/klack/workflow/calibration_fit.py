@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.case.calibration import FreeParameter
+from klack.case.free_parameters import FreeParameter
 from klack.measurement.computed_stroke import recorded_stroke
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.trigger import Trigger

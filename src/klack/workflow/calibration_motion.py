@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.case.calibration import FreeParameter
 from klack.case.case_tree import CaseTree
+from klack.case.free_parameters import FreeParameter
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.local_law import LocalLaw

@@ -101,7 +101,7 @@ def run_impact(
     ----------
     case : Case
     levels : sequence of str
-        Among :data:`klack.case.schema.LEVELS`.
+        Among :data:`klack.case.impact_sections.LEVELS`.
     certify : bool
         Estimate the error of reduced levels by one interface-level run with twice as many modes;
         bodies without surfaces have no such level.

@@ -10,9 +10,10 @@ from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
 from klack.input.existing_file import refuse_lfs_pointer
 from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
-from klack.mesh.mesh_file import MESH_FORMATS, read_mesh_file
-from klack.mesh.mesh_model import MeshModel
 from klack.mesh.quality import corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix

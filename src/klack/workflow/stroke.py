@@ -59,7 +59,7 @@ def run_stroke(
     ----------
     case : ValveCase
     variants : sequence of str
-        Among :data:`klack.case.valve.VARIANTS`; those of the case by default.
+        Among :data:`klack.case.valve_sections.VARIANTS`; those of the case by default.
     after : StrokeStudy, optional
         Go on where this study of the same case ended: time goes on, for another duration.
     progress : callable

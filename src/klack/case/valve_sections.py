@@ -1,0 +1,151 @@
+"""Sections of a case of a whole valve, key by key as in the YAML file, in SI.
+
+:class:`ValveSections` holds them all; what contradicts each other is found by
+:mod:`klack.case.valve_consistency`, and :class:`klack.case.valve.ValveCase` is what passed.
+"""
+
+from collections.abc import Mapping
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
+from klack.case.calibration import CaseCalibration
+from klack.case.impact_sections import Lumped
+from klack.case.measurement import CaseMeasurement
+from klack.case.noise import CaseNoise
+from klack.input.problem import CaseProblem
+from klack.input.section import Count, Name, Section
+from klack.network.declaration import NetworkSection
+from klack.units import Force, Length, Speed, Time, format_si
+
+__all__ = [
+    "VARIANTS",
+    "BodyPort",
+    "CaseStop",
+    "StrokeRun",
+    "ValveBody",
+    "ValveSections",
+    "Variant",
+]
+
+Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]
+VARIANTS: tuple[Variant, ...] = ("wet", "dry", "wet-lumped", "dry-lumped")
+_MOST_STEPS = 20_000_000_000
+_MOST_RECORDS = 2_000_000
+
+
+class BodyPort(Section):
+    """A place of a body where the network pushes it."""
+
+    surface: Name = Field(description="Name of the surface.")
+    load: Literal["axial", "pressure"] = Field(
+        default="axial",
+        description="axial: evenly spread along z; pressure: normal to the surface everywhere, "
+        "so that a cone is squeezed as well.",
+    )
+
+
+class ValveBody(CaseBody):
+    """An elastic body of a valve."""
+
+    ports: Mapping[Name, BodyPort] = Field(
+        default_factory=dict,
+        description="Points for the network with a name or a load of their own; every named "
+        "surface is a point already, loaded along the axis.",
+    )
+
+
+class CaseStop(Section):
+    """Two surfaces that hit each other; the end stop of the same name in the network acts there.
+
+    Their static contact gives the consistent law of that end stop.
+    """
+
+    between: tuple[BodySurface, BodySurface] = Field(
+        description="Surface of the upper body, then surface of the lower one."
+    )
+    speed: Speed = Field(gt=0, description="Fastest impact that the law must hold.")
+    force: Force = Field(
+        default=0.0, ge=0, description="Greatest force that presses the two together meanwhile."
+    )
+    reach: Length | None = Field(
+        default=None, gt=0, description="Largest gap of points that may come into contact."
+    )
+
+    @property
+    def upper(self) -> SurfaceName:
+        """Surface of the upper body."""
+        return self.between[0]
+
+    @property
+    def lower(self) -> SurfaceName:
+        """Surface of the lower body."""
+        return self.between[1]
+
+
+class StrokeRun(Section):
+    """What is computed."""
+
+    duration: Time = Field(
+        examples=["5 ms"], gt=0, description="Time to compute, from the start of the drivers."
+    )
+    step: Time = Field(default=20e-9, gt=0, description="Fine time step.")
+    coarse: Count = Field(
+        default=16, le=256, description="Fine steps in a coarse one, taken far from the stops."
+    )
+    record: Time = Field(default=1e-6, gt=0, description="Spacing of the recorded channels.")
+    variants: tuple[Variant, ...] = Field(
+        default=("wet",),
+        min_length=1,
+        description="wet: as described; dry: without fluid; with -lumped: rigid bodies on one "
+        "spring per stop.",
+    )
+    lift: BodySurface | None = Field(
+        default=None,
+        description="Point of a body whose displacement is the lift, as component.point; "
+        "the point of the needle at the seat without.",
+    )
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        for key, spacing, most, what in (
+            ("step", self.step, _MOST_STEPS, "steps"),
+            ("record", self.record, _MOST_RECORDS, "records"),
+        ):
+            if not 10 * spacing <= self.duration <= most * spacing:
+                raise CaseProblem(
+                    (key,),
+                    got=f"{self.duration / spacing:.4g} {what} of {format_si(spacing, 's')}",
+                    expected=f"10 to {most} {what}",
+                    hint="strokes of small valves last 2 to 20 ms; a step of 20 ns is usual.",
+                )
+        return self
+
+
+class ValveSections(CaseFile):
+    """All sections of a valve, not yet checked against each other."""
+
+    materials: Mapping[Name, CaseMaterial] = Field(
+        default_factory=dict, description="name: properties."
+    )
+    bodies: Mapping[Name, ValveBody] = Field(
+        default_factory=dict,
+        description="name: elastic body; the network refers to them by flexible-body.",
+    )
+    stops: Mapping[Name, CaseStop] = Field(
+        default_factory=dict, description="name of an end stop in the network: its surfaces."
+    )
+    reduction: Reduction = Field(
+        default=Reduction(), description="Kept modes and their correction."
+    )
+    network: NetworkSection = Field(description="Components of the valve and how they are joined.")
+    run: StrokeRun = Field(description="Duration, steps and variants.")
+    lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
+    measurement: CaseMeasurement | None = Field(
+        default=None, description="How strokes of this valve were measured."
+    )
+    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
+    calibration: CaseCalibration | None = Field(
+        default=None, description="What klack calibrate fits to measured strokes."
+    )

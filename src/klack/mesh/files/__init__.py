@@ -1,0 +1,1 @@
+"""Finished meshes from files of other programs, one folder for each format."""

@@ -1,0 +1,85 @@
+"""Every format of mesh files that klack reads."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from klack.mesh.files.mesh_model import MeshModel
+
+__all__ = ["FORMATS", "MESH_FORMATS", "MeshFormat", "MeshReader", "format_of"]
+
+
+class MeshReader(Protocol):
+    """What reads a mesh file; see :func:`klack.mesh.files.mesh_file.read_mesh_file`."""
+
+    def __call__(
+        self,
+        path: Path,
+        unit_length: float | None,
+        *,
+        solids: Sequence[str] | None,
+        solids_only: bool,
+    ) -> MeshModel:
+        """Read the mesh; raise where neither the call nor the file gives a unit of length."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFormat:
+    """One format.
+
+    Parameters
+    ----------
+    path : str
+        Where its :class:`MeshReader` is, below ``klack.mesh.files``.
+    program : str
+        Whose files these are, in words.
+    endings : tuple of str
+        Of the names of such files.
+    mark : bytes, optional
+        Pattern of a line that only these files have: it decides where formats share an ending.
+    """
+
+    path: str
+    program: str
+    endings: tuple[str, ...]
+    mark: bytes = b""
+
+    @property
+    def reader(self) -> MeshReader:
+        """The function that reads such files; imported when it is asked for."""
+        module, _, name = self.path.rpartition(".")
+        return cast("MeshReader", getattr(import_module(f"klack.mesh.files.{module}"), name))
+
+    def marks(self, path: Path) -> bool:
+        """Whether a file has the mark of this format."""
+        return bool(re.search(self.mark, path.read_bytes(), re.IGNORECASE | re.MULTILINE))
+
+
+# A new format is a folder with its reader, and one line here.  Of formats with the same ending
+# those with a mark stand first.  Nothing is imported before a file is read.
+FORMATS = (
+    MeshFormat("abaqus.reader.read_abaqus_model", "Abaqus or CalculiX input", (".inp",)),
+    MeshFormat(
+        "ansys.reader.read_ansys_archive", "ANSYS archive", (".cdb", ".dat"), rb"^\s*nblock\s*,"
+    ),
+    MeshFormat("nastran.reader.read_nastran", "Nastran bulk data", (".bdf", ".nas", ".dat")),
+    MeshFormat("gmsh.reader.read_gmsh", "Gmsh mesh", (".msh",)),
+    MeshFormat("vtk.reader.read_vtk", "VTK grid", (".vtk", ".vtu")),
+)
+"""Reader, program and endings of each format."""
+
+MESH_FORMATS: Mapping[str, str] = {
+    ending: " or ".join(other.program for other in FORMATS if ending in other.endings)
+    for one in FORMATS
+    for ending in one.endings
+}
+"""Ending of the file name, and whose files these are."""
+
+
+def format_of(path: Path) -> MeshFormat:
+    """Format of a file with one of the endings of :data:`MESH_FORMATS`."""
+    *marked, last = (one for one in FORMATS if path.suffix.lower() in one.endings)
+    return next((one for one in marked if path.is_file() and one.marks(path)), last)

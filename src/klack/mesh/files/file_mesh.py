@@ -1,0 +1,280 @@
+"""From the nodes, elements and sets of a file to a mesh.
+
+Every reader hands over what its file holds, in the numbers of the file and in the node order of
+:mod:`klack.mesh.families`; what follows is the same for all formats.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError, require_positive
+from klack.mesh.families import FAMILIES
+from klack.mesh.files.mesh_model import FileMaterial, MeshModel
+from klack.mesh.files.named_faces import LOOSE, MarkedFaces, loose_faces, named_faces
+from klack.mesh.files.sound_mesh import require_near, require_right_of_axis, require_sound
+from klack.mesh.mesh import ElementBlock, Mesh
+
+__all__ = ["FileElements", "FileMesh", "mesh_model"]
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileElements:
+    """Elements of one family under one name.
+
+    Parameters
+    ----------
+    family : str
+    name : str
+        Of the solid, or of the surface that surface elements mark.
+    numbers : int array, shape (n,)
+    nodes : int array, shape (n, k)
+        Node numbers of the file; of surface elements the corners are enough.
+    """
+
+    family: str
+    name: str
+    numbers: Ints
+    nodes: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileMesh:
+    """What a mesh file holds.
+
+    Parameters
+    ----------
+    numbers : int array, shape (n,)
+        Of the nodes, in any order.
+    points : array, shape (n, 3) [unit of the file]
+    solids, faces : tuple of FileElements
+        Elements with volume (in an axisymmetric mesh: plane ones), and those that mark surfaces.
+    node_sets : mapping of name to node numbers
+    faces_of_sets : bool
+        True: a node set that holds all nodes of some outer faces is a surface as well.
+    loose_faces : bool
+        True: surface elements on no solid are passed over, for they have no stiffness.
+    solids_only : bool
+        True: surface elements on no solid are left out and counted.
+    left_out : mapping of str to int
+        Elements of other kinds that the reader left out already, by their type.
+    foreign_materials : mapping
+        As in :class:`~klack.mesh.files.mesh_model.MeshModel`.
+    materials, sections : mappings
+        As in :class:`~klack.mesh.files.mesh_model.MeshModel`.
+    """
+
+    numbers: Ints
+    points: NDArray[np.float64]
+    solids: tuple[FileElements, ...]
+    faces: tuple[FileElements, ...] = ()
+    node_sets: Mapping[str, Ints] = field(default_factory=dict)
+    faces_of_sets: bool = False
+    loose_faces: bool = False
+    solids_only: bool = False
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    foreign_materials: Mapping[str, str] = field(default_factory=dict)
+    materials: Mapping[str, FileMaterial] = field(default_factory=dict)
+    sections: Mapping[str, str] = field(default_factory=dict)
+
+
+def mesh_model(
+    path: Path, raw: FileMesh, unit_length: float, wanted: Sequence[str] | None
+) -> MeshModel:
+    """Build the mesh: only nodes of its elements, surfaces and sets on them, checked.
+
+    Raises
+    ------
+    InputError
+        For nodes that are missing or there twice, solids that are not there, surface elements on
+        no solid, points left of the axis, and inverted elements.
+    """
+    require_positive(f"{path}: unit of length", unit_length, "m")
+    solids = tuple(part for part in raw.solids if len(part.numbers))
+    dimension = _dimension(path, solids)
+    nodes = _NodeNumbers(path, raw.numbers)
+    everything = tuple(
+        ElementBlock(part.family, nodes.index(part), part.name) for part in _merged(solids)
+    )
+    marks = tuple(
+        MarkedFaces(part.name, part.numbers, nodes.index(part)[:, : _corners(part)])
+        for part in raw.faces
+        if len(part.numbers)
+    )
+    sets = {name: nodes.present(members) for name, members in raw.node_sets.items()}
+    left_out = dict(raw.left_out)
+    if raw.solids_only and not raw.loose_faces and (loose := loose_faces(everything, marks)):
+        left_out[LOOSE] = loose
+    kept = _kept(path, everything, wanted)
+    blocks = tuple(everything[i] for i in kept)
+    numbers = tuple(_merged(solids)[i].numbers for i in kept)
+    used = np.zeros(len(raw.numbers), dtype=bool)
+    for block in blocks:
+        used[block.connectivity] = True
+    new = np.cumsum(used) - 1
+    new[~used] = -1
+    points = raw.points[nodes.order][used, :dimension] * unit_length
+    require_near(path, points, nodes.sorted[used])
+    blocks = tuple(
+        _turned(points, ElementBlock(b.family, new[b.connectivity], b.solid)) for b in blocks
+    )
+    sets = {name: own for name, members in sets.items() if len(own := _renumbered(new, members))}
+    surfaces, inner = named_faces(
+        str(path),
+        blocks,
+        tuple(MarkedFaces(m.name, m.numbers, new[m.corners]) for m in marks),
+        sets if raw.faces_of_sets else {},
+        all_solids=wanted is None and not (raw.loose_faces or raw.solids_only),
+    )
+    mesh = Mesh(points=points, blocks=blocks, surfaces=surfaces, node_sets={**inner, **sets})
+    require_right_of_axis(path, mesh, nodes.sorted[used])
+    require_sound(path, mesh, numbers)
+    return MeshModel(
+        mesh=mesh,
+        node_numbers=nodes.sorted[used],
+        element_numbers=numbers,
+        materials=raw.materials,
+        sections={name: raw.sections[name] for name in mesh.solids if name in raw.sections},
+        unit_length=unit_length,
+        left_out=left_out,
+        foreign_materials=raw.foreign_materials,
+    )
+
+
+def _corners(part: FileElements) -> int:
+    return FAMILIES[part.family].corners
+
+
+def _dimension(path: Path, solids: tuple[FileElements, ...]) -> int:
+    dimensions = {FAMILIES[part.family].dimension for part in solids}
+    if len(dimensions) != 1:
+        raise InputError(
+            str(path),
+            got="no solid elements" if not dimensions else "solid and plane elements",
+            expected="solid elements (tetrahedra, hexahedra, wedges)",
+            hint="save the volume elements too; the file may be cut off.",
+        )
+    return dimensions.pop()
+
+
+def _merged(parts: tuple[FileElements, ...]) -> tuple[FileElements, ...]:
+    """One part for each solid and family, in order of first appearance."""
+    groups: dict[tuple[str, str], list[FileElements]] = {}
+    for name in dict.fromkeys(part.name for part in parts):
+        for part in parts:
+            if part.name == name:
+                groups.setdefault((name, part.family), []).append(part)
+    return tuple(
+        group[0]
+        if len(group) == 1
+        else FileElements(
+            family=family,
+            name=name,
+            numbers=np.concatenate([part.numbers for part in group]),
+            nodes=np.concatenate([part.nodes for part in group]),
+        )
+        for (name, family), group in groups.items()
+    )
+
+
+class _NodeNumbers:
+    """Node numbers of the file in ascending order."""
+
+    def __init__(self, path: Path, numbers: Ints) -> None:
+        self._path = path
+        self.order = np.argsort(numbers, kind="stable")
+        self.sorted = numbers[self.order]
+        twice = np.flatnonzero(self.sorted[1:] == self.sorted[:-1])
+        if len(twice):
+            raise InputError(
+                str(path),
+                got=f"node {self.sorted[twice[0]]} for the second time",
+                expected="every node once",
+                hint="write the file again from the preprocessor.",
+            )
+
+    def index(self, part: FileElements) -> Ints:
+        """Nodes of elements, counted from 0."""
+        rows, found = self._find(part.nodes)
+        if not found.all():
+            row, column = np.argwhere(~found)[0]
+            raise InputError(
+                f"{self._path}: element {part.numbers[row]}",
+                got=f"node {part.nodes[row, column]}, which the file does not define",
+                expected="nodes of this file",
+                hint="the file may be cut off: write it again from the preprocessor.",
+            )
+        return rows
+
+    def present(self, numbers: Ints) -> Ints:
+        """Those of some nodes that the file has, counted from 0."""
+        rows, found = self._find(np.asarray(numbers, dtype=np.int64))
+        return np.unique(rows[found])
+
+    def _find(self, numbers: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+        if not len(self.sorted):
+            return np.zeros(numbers.shape, dtype=np.int64), np.zeros(numbers.shape, dtype=bool)
+        first = int(self.sorted[0])
+        if int(self.sorted[-1]) - first == len(self.sorted) - 1:  # without holes
+            rows = numbers - first
+            found = (rows >= 0) & (rows < len(self.sorted))
+            return np.where(found, rows, 0), found
+        rows = np.minimum(np.searchsorted(self.sorted, numbers), len(self.sorted) - 1)
+        return rows, self.sorted[rows] == numbers
+
+
+def _kept(path: Path, blocks: tuple[ElementBlock, ...], wanted: Sequence[str] | None) -> list[int]:
+    known = dict.fromkeys(block.solid for block in blocks)
+    for name in () if wanted is None else wanted:
+        if name not in known:
+            raise InputError(
+                f"{path}: solid '{name}'",
+                got="a name that the file does not have",
+                expected=f"one of: {', '.join(known)}",
+                hint="'klack inspect FILE' lists the solids of a mesh file.",
+            )
+    return [i for i, block in enumerate(blocks) if wanted is None or block.solid in wanted]
+
+
+def _renumbered(new: Ints, nodes: Ints) -> Ints:
+    kept = new[nodes]
+    return kept[kept >= 0]
+
+
+_MIRRORED = {
+    "tri3": (0, 2, 1),
+    "tri6": (0, 2, 1, 5, 4, 3),
+    "quad4": (0, 3, 2, 1),
+    "quad8": (0, 3, 2, 1, 7, 6, 5, 4),
+    "wedge6": (0, 2, 1, 3, 5, 4),
+    "wedge15": (0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13),
+}
+
+
+def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:
+    """Turn elements round whose sense differs between programs: plane ones and wedges.
+
+    A plane mesh has the sense of its drawing, and VTK numbers a wedge from its other side.
+    """
+    if block.family not in _MIRRORED:
+        return block
+    x = points[block.connectivity[:, : block.topology.corners]]
+    if block.topology.dimension == 2:
+        a, b = x[:, 2] - x[:, 0], x[:, -1] - x[:, 1]
+        if x.shape[1] == 3:
+            a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+        sense = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    else:
+        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        sense = (normal * (x[:, 3:].mean(axis=1) - x[:, :3].mean(axis=1))).sum(axis=1)
+    backward = sense < 0
+    if not backward.any():
+        return block
+    nodes = block.connectivity.copy()
+    nodes[backward] = nodes[backward][:, _MIRRORED[block.family]]
+    return ElementBlock(block.family, nodes, block.solid)

@@ -1,0 +1,300 @@
+"""Sections of a Gmsh file (.msh 2 and 4.1, ASCII and binary): nodes, elements, physical groups."""
+
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.files.file_bytes import read_bytes
+from klack.mesh.files.gmsh.streams import BinaryStream, Stream, TextStream, refuse, whole_of
+
+__all__ = ["NODE_COUNTS", "GmshContent", "GmshElements", "read_content"]
+
+Ints = NDArray[np.int64]
+
+_KIND = "a Gmsh mesh (.msh 2.2 or 4.1)"
+
+NODE_COUNTS = {
+    **{1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10},
+    **{12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20, 18: 15, 19: 13},
+}
+"""Nodes of the element types that Gmsh makes at order 1 and 2, by their number."""
+
+
+@dataclass(frozen=True, slots=True)
+class GmshElements:
+    """Elements of one type with the same physical groups.
+
+    Parameters
+    ----------
+    kind : int
+        Element type of Gmsh.
+    groups : tuple of int
+        Numbers of the physical groups, of the dimension of the elements.
+    numbers : int array, shape (n,)
+    nodes : int array, shape (n, k)
+        Node numbers, in the order of Gmsh.
+    """
+
+    kind: int
+    groups: tuple[int, ...]
+    numbers: Ints
+    nodes: Ints
+
+
+@dataclass
+class GmshContent:
+    """What the sections hold."""
+
+    node_parts: list[Ints] = field(default_factory=list)
+    point_parts: list[NDArray[np.float64]] = field(default_factory=list)
+    elements: list[GmshElements] = field(default_factory=list)
+    names: dict[tuple[int, int], str] = field(default_factory=dict)  # by dimension and number
+    groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)  # by entity
+
+    @cached_property
+    def node_numbers(self) -> Ints:
+        """Numbers of the nodes, shape (n,)."""
+        return np.concatenate([np.empty(0, dtype=np.int64), *self.node_parts])
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """Coordinates, shape (n, 3)."""
+        return np.concatenate([np.empty((0, 3)), *self.point_parts])
+
+
+def read_content(path: Path) -> GmshContent:
+    """Read all sections of interest.
+
+    Raises
+    ------
+    InputError
+        With file and section, for other formats, other versions, and counts that do not fit.
+    """
+    data = read_bytes(path, _KIND)
+    reader = _Reader(path, data)
+    return reader.read()
+
+
+_FORMAT = re.compile(rb"\s*(\d+(?:\.\d+)?)[ \t]+([01])[ \t]+([48])[ \t]*\r?\n")
+_PHYSICAL = re.compile(r'\s*([0-3])\s+(-?\d{1,9})\s+"(.*)"\s*$')
+
+
+class _Reader:
+    def __init__(self, path: Path, data: bytes) -> None:
+        self._path, self._data = path, data
+        self._content = GmshContent()
+        self._version = ""
+        self._binary = False
+        self._order, self._size = "<", 8
+
+    def read(self) -> GmshContent:
+        at = 0
+        while (at := self._data.find(b"$", at)) >= 0:
+            end = self._data.find(b"\n", at)
+            end = len(self._data) if end < 0 else end
+            name = self._data[at + 1 : min(end, at + 100)].strip().decode("latin-1")
+            if not self._version and name not in ("MeshFormat", "Comments"):
+                break
+            at = self._section(name, end + 1)
+        if not self._version:
+            raise InputError(
+                str(self._path),
+                got="no $MeshFormat at its start",
+                expected=_KIND,
+                hint="save the mesh from Gmsh as .msh.",
+            )
+        return self._content
+
+    def _section(self, name: str, start: int) -> int:
+        """Read one section that starts at a byte; give the byte behind it."""
+        place = f"{self._path}: ${name}"
+        if name == "MeshFormat":
+            start = self._format(place, start)
+        elif name == "PhysicalNames":
+            self._physical_names(place, start)
+        elif name in ("PartitionedEntities", "ParametricNodes"):
+            raise InputError(
+                place,
+                got="a section that is not supported",
+                expected="a mesh without partitions and parametric nodes",
+                hint="save it again with Mesh.SavePartitions = 0, Mesh.SaveParametric = 0.",
+            )
+        elif name in ("Entities", "Nodes", "Elements"):
+            start = self._numbers(name, place, start)
+        end = self._data.find(b"$End" + name.encode("latin-1"), start)
+        if end < 0:
+            refuse(place, "the end of the file", f"$End{name}")
+        line = self._data.find(b"\n", end)
+        return len(self._data) if line < 0 else line + 1
+
+    def _format(self, place: str, start: int) -> int:
+        match = _FORMAT.match(self._data, start, start + 80)
+        if not match:
+            refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
+        version = match[1].decode()
+        if version not in ("2", "2.1", "2.2", "4", "4.1"):
+            raise InputError(
+                place,
+                got=f"version {version}",
+                expected="2.2 or 4.1",
+                hint="save the mesh with Mesh.MshFileVersion = 4.1 (or 2.2).",
+            )
+        self._version, self._binary = version, match[2] == b"1"
+        self._size = int(match[3])
+        if not self._binary:
+            return match.end()
+        one = self._data[match.end() : match.end() + 4]
+        if one not in (b"\1\0\0\0", b"\0\0\0\1"):
+            refuse(place, "binary data without the number 1 in front", "the number 1")
+        self._order = "<" if one == b"\1\0\0\0" else ">"
+        return match.end() + 4
+
+    def _physical_names(self, place: str, start: int) -> None:
+        end = self._data.find(b"$EndPhysicalNames", start)
+        text = self._data[start : max(end, start)].decode("utf-8", "replace")
+        for line in text.splitlines()[1:]:
+            match = _PHYSICAL.match(line)
+            if match:
+                self._content.names[int(match[1]), int(match[2])] = match[3]
+            elif line.strip():
+                refuse(place, repr(line[:40]), 'dimension, number and "name"')
+
+    def _numbers(self, name: str, place: str, start: int) -> int:
+        """Read a section of numbers; give the byte behind them."""
+        old = self._version.startswith("2")
+        if not self._binary:
+            end = self._data.find(f"$End{name}".encode(), start)
+            if end < 0:
+                refuse(place, "the end of the file", f"$End{name}")
+            text = TextStream(place, self._data[start:end])
+            match name, old:
+                case "Nodes", True:
+                    count = int(text.sizes(1)[0])
+                    table = text.real(4 * count).reshape(-1, 4)
+                    self._take_nodes(place, whole_of(place, table[:, 0]), table[:, 1:])
+                case "Elements", True:
+                    self._old_elements(place, text)
+                case _:
+                    self._new(name, place, text)
+            return end
+        line = self._data.find(b"\n", start) + 1 if old else start
+        stream = BinaryStream(place, self._data, line, self._order, self._size)
+        if not old:
+            self._new(name, place, stream)
+            return stream.at
+        count_text = self._data[start : max(line, start)][:20].strip()
+        if not count_text.isdigit():
+            refuse(place, repr(count_text), "the number of items")
+        if name == "Nodes":
+            records = stream.take(stream.record(3), int(count_text))
+            self._take_nodes(place, records["number"].astype(np.int64), records["x"])
+        elif name == "Elements":
+            self._old_binary_elements(place, stream, int(count_text))
+        return stream.at
+
+    def _take_nodes(self, place: str, numbers: Ints, points: NDArray[np.float64]) -> None:
+        if not np.isfinite(points).all():
+            refuse(place, "what is no finite number", "coordinates")
+        self._content.node_parts.append(numbers)
+        self._content.point_parts.append(points)
+
+    def _take(self, place: str, kind: int, groups: tuple[int, ...], rows: Ints) -> None:
+        """Take elements: number and nodes in every row."""
+        self._content.elements.append(GmshElements(kind, groups, rows[:, 0], rows[:, 1:]))
+
+    def _node_count(self, place: str, kind: int) -> int:
+        if kind not in NODE_COUNTS:
+            raise InputError(
+                place,
+                got=f"element type {kind}",
+                expected="elements of order 1 or 2",
+                hint="mesh with Mesh.ElementOrder = 2 and Mesh.SecondOrderIncomplete = 1.",
+            )
+        return NODE_COUNTS[kind]
+
+    def _old_elements(self, place: str, text: TextStream) -> None:
+        """Rows of number, type, number of tags, tags, nodes; neighbours mostly alike."""
+        left = int(text.sizes(1)[0])
+        values = text.whole(text.left)
+        at = 0
+        while left > 0:
+            if len(values) - at < 3:
+                refuse(place, "the end of the section", f"{left} elements more")
+            kind, tags = int(values[at + 1]), int(values[at + 2])
+            nodes = self._node_count(place, kind)
+            width = 3 + tags + nodes
+            most = min(left, (len(values) - at) // width) if 0 <= tags <= 10_000 else 0
+            if most == 0:
+                refuse(place, f"an element with {tags} tags", "a whole element")
+            count = _alike(values[at:], width, most)
+            rows = values[at : at + count * width].reshape(count, width)
+            self._take_tagged(place, kind, tags, rows[:, [0, *range(3, width)]])
+            at += count * width
+            left -= count
+
+    def _old_binary_elements(self, place: str, stream: BinaryStream, left: int) -> None:
+        while left > 0:
+            kind, count, tags = stream.whole(3).tolist()
+            width = 1 + tags + self._node_count(place, kind)
+            if not (0 < count <= left and 0 <= tags <= 10_000):
+                refuse(place, f"{count} elements with {tags} tags", f"at most {left} elements")
+            rows = stream.whole(count * width).reshape(count, width)
+            self._take_tagged(place, kind, tags, rows)
+            left -= count
+
+    def _take_tagged(self, place: str, kind: int, tags: int, rows: Ints) -> None:
+        """Split elements by their first tag, which is the physical group (0: none)."""
+        group = rows[:, 1] if tags else np.zeros(len(rows), dtype=np.int64)
+        for label in np.unique(group).tolist():
+            own = rows[group == label]
+            groups = (abs(label),) if label else ()
+            self._take(place, kind, groups, np.delete(own, np.s_[1 : 1 + tags], axis=1))
+
+    def _new(self, name: str, place: str, stream: Stream) -> None:
+        if name == "Entities":
+            for dimension, count in enumerate(stream.sizes(4).tolist()):
+                for _ in range(count):
+                    self._entity(dimension, stream)
+            return
+        blocks = int(stream.sizes(4)[0])
+        for _ in range(blocks):
+            first, second, third = stream.whole(3).tolist()
+            count = int(stream.sizes(1)[0])
+            if not 0 <= (first if name == "Nodes" else 0) <= 3:
+                refuse(place, f"an entity of dimension {first}", "dimension 0 to 3")
+            if name == "Nodes":
+                numbers = stream.sizes(count)
+                columns = 3 + (first if third else 0)
+                points = stream.real(columns * count).reshape(count, columns)
+                self._take_nodes(place, numbers, points[:, :3])
+            else:
+                width = 1 + self._node_count(place, third)
+                rows = stream.sizes(count * width).reshape(count, width)
+                groups = self._content.groups.get((first, second), ())
+                self._take(place, third, groups, rows)
+
+    def _entity(self, dimension: int, stream: Stream) -> None:
+        tag = int(stream.whole(1)[0])
+        stream.real(3 if dimension == 0 else 6)
+        groups = stream.whole(int(stream.sizes(1)[0]))
+        self._content.groups[dimension, tag] = tuple(np.unique(np.abs(groups)).tolist())
+        if dimension:
+            stream.whole(int(stream.sizes(1)[0]))
+
+
+def _alike(values: Ints, width: int, most: int) -> int:
+    """How many rows from the start have the type and number of tags of the first one."""
+    done, step = 1, 64
+    while done < most:
+        last = min(done + step, most)
+        rows = values[done * width : last * width].reshape(-1, width)
+        same = (rows[:, 1] == values[1]) & (rows[:, 2] == values[2])
+        if not same.all():
+            return done + int(np.argmin(same))
+        done, step = last, 4 * step
+    return done

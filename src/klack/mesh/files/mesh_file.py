@@ -1,0 +1,73 @@
+"""Finished meshes from files of other programs; the ending of the name says which."""
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from klack.errors import AccuracyWarning, InputError
+from klack.input.existing_file import refuse_lfs_pointer
+from klack.mesh.files.catalogue import MESH_FORMATS, format_of
+from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.files.plausible import require_plausible_size
+from klack.mesh.files.scripts import refuse_script
+
+__all__ = ["read_mesh_file"]
+
+
+def read_mesh_file(
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
+) -> MeshModel:
+    """Read a finished mesh.
+
+    Parameters
+    ----------
+    path : path
+        With one of the endings of :data:`~klack.mesh.files.catalogue.MESH_FORMATS`.
+    unit_length : float [m] or None
+        Unit of the coordinates: 1e-3 for millimetres.  None where the file names it.
+    solids : sequence of str or None
+        Keep these solids only; None keeps all.
+    solids_only : bool
+        Leave out beams, springs, masses, rigid elements, and shells on no solid, with a warning
+        that counts them; they are an error otherwise.  Volumes that klack does not know (pyramids,
+        gaskets) are an error in any case: the body would have a hole.
+
+    Raises
+    ------
+    InputError
+        With file and place, if the file cannot be read, is of another kind, names no unit, or
+        holds a body of no plausible size (the sign of a wrong unit).
+
+    Warns
+    -----
+    AccuracyWarning
+        With the number and type of the elements that were left out.
+    """
+    path = Path(path)
+    refuse_lfs_pointer(path)
+    if path.suffix.lower() not in MESH_FORMATS:
+        known = ", ".join(f"{ending} ({program})" for ending, program in MESH_FORMATS.items())
+        raise InputError(
+            str(path),
+            got=f"a file that ends in '{path.suffix}'",
+            expected=f"one of: {known}",
+            hint="export the mesh from its program in one of these formats.",
+        )
+    mesh_format = format_of(path)
+    if not mesh_format.mark:
+        refuse_script(path)
+    model = mesh_format.reader(path, unit_length, solids=solids, solids_only=solids_only)
+    require_plausible_size(str(path), model.mesh, model.unit_length)
+    if model.left_out:
+        counted = ", ".join(f"{count} {kind}" for kind, count in model.left_out.items())
+        warnings.warn(
+            f"{path.name}: left out, for klack computes solids only: {counted}. Their stiffness, "
+            "mass and constraints are missing in the body.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return model

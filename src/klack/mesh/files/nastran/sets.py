@@ -1,0 +1,163 @@
+"""Node sets and names of a Nastran file."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.mesh.files.nastran.cards import BulkData, Card
+from klack.mesh.files.number_ranges import Ranges, within
+
+__all__ = ["names_in_comments", "node_sets"]
+
+_DEGREES = ("ASET", "BSET", "CSET", "QSET", "OMIT")
+
+
+def node_sets(bulk: BulkData, numbers: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    """Sets of nodes: SET of the case control, SET1, SET3 of grids, ASET and the like, USET.
+
+    Parameters
+    ----------
+    bulk : BulkData
+    numbers : int array
+        All node numbers.
+
+    Returns
+    -------
+    dict of int arrays
+        Called ``set_5``, ``aset``, or after USET; members that are no nodes are left out (a SET
+        of the case control may be one of elements), and sets without nodes as well.
+    """
+    ordered = np.sort(numbers)
+    given = names_in_comments(bulk).get("SET", {})
+    members: dict[str, Ranges] = {}
+    for name, ranges in _of_cards(bulk, given):
+        members.setdefault(name, []).extend(ranges)
+    for label, ranges in _of_case_control(bulk.head):
+        members.setdefault(given.get(label, f"set_{label}"), []).extend(ranges)
+    sets = {name: within(ordered, ranges) for name, ranges in members.items()}
+    return {name: nodes for name, nodes in sets.items() if len(nodes)}
+
+
+def _of_cards(bulk: BulkData, given: dict[int, str]) -> Iterator[tuple[str, Ranges]]:
+    for card in bulk.cards("SET1"):
+        label = card.integer(1, "number of the set")
+        yield given.get(label, f"set_{label}"), _ranges(card, card.fields[1:])
+    for card in bulk.cards("SET3"):
+        label = card.integer(1, "number of the set")
+        if card.field(2).upper() in ("GRID", "POINT"):
+            yield given.get(label, f"set_{label}"), _ranges(card, card.fields[2:])
+    for name in _DEGREES:
+        for card in bulk.cards(name):
+            yield name.lower(), _ranges(card, card.fields[::2])
+        for card in bulk.cards(name + "1"):
+            yield name.lower(), _ranges(card, card.fields[1:])
+    for card in bulk.cards("USET"):
+        yield card.field(1) or "uset", _ranges(card, card.fields[1::2])
+    for card in bulk.cards("USET1"):
+        yield card.field(1) or "uset", _ranges(card, card.fields[2:])
+
+
+def _ranges(card: Card, fields: list[str]) -> Ranges:
+    words = [word for word in fields if word]
+    try:
+        return _read(words)
+    except ValueError:
+        card.refuse(f"the members {' '.join(words)[:60]}", "node numbers, or 'first THRU last'")
+        raise
+
+
+def _read(words: list[str]) -> Ranges:
+    """Ranges of ``1 THRU 10 EXCEPT 4 5 20``; raise ValueError for anything else."""
+    ranges: Ranges = []
+    i = 0
+    while i < len(words):
+        if words[i].upper() == "ALL":
+            return [(1, 10**18)]
+        first = _number(words[i])
+        if i + 2 < len(words) and words[i + 1].upper() == "THRU":
+            last = _number(words[i + 2])
+            if last < first:
+                raise ValueError(words[i])
+            i += 3
+            left_out: list[int] = []
+            if i < len(words) and words[i].upper() == "EXCEPT":
+                i += 1
+                while i < len(words) and words[i].isdecimal() and _number(words[i]) <= last:
+                    left_out.append(_number(words[i]))
+                    i += 1
+            for gap in sorted(set(left_out)):
+                if first <= gap - 1:
+                    ranges.append((first, gap - 1))
+                first = gap + 1
+            if first <= last:
+                ranges.append((first, last))
+        else:
+            ranges.append((first, first))
+            i += 1
+    return ranges
+
+
+def _number(word: str) -> int:
+    if not re.fullmatch(r"\d{1,18}", word):
+        raise ValueError(word)
+    return int(word)
+
+
+_SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=\s*(.*)", re.IGNORECASE)
+
+
+def _of_case_control(head: tuple[str, ...]) -> Iterator[tuple[int, Ranges]]:
+    """Sets of integers; those of real numbers and of names are passed over."""
+    lines = iter(head)
+    for line in lines:
+        match = _SET.match(line)
+        if not match:
+            continue
+        text = [match[2]]
+        while text[-1].rstrip().endswith(","):
+            text.append(next(lines, ""))
+        words = " ".join(text).replace(",", " ").split()
+        try:
+            yield int(match[1]), _read(words)
+        except ValueError:
+            if any(re.search(r"[.A-Za-z]", w.upper().replace("THRU", "")) for w in words):
+                continue
+            raise InputError(
+                f"SET {match[1]} of the case control",
+                got=" ".join(words)[:60],
+                expected="numbers, or 'first THRU last'",
+                hint="correct the set, or take it out of the file.",
+            ) from None
+
+
+_NAMES = (
+    # $HMNAME PROP  1"needle" 4
+    re.compile(r"\$HMNAME\s+(?P<kind>[A-Z]+)\s+(?P<label>\d{1,9})\s*\"(?P<name>[^\"]+)\"", re.I),
+    re.compile(r"\$HM(?P<kind>SET)\s+(?P<label>\d{1,9})\s+\d+\s*\"(?P<name>[^\"]+)\"", re.I),
+    # $ANSA_NAME_COMMENT;1;PSOLID;needle;
+    re.compile(r"\$ANSA_NAME_COMMENT;(?P<label>\d{1,9});(?P<kind>\w+);(?P<name>[^;]+);", re.I),
+    # $ Femap Property 1 : needle
+    re.compile(r"\$ Femap (?P<kind>\w+) (?P<label>\d{1,9}) : (?P<name>.+)", re.I),
+)
+_KINDS = {
+    **{"PROP": "PROPERTY", "PROPERTY": "PROPERTY", "PSOLID": "PROPERTY", "PSHELL": "PROPERTY"},
+    **{"MAT": "MATERIAL", "MATS": "MATERIAL", "MATERIAL": "MATERIAL", "MAT1": "MATERIAL"},
+    **{"SET": "SET", "GROUP": "SET"},
+}
+
+
+def names_in_comments(bulk: BulkData) -> dict[str, dict[int, str]]:
+    """Names that HyperMesh, ANSA and Femap write into comments, by kind and number."""
+    names: dict[str, dict[int, str]] = {}
+    for comment in bulk.comments:
+        if comment[1:3].upper() not in ("HM", "AN", " F"):
+            continue
+        for pattern in _NAMES:
+            match = pattern.match(comment)
+            if match and match["kind"].upper() in _KINDS:
+                kind = _KINDS[match["kind"].upper()]
+                names.setdefault(kind, {}).setdefault(int(match["label"]), match["name"].strip())
+    return names

@@ -1,0 +1,71 @@
+"""Unit of length of a mesh file, and the size of its body: the usual sign of a wrong unit."""
+
+from pathlib import Path
+
+import numpy as np
+
+from klack.errors import InputError
+from klack.mesh.mesh import Mesh
+from klack.units import format_si
+
+__all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size", "require_unit"]
+
+SAY_UNIT = "add 'unit: mm' (or your unit) beside the file; for klack inspect, --unit mm."
+"""What to do about a mesh file that names no unit of length."""
+
+LARGEST_BODY = 2.0
+"""Largest extent [m] of a body that klack takes from a file."""
+
+SMALLEST_BODY = 1e-5
+"""Smallest one [m]."""
+
+_UNITS = {"m": 1.0, "cm": 1e-2, "in": 0.0254, "mm": 1e-3, "um": 1e-6}
+
+
+def require_plausible_size(where: str, mesh: Mesh, unit_length: float) -> None:
+    """Raise :class:`InputError` for a body of more than 2 m or less than 10 um.
+
+    Parameters
+    ----------
+    where : str
+        Start of the error text: the file.
+    mesh : Mesh
+    unit_length : float [m]
+        Unit that the coordinates were read in, for the hint.
+    """
+    size = float(np.ptp(mesh.points, axis=0).max())
+    if SMALLEST_BODY <= size <= LARGEST_BODY:
+        return
+    likely = _likely_unit(size / unit_length)
+    hint = (
+        f"the file is probably in {likely}: say 'unit: {likely}'."
+        if likely
+        else "check the coordinates and the unit of the file."
+    )
+    raise InputError(
+        where,
+        got=f"a body of {format_si(size, 'm')}, with {format_si(unit_length, 'm')} "
+        "as unit of the coordinates",
+        expected=f"an extent of {format_si(SMALLEST_BODY, 'm')} to {format_si(LARGEST_BODY, 'm')}",
+        hint=hint,
+    )
+
+
+def _likely_unit(extent: float) -> str:
+    """Unit that makes the extent that of a part of a valve: 1 mm to 0.5 m."""
+    for name in ("mm", "m", "um", "cm", "in"):
+        if 1e-3 <= extent * _UNITS[name] <= 0.5:
+            return name
+    return ""
+
+
+def require_unit(path: Path, unit_length: float | None) -> float:
+    """Unit of length that the user gave; raise where the file names none either."""
+    if unit_length is None:
+        raise InputError(
+            str(path),
+            got="no unit of length",
+            expected="the unit of its coordinates: such files do not say",
+            hint=SAY_UNIT,
+        )
+    return unit_length
