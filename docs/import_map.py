@@ -58,8 +58,6 @@ GROUND = 6
 """Floors of single small modules that everything stands on: one row of the picture."""
 
 KNOWN_CIRCLES: Mapping[str, int] = {
-    "case": 8,  # schema and its checks name each other for their types
-    "measurement": 8,  # the recording chooses a reader, and every reader makes a recording
     "network": 2,  # a component adds rows, and rows know their component by type
 }
 """Files in circles, by room.  The list may only shrink."""
