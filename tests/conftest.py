@@ -21,10 +21,12 @@ if "PYTEST_XDIST_WORKER" in os.environ:
         os.environ.setdefault(variable, "1")
 
 sys.path.append(str(Path(__file__).parent))  # worker processes look there as well
+from c_compiler import untested
 from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy books)
 
 # the search for examples in docstrings would run these modules a second time, under another name
 collect_ignore_glob = [
+    "c_compiler.py",
     "energy_ledger.py",
     "json_schema_check.py",
     "mutated_cases.py",
@@ -32,6 +34,15 @@ collect_ignore_glob = [
     "rigid_valve.py",
     "data/*.py",
 ]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say at the end of a run what this machine leaves untested, whatever the options."""
+    if missing := untested():
+        terminalreporter.section("not tested on this machine", sep="=", yellow=True)
+        for line in missing:
+            terminalreporter.line(line)
+
 
 SOURCE = Path(__file__).parent / "data" / "spring_damper.c"
 
@@ -97,7 +108,7 @@ def spring_damper_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[...,
     """
     fmpy = pytest.importorskip("fmpy")
     if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
+        pytest.skip("no FMU of another program to test with: gcc is not installed")
     folder = tmp_path_factory.mktemp("fmu")
     headers = Path(fmpy.__file__).parent / "c-code"
     source = SOURCE.read_text()

@@ -24,6 +24,7 @@ SHOWN = {
     "project/cases": "cases/README.md",
     "project/benchmarks": "benchmarks/README.md",
     "project/changelog": "CHANGELOG.md",
+    "project/contributing": "CONTRIBUTING.md",
 }
 _PAGE_OF = {file: f"docs/{page}.md" for page, file in SHOWN.items()}
 _LINK = re.compile(r"(?P<open>\]\()(?P<target>[^)\s#:]+)(?P<anchor>#[^)\s]*)?\)")

@@ -80,10 +80,22 @@ def test_compliance_is_symmetric_and_positive_definite():
     assert np.linalg.eigvalsh(C).min() > 0
 
 
-def test_axisymmetric_area_is_that_of_the_full_circle():
-    problem = half_spaces(lambda r: 0 * r, contact=1e-4, cells=(4, 3), far=10, reach=1e-6)
+def test_axisymmetric_areas_are_those_of_full_rings():
+    """Hats over the radius, times the circle; the pieces of a quad8 face are exact for them."""
+    radius, cells = 1.2e-3, 8
+    h = radius / (2 * cells)  # between nodes
+    height = np.linspace(0.0, radius, 3)
+    upper = lattice_mesh("quad8", [np.linspace(0.0, radius, cells + 1), height + radius])
+    lower = lattice_mesh("quad8", [np.linspace(0.0, radius, 6), height])
 
-    assert problem.space.area.sum() == pytest.approx(
-        np.pi * problem.body_a.mesh.points[:, 0].max() ** 2, rel=0.5
+    space = contact_space(
+        upper, upper.surface("bottom"), lower, lower.surface("top"), reach=1e-6, slave="a"
     )
-    assert problem.space.area[0] == pytest.approx(np.pi * 12.5e-6**2 / 3, rel=1e-9)
+
+    r = space.points[:, 0]
+    exact = 2.0 * np.pi * r * h
+    exact[r == 0.0] = np.pi * h**2 / 3.0
+    exact[r == radius] = np.pi * h * (radius - h / 3.0)
+    assert space.count == 2 * cells + 1
+    np.testing.assert_allclose(space.area, exact, rtol=1e-13)
+    assert space.area.sum() == pytest.approx(np.pi * radius**2, rel=1e-13, abs=0.0)

@@ -1,9 +1,8 @@
 """Energy of an FMU in co-simulation: modal energies, contact and work of the force from outside."""
 
-import shutil
-
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.contact.laws import TableLaw
 from klack.exchange.fmu.build import build_fmu
@@ -12,7 +11,7 @@ from klack.simulation.bodies import rod_body
 from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 TABLE = TableLaw(np.array([0.2, 0.5, 1.0, 2.0]) * 1e-6, [20.0, 70.0, 190.0, 520.0])

@@ -4,10 +4,9 @@ A spring outside the FMU pulls the needle: its force is computed from the lift a
 step and held, or from where the lift will be at half the step.
 """
 
-import shutil
-
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.case import find_case
 from klack.case.valve_reader import load_any_case
@@ -15,7 +14,7 @@ from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STIFFNESS, PUSH, END = 50e3, 23.0, 160e-6  # [N/m], [N], [s] in free flight
 STEPS = (8e-6, 4e-6, 2e-6, 1e-6)

@@ -1,5 +1,7 @@
 """Vibration, mounts, plates and radiation against closed formulas and small exact systems."""
 
+from math import factorial
+
 import numpy as np
 import pytest
 
@@ -214,6 +216,33 @@ def test_corners_and_edges_in_the_notation_of_maidanik() -> None:
 
     assert corners > 0.1 * edges
     assert sigma == pytest.approx([corners + edges], rel=1e-12)
+
+
+@pytest.mark.parametrize(("first_mode", "limited"), [(0.45, False), (0.55, True)])
+def test_plates_change_their_kind_where_the_first_mode_is_at_half_coincidence(
+    first_mode: float, limited: bool
+) -> None:
+    """EN 12354-1, B: beyond it the efficiency near coincidence is sqrt(2 pi f 2 l/(16 c))."""
+    c, fc = 343.0, 1000.0
+    area = c**2 / (2.0 * fc * first_mode * fc)
+
+    sigma = baffled_plate_efficiency(np.array([0.9 * fc]), fc, area=area, sound_speed=c)
+
+    limit = np.sqrt(2.0 * np.pi * 0.9 * fc * 2.0 * np.sqrt(area) / (16.0 * c))
+    assert bool(sigma[0] == pytest.approx(limit, rel=1e-12)) is limited
+
+
+@pytest.mark.parametrize("x", [1e-4, 3e-3, 0.99e-2, 0.3])
+def test_efficiency_of_a_piston_by_the_series_of_the_bessel_function(x: float) -> None:
+    """``1 - 2 J_1(x)/x``, ``x = 2 k a``, by its series: ``-(-x^2/4)^k / (k! (k + 1)!)``."""
+    area, c = 1e-2, 343.0
+    f = x * c / (4.0 * np.pi) / np.sqrt(area / np.pi)
+
+    exact = sum(-((-(x**2) / 4.0) ** k) / (factorial(k) * factorial(k + 1)) for k in range(1, 9))
+
+    # x^4/9216 is left out below 1e-2; the closed form loses 1e-16/(x^2/8)
+    sigma = piston_efficiency(np.array([f]), area, c)[0]
+    assert sigma == pytest.approx(exact, rel=1e-11, abs=0.0)
 
 
 def test_all_power_of_a_lossless_valve_goes_into_the_plate() -> None:

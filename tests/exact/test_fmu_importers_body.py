@@ -1,10 +1,10 @@
 """Truth: closed solution of every mode under a constant force, for the FMU of a linear body."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
@@ -13,7 +13,7 @@ from klack.exchange.fmu.pictures import receptance
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 FORCE, DURATION = 10.0, 1e-4  # [N], [s]
 

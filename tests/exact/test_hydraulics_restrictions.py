@@ -90,8 +90,8 @@ def test_hyperbolic_tangent_is_that_of_the_library():
     for x in np.concatenate([np.geomspace(1e-12, 30.0, 400), [0.0499999, 0.0500001, 20.0, 20.01]]):
         t, ratio = _tanh(x)
 
-        assert t == pytest.approx(tanh(x), rel=1e-14)
-        assert ratio == pytest.approx(tanh(x) / x, rel=1e-14)
+        assert t == pytest.approx(tanh(x), rel=1e-14, abs=0.0)
+        assert ratio == pytest.approx(tanh(x) / x, rel=1e-14, abs=0.0)
     assert _tanh(0.0) == (0.0, 1.0)
 
 
@@ -328,11 +328,11 @@ VISCOSITY = float(HEPTANE.viscosity(Ambient().pressure))
 GUIDE = {"diameter": 4e-3, "length": 10e-3, "clearance": 5e-6}
 
 
-def annulus(p_a, p_b, needle=0.0, body=0.0, h=2e-8, **numbers):
+def annulus(p_a, p_b, needle=0.0, body=0.0, h=2e-8, rho=(RHO, RHO), **numbers):
     handles = {"a": 0, "b": 1, "needle": 0, "body": 1}
     rows = Rows(ambient=Ambient(), fluid=HEPTANE, handles=handles)
     Annulus(**GUIDE, **numbers).add_rows(rows)
-    inputs = [0.0, h, p_a, p_b, RHO, RHO, 0.0, needle * h, 0.0, body * h]
+    inputs = [0.0, h, p_a, p_b, *rho, 0.0, needle * h, 0.0, body * h]
     status, out = evaluate(annulus_step, rows.branches[0].parameters, [], inputs, 5)
     assert status == 0
     return out
@@ -368,6 +368,22 @@ def test_annulus_carries_half_of_the_gap_with_the_needle_and_all_of_it_with_both
     together = annulus(BAR, BAR, needle=0.5, body=0.5)
     assert together[0] == pytest.approx(RHO * ring * 0.5, rel=1e-12)
     np.testing.assert_allclose(together[3:], 0.0, atol=1e-18)
+
+
+@pytest.mark.parametrize(("needle", "density"), [(0.5, 700.0), (-0.5, 600.0)])
+def test_annulus_carries_the_fluid_that_enters_it(needle, density):
+    """From a to b with the needle, or back: what stood before the gap, whatever the pressures."""
+    flow = annulus(BAR, BAR, needle=needle, rho=(700.0, 600.0))[0]
+
+    assert flow == pytest.approx(density * pi * 4e-3 * 5e-6 * 0.5 * needle, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize(("pressures", "density"), [((3, 1), 700.0), ((1, 3), 600.0)])
+def test_annulus_leaks_the_fluid_that_enters_it(pressures, density):
+    alike = annulus(*(p * BAR for p in pressures))[0]
+    flow = annulus(*(p * BAR for p in pressures), rho=(700.0, 600.0))[0]
+
+    assert flow == pytest.approx(alike * density / RHO, rel=1e-12, abs=0.0)
 
 
 def test_pressure_on_the_gap_is_carried_by_both_walls_half_each():

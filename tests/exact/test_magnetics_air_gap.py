@@ -138,6 +138,24 @@ def test_a_plane_is_a_mirror():
     assert float(edge_on_plane(1e-4, 2e-3)[0]) == 2 * float(equal_edges(2e-4, 2e-3)[0])
 
 
+@pytest.mark.parametrize("radius", [2e-3, 5e-3])
+def test_outer_arcs_lie_on_wider_circles(radius):
+    """Quarter arcs of radius s: mean circle ``2 pi (r + 2 s/pi)`` over length ``pi s/2``.
+
+    Beyond the same arcs beside a straight edge, summed over all of them up to the reach.
+    """
+    gap, reach = 0.1e-3, 1.5e-3
+    straight = float(outer_ring(gap, reach, 1e6)[0])
+    arcs = 0.5 * reach * (1.0 + np.polynomial.legendre.leggauss(8)[0])
+    weights = 0.5 * reach * np.polynomial.legendre.leggauss(8)[1]
+
+    wider = weights @ ((radius + 2.0 * arcs / pi) / radius / (pi * arcs / 2.0))
+    alike = weights @ (1.0 / (pi * arcs / 2.0))
+
+    round_one = float(outer_ring(gap, reach, radius)[0])
+    assert round_one - straight == pytest.approx(wider - alike, rel=1e-8)
+
+
 def test_step_vanishes_without_a_step():
     assert step_excess(0.999999, 1.0) == pytest.approx(0.0, abs=2e-5)
 

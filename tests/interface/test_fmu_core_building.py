@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler, needs_gcc
 
 from klack.contact.laws import HuntCrossley, LinearLaw, TableLaw
 from klack.errors import ConvergenceError, InputError
@@ -18,7 +19,7 @@ from klack.network.rows import FilmRow
 from klack.simulation.bodies import rod_body
 from klack.verification.one_dimension import one_contact
 
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 TABLE = TableLaw(np.array([0.2, 0.5, 1.0, 2.0]) * 1e-6, [20.0, 70.0, 190.0, 520.0])
@@ -51,6 +52,7 @@ MODELS = {
 }
 
 
+@needs_gcc
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", [*MODELS, "Hunt-Crossley"])
 def test_sources_compile_without_warnings(name, fmi, tmp_path):
@@ -61,6 +63,7 @@ def test_sources_compile_without_warnings(name, fmi, tmp_path):
     subprocess.run([*command, *SOURCE_FILES[fmi]], cwd=tmp_path, check=True)
 
 
+@needs_gcc
 def test_static_sources_have_the_prefix_of_the_standard(tmp_path):
     for name, text in source_texts(MODELS["dry"], 2, "guid").items():
         (tmp_path / name).write_bytes(text)
@@ -84,6 +87,7 @@ def test_every_number_survives_the_header():
     assert [float(x) for x in line.split(",")] == list(MODELS["film"].omega)
 
 
+@needs_gcc
 def test_same_model_gives_the_same_file(tmp_path):
     a = build_fmu(MODELS["dry"], tmp_path / "a.fmu", fmi=2)
     with zipfile.ZipFile(a) as archive:

@@ -1,11 +1,11 @@
 """The C functions of FMI 2.0, one by one, and the building of FMUs."""
 
-import shutil
 import threading
 from contextlib import suppress
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.contact.laws import TableLaw
 from klack.exchange.fmu.build import build_fmu
@@ -17,7 +17,7 @@ from klack.simulation.propagator import modal_propagator
 from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 TABLE = TableLaw(np.array([0.2, 0.5, 1.0, 2.0]) * 1e-6, [20.0, 70.0, 190.0, 520.0])

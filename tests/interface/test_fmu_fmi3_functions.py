@@ -2,11 +2,11 @@
 
 import ctypes
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
@@ -14,7 +14,7 @@ from klack.exchange.fmu.build import build_fmu
 from klack.exchange.fmu.variables import fmu_variables
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STEP = 1e-7
 

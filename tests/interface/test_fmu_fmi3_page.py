@@ -3,10 +3,10 @@
 import contextlib
 import io
 import re
-import shutil
 from pathlib import Path
 
 import pytest
+from c_compiler import needs_compiler
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
@@ -24,7 +24,7 @@ def pair():
     return case_models(load_case(find_case("demo-valve-axisymmetric"))).pair
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+@needs_compiler
 def test_example_prints_what_the_page_says(pair, tmp_path, monkeypatch):
     build_fmu(pair, tmp_path / f"{pair.name}.fmu", fmi=2, platforms=("linux64",))
     monkeypatch.chdir(tmp_path)

@@ -152,7 +152,10 @@ def test_equations_that_the_converter_alone_gets_wrong(tex, shape):
 def test_links_of_the_pages_work_in_the_repository_too():
     """As plain Markdown, relative links lead to files, without the site."""
     root = DOCS.parent
-    files = [*DOCS.rglob("*.md"), *(root / name for name in ("README.md", "CHANGELOG.md"))]
+    files = [
+        *DOCS.rglob("*.md"),
+        *(root / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")),
+    ]
     files += [root / "cases" / "README.md", root / "benchmarks" / "README.md"]
     broken = []
     for file in files:

@@ -4,10 +4,9 @@ Both live in one FMU and share the forces of a state only: CVODE integrates the 
 way, with first touch and release as events.
 """
 
-import shutil
-
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.exchange.fmu.build import build_fmu
@@ -17,7 +16,7 @@ from klack.simulation.bodies import rigid_mass_body, rod_body
 from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 STEP = 1e-9  # [s]

@@ -3,11 +3,11 @@
 The C core repeats the same steps, so only round-off may differ.
 """
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 from energy_ledger import allowed
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
@@ -25,10 +25,7 @@ from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, Retu
 from klack.verification.interface_motion import interface_motion
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 STEP = 20e-9  # [s]

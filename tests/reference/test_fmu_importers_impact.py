@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler, needs_gcc
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
@@ -22,10 +23,7 @@ from klack.workflow.progress import silent
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 HOST = Path(__file__).parents[1] / "data" / "fmu_host.c"
 WINDOWS_COMPILER = "x86_64-w64-mingw32-gcc"
@@ -233,6 +231,7 @@ def by_host(impact, folder, compiler, platform, ending, run):
     return [float(word) for word in done.stdout.split()]
 
 
+@needs_gcc
 def test_bare_c_program_gives_the_native_peak(impact, tmp_path):
     peak, velocity = by_host(impact, tmp_path, "gcc", "linux64", ["-ldl"], [])
 

@@ -4,11 +4,11 @@ Without films, or without series compliances, the same model has model exchange,
 SUNDIALS runs it.
 """
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from c_compiler import needs_compiler
 
 from klack.case import find_case
 from klack.case.valve_reader import load_any_case
@@ -22,10 +22,7 @@ from klack.workflow.valve import build_valve
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler"),
-]
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 OPENING = ("contact_force_opening", "peak_contact_force_opening")
 FORCE, DURATION = 20.0, 3e-4  # [N] opening, on the spring face; one impact on the opening stop
