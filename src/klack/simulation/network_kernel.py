@@ -57,7 +57,6 @@ __all__ = [
     "STATUS_ELEMENT",
     "STATUS_FORCES",
     "STATUS_PRESSURES",
-    "read_stores",
     "record_points",
     "run_network",
 ]
@@ -262,7 +261,6 @@ def _finite(S: Any, ports: int) -> bool:
 def run_network(
     macros: int,
     per_record: int,
-    record0: int,
     clock: Index,
     M: int,
     h: float,
@@ -284,8 +282,7 @@ def run_network(
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
     ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
-    ``record0`` is the first record to fill; ``report`` gets the row of a failure, its status and
-    its time.
+    ``report`` gets the row of a failure, its status and its time.
     """
     S = first(bodies.at)
     ports = bodies.first.size - 1
@@ -432,7 +429,7 @@ def run_network(
     step, last_level = clock[0], clock[1]
     inverse_h = 1.0 / h
     in_record = 0
-    record = record0
+    record = 0
     record_time = 0.0
     fine_steps, coarse_steps = 0, 0
 
@@ -938,46 +935,6 @@ def run_network(
     clock[2] += fine_steps
     clock[3] += coarse_steps
     return STATUS_DONE
-
-
-@njit(cache=True)
-def read_stores(
-    rows: StepRows,
-    head: int,
-    y: Vector,
-    p: Vector,
-    rho: Vector,
-    books: Vector,
-    book_kind: Index,
-) -> int:
-    """Fill the stores of elements (``head`` 0) or branches (3) at the start; a failed row or -1."""
-    for k in range(rows.function.size):
-        i0, o0 = rows.input0[k], rows.output0[k]
-        q0, q1 = rows.port0[k], rows.port0[k + 1]
-        rows.inputs[i0] = rows.inputs[i0 + 1] = 0.0
-        first = 2
-        if head > 0:
-            a, b = rows.a[k], rows.b[k]
-            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
-            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
-            first = 6
-        for j in range(q0, q1):
-            for end in range(2):
-                rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
-        status = call(
-            rows.function[k],
-            pointer(rows.parameters, rows.parameter0[k]),
-            pointer(rows.state, rows.state0[k]),
-            pointer(rows.inputs, i0),
-            pointer(rows.outputs, o0),
-        )
-        if status != 0:
-            return k
-        o0 += head + q1 - q0 + rows.states[k]
-        for j in range(rows.books[k]):
-            if book_kind[rows.book0[k] + j] == STORE:
-                books[rows.book0[k] + j] = rows.outputs[o0 + j]
-    return -1
 
 
 @njit(cache=True)

@@ -43,6 +43,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
+from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_rows import at_rest, slopes_at_rest
 from klack.units import format_si
 
@@ -57,7 +58,6 @@ _GROWTH = 8.0  # from one to the next
 _MOST_NEWTON = 60
 _HALVINGS = 12  # of a Newton step that leads where a part knows no answer
 _FALL = 0.1  # least share of a pressure that a Newton step leaves
-_SHARE_OF_STEP = 1e-6  # of the step: sources are asked for over so short a time
 _FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
 _STUCK = 1e-8  # the same, where round-off lets it fall no more
 _LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this covers in a step
@@ -167,7 +167,7 @@ class _Balance:
         self, network: CompiledNetwork, step: float, held: set[int], *, enclosed: bool
     ) -> None:
         self.network, self.step, self.enclosed = network, step, enclosed
-        self.h, self.move = _SHARE_OF_STEP * step, _MOVE * step
+        self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
         self.ports = count
@@ -255,12 +255,8 @@ class _Balance:
     def first(self) -> _State:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
         nodes = self.network.nodes
-        p = nodes.p.copy()
-        for i in range(nodes.volumes, p.size):  # sources at time zero
-            here = slice(*nodes.table0[i - nodes.volumes : i - nodes.volumes + 2])
-            p[i] = np.interp(0.0, nodes.time[here], nodes.pressure[here])
         z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
-        return _State(z, y, p, np.zeros(len(self.ends)))
+        return _State(z, y, nodes.p.copy(), np.zeros(len(self.ends)))
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
         """Rigid modes that are free to creep; None if all is in equilibrium.
@@ -401,7 +397,6 @@ class _Balance:
         """Repeat the slopes with those ports whose motion changes such a state."""
         elements = self.network.elements
         force, inflow = self.force.copy(), self.inflow.copy()
-        size = self.size.copy()
         for k, _ in self.kept:
             for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
                 if port == self.ports:
@@ -411,9 +406,8 @@ class _Balance:
                 if self.answers(moved):
                     self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
                     self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
-        if self.kept:
-            self._keep_states(state.y)
-        self.force[:], self.inflow[:], self.size[:] = force, inflow, size
+        if self.kept:  # what the rows gave out last belongs to the state itself
+            self.answers(state)
 
     def _moved(self, state: _State, change: Vector) -> _State:
         n, r, f = self.ports, self.of_body.size, self.free.size
