@@ -1,7 +1,7 @@
 """Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from klack.workflow.noise_force import (
     interrupted_impact,
     stop_forces,
 )
+from klack.workflow.noise_window import first_part
 from klack.workflow.progress import Progress, silent
 from klack.workflow.record_store import stored_format
 from klack.workflow.store import IMPACT_FORMAT, load_study
@@ -214,6 +215,8 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
     for name in wanted:
         _require("variant", name, study.variants)
         variant = study.variants[name]
+        followed, cut = first_part(variant.result)
+        variant = replace(variant, result=followed)
         net = _net_force(study, variant)
         last = interrupted_impact(variant.result.events, net)
         found.append(
@@ -231,7 +234,7 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 given=given,
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
-                notes=_notes(variant, last),
+                notes=(*filter(None, [cut]), *_notes(variant, last)),
                 own_components=study.own_components,
             )
         )
