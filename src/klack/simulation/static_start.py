@@ -19,6 +19,9 @@ Numer. Anal. 35 (1998) 508): implicit Euler steps in which a body creeps with
 :math:`V \varrho' \Delta p = \tau \sum \dot m`.  Steps :math:`\tau` grow from microseconds until
 they are so long that nothing but the equilibrium is left; a step whose Newton iteration fails is
 shortened.  What moves ever on has no equilibrium.
+
+No state is tried in which a magnet is beyond the range of its gaps: past its pole it would pull all
+the same, and hold an armature where none can be.
 """
 
 import warnings
@@ -29,6 +32,9 @@ from numpy.typing import NDArray
 
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
+from klack.network.ranges import range_text, value_text
+from klack.network.rows import LimitRow
+from klack.network.travel import Travel
 from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import start_lines
 from klack.simulation.interface_step import NO_LAW
@@ -66,6 +72,7 @@ _FAR = 2e9  # [m/s] ... and for what a body that nothing holds has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
 _EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
+_SHALLOW = 1e-6  # [m] no contact deeper than that is looked at
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
 _NEARLY = 1e-9  # the same where they come no closer
 
@@ -217,6 +224,8 @@ class _Balance:
             ]
         )
         self.code = np.zeros(3, np.int64)
+        self.ranges = [limit for limit in rows.limits if limit.ports]
+        self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
     def _columns(self) -> None:
         """Lines and inertances with a free volume at one end carry an unknown flow."""
@@ -286,7 +295,7 @@ class _Balance:
 
     def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
         """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
-        state, before = start.copy(), np.inf
+        state, before, self.beyond = start.copy(), np.inf, None
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
         mass = self._masses(start)[0]
         for _ in range(_MOST_NEWTON):
@@ -332,9 +341,20 @@ class _Balance:
 
     def answers(self, state: _State) -> bool:
         """Whether every part knows its force or flow in this state."""
-        return self._keep_states(state.y) and bool(
-            at_rest(
-                *self._rows, self.h, state.y, state.p, self.force, self.inflow, self.size, self.code
+        return (
+            self._in_range(state.y)
+            and self._keep_states(state.y)
+            and bool(
+                at_rest(
+                    *self._rows,
+                    self.h,
+                    state.y,
+                    state.p,
+                    self.force,
+                    self.inflow,
+                    self.size,
+                    self.code,
+                )
             )
         )
 
@@ -379,6 +399,16 @@ class _Balance:
             _contact(int(kind), interfaces.law, int(first), float(series), float(g))
             for kind, first, series, g in kinds
         ]
+
+    def _in_range(self, y: Vector) -> bool:
+        """Whether all gaps are those of their magnets."""
+        for limit in self.ranges:
+            moved = sum(factor * y[self.network.port_of[port]] for port, factor in limit.ports)
+            value = limit.start + float(moved)
+            if not limit.valid[0] - limit.slack <= value <= limit.valid[1] + limit.slack:
+                self.beyond = limit, value
+                return False
+        return True
 
     def _keep_states(self, y: Vector) -> bool:
         """Give every element that says so the state in which it stays; False if it has none."""
@@ -530,6 +560,8 @@ class _Balance:
         """Error of a network that comes to no end."""
         if not self.evaluate(state):
             return self.failed()
+        if self.beyond is not None:
+            return _out_of_range(*self.beyond)
         left = self.left_on_bodies()
         name = max(left, key=lambda key: abs(left[key])) if left else "the network"
         force = format_si(abs(left.get(name, 0.0)), "N", 3)
@@ -545,11 +577,31 @@ class _Balance:
         """Put the network into this state, and say where that is."""
         if not self.evaluate(state):
             raise self.failed()
+        self._check_stops(state)
         self._put_bodies(state)
         if state.p.size:
             self._put_fluid(state)
         self._put_interfaces(state)
         return self._told(state, notes)
+
+    def _check_stops(self, state: _State) -> None:
+        """Refuse bodies that are pressed into a stop deeper than they can move away from it."""
+        rows, interfaces = self.network.rows, self.network.interfaces
+        gap = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
+        for row, depth in zip(rows.interfaces, -gap, strict=True):
+            if row.law is None or depth <= _SHALLOW:
+                continue
+            factors = Travel.factors(rows, ((row.upper, 1.0), (row.lower, -1.0)))
+            way = row.gap + Travel.of(rows).highest(factors)[0]
+            if depth > way > 0.0:
+                raise InputError(
+                    f"static start: components.{row.component}",
+                    got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
+                    expected=f"less than {format_si(way, 'm', 3)}, all that the stops let them "
+                    "move apart",
+                    hint="check the stiffness of the stop and the forces at time zero, with their "
+                    "units.",
+                )
 
     def _put_bodies(self, state: _State) -> None:
         network = self.network
@@ -690,6 +742,16 @@ def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
         hint="look at the signs of preloads and forces (positive opens; the preload of a spring "
         "closes), add a stop, let the force begin later, or give the body a 'speed': then it "
         "starts in flight.",
+    )
+
+
+def _out_of_range(limit: LimitRow, value: float) -> ConvergenceError:
+    return ConvergenceError(
+        f"static start: {limit.component}: no equilibrium was found with a {limit.quantity} in the "
+        f"range of {limit.law}, {range_text(limit)}; the forces at time zero lead to "
+        f"{value_text(value, limit.unit)} and beyond.\n"
+        f"Try: {limit.advice} Or look for a magnet that is stronger at the start than the stop "
+        "that holds it."
     )
 
 
