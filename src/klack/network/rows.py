@@ -159,6 +159,11 @@ class NodeRow:
     pressure: NDArray[np.float64]
     stated: bool = True
 
+    @property
+    def at_start(self) -> float:
+        """Pressure at time zero [Pa]; of a volume that is not stated, that of the surroundings."""
+        return float(np.interp(0.0, self.time, self.pressure))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WallRow:

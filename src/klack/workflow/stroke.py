@@ -254,9 +254,7 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
 
 def _highest_pressure(rows: Rows) -> float:
     """Highest pressure of the valve at the start, absolute [Pa]."""
-    return max(
-        (float(node.pressure[0]) for node in rows.nodes.values()), default=rows.ambient.pressure
-    )
+    return max((node.at_start for node in rows.nodes.values()), default=rows.ambient.pressure)
 
 
 def _lift(rows: Rows, needle: str) -> float | None:
