@@ -113,13 +113,27 @@ def _table(time: Vector, value: Vector, first: int, last: int, t: float) -> floa
     return value[low] + share * (value[high] - value[low])
 
 
-@njit(cache=True)
-def _solve(A: Any, r: Any, n: int) -> None:
-    """Gauss without pivoting, ``A`` row by row: the matrix is diagonally dominant."""
+@njit(cache=True, error_model="numpy")
+def _solve(A: Any, own: Any, r: Any, n: int) -> None:
+    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
+
+    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
+    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
+    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
+    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
+    """
     for k in range(n):
+        pivot = own[k]
+        for i in range(k + 1, n):
+            pivot -= A[i * n + k]
+        A[k * n + k] = pivot
+        inverse = 1.0 / pivot
+        share = own[k] * inverse
+        for j in range(k + 1, n):
+            own[j] -= A[k * n + j] * share
         for i in range(k + 1, n):
             if A[i * n + k] != 0.0:
-                c = A[i * n + k] / A[k * n + k]
+                c = A[i * n + k] * inverse
                 for j in range(k + 1, n):
                     A[i * n + j] -= c * A[k * n + j]
                 r[i] -= c * r[k]
@@ -257,7 +271,7 @@ def _finite(S: Any, ports: int) -> bool:
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
-@njit(cache=True, _nrt=False)
+@njit(cache=True, _nrt=False, error_model="numpy")
 def run_network(
     macros: int,
     per_record: int,
@@ -407,7 +421,7 @@ def run_network(
     )
     p_used, V, V_used = first(at_nodes[4]), first(at_nodes[5]), first(at_nodes[6])
     r, inflow, known = first(at_nodes[7]), first(at_nodes[8]), first(at_nodes[9])
-    lower, upper = first(at_nodes[10]), first(at_nodes[11])
+    lower, upper, own = first(at_nodes[10]), first(at_nodes[11]), first(at_nodes[12])
     mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
     gammas = nodes.gamma.shape[1]
@@ -542,9 +556,7 @@ def run_network(
                             r[i] = node_mass[i] - V[i] * rho[i]
                             for j in range(volumes):
                                 A[i * volumes + j] = 0.0
-                            A[i * volumes + i] = (
-                                V[i] * slope[i] + rho[i] * node_gamma[level * gammas + i]
-                            )
+                            own[i] = V[i] * slope[i] + rho[i] * node_gamma[level * gammas + i]
                         for k in range(count_branches):
                             i0, o0 = branch_input0[k], branch_output0[k]
                             q0, q1 = branch_port0[k], branch_port0[k + 1]
@@ -574,25 +586,25 @@ def run_network(
                             slope_b[k] = branch_outputs[o0 + 2]
                             if a < volumes:
                                 r[a] -= H * mdot[k]
-                                A[a * volumes + a] += H * slope_a[k]
                                 if b < volumes:
                                     A[a * volumes + b] += H * slope_b[k]
                                     A[b * volumes + a] -= H * slope_a[k]
+                                else:
+                                    own[a] += H * slope_a[k]
                             if b < volumes:
                                 r[b] += H * mdot[k]
-                                A[b * volumes + b] -= H * slope_b[k]
+                                if a >= volumes:
+                                    own[b] -= H * slope_b[k]
                         for e in range(ends):
                             i = node_end_node[e]
                             q_end[e] = (node_density * g[i] - c_end[e]) / Z_end[e]
                             if i < volumes:
                                 r[i] -= H * node_density * q_end[e]
-                                A[i * volumes + i] += (
-                                    H * node_density * (node_density / rho[i]) / Z_end[e]
-                                )
+                                own[i] += H * node_density * (node_density / rho[i]) / Z_end[e]
                         if volumes == 1:
-                            r[0] /= A[0]
+                            r[0] /= own[0]
                         else:
-                            _solve(A, r, volumes)
+                            _solve(A, own, r, volumes)
                         worst, total = 0.0, 0.0
                         for i in range(volumes):
                             total += r[i]
