@@ -509,6 +509,7 @@ def run_network(
             if ends > 0:
                 lines_incoming(lines, line_state, m, c_end, Z_end)
             # 2. sweeps
+            settled, lost = False, False
             for sweep in range(_MOST_SWEEPS):
                 own_G = shift(body_G, level * PORTS * PORTS)
                 _move_by_guess(S, own_G, body_first, body_last, ports)
@@ -633,11 +634,16 @@ def run_network(
                             p[i] += share * r[i]
                         # at once, while it can be seen which branch is to blame
                         if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
+                            if level == 1:  # fine steps may do
+                                lost = True
+                                break
                             report[0], report[2] = 0.0, t
                             for i in range(volumes):
                                 if abs(r[i]) / max(p[i], node_ambient) == worst:
                                     report[0] = i
                             return STATUS_PRESSURES
+                    if lost:
+                        break
                     # the last Newton step, taken with the slopes: mass is conserved exactly
                     for k in range(count_branches):
                         a, b = branch_a[k], branch_b[k]
