@@ -72,7 +72,8 @@ _FAR = 2e9  # [m/s] ... and for what a body that nothing holds has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
 _EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
-_SHALLOW = 1e-6  # [m] no contact deeper than that is looked at
+_SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
+_DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
 _NEARLY = 1e-9  # the same where they come no closer
 
@@ -401,11 +402,11 @@ class _Balance:
         ]
 
     def _in_range(self, y: Vector) -> bool:
-        """Whether all gaps are those of their magnets."""
+        """Whether no armature is beyond its pole, and none far outside its map."""
         for limit in self.ranges:
             moved = sum(factor * y[self.network.port_of[port]] for port, factor in limit.ports)
             value = limit.start + float(moved)
-            if not limit.valid[0] - limit.slack <= value <= limit.valid[1] + limit.slack:
+            if not limit.valid[0] - limit.slack <= value <= limit.usable[1]:
                 self.beyond = limit, value
                 return False
         return True
@@ -585,7 +586,7 @@ class _Balance:
         return self._told(state, notes)
 
     def _check_stops(self, state: _State) -> None:
-        """Refuse bodies that are pressed into a stop deeper than they can move away from it."""
+        """Refuse bodies that are pressed far deeper into a stop than they can move away."""
         rows, interfaces = self.network.rows, self.network.interfaces
         gap = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
         for row, depth in zip(rows.interfaces, -gap, strict=True):
@@ -593,12 +594,12 @@ class _Balance:
                 continue
             factors = Travel.factors(rows, ((row.upper, 1.0), (row.lower, -1.0)))
             way = row.gap + Travel.of(rows).highest(factors)[0]
-            if depth > way > 0.0:
+            if depth > _DEEP * way > 0.0:
                 raise InputError(
                     f"static start: components.{row.component}",
                     got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
-                    expected=f"less than {format_si(way, 'm', 3)}, all that the stops let them "
-                    "move apart",
+                    expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, all that the "
+                    "stops let them move apart",
                     hint="check the stiffness of the stop and the forces at time zero, with their "
                     "units.",
                 )
