@@ -461,11 +461,16 @@ class _Balance:
         return np.where(self.shut, 0.0, inflow[self.free])
 
     def _columns_left(self, state: _State) -> tuple[Vector, Vector]:
-        """What accelerates each column [J/kg], and the sum of what it is the difference of."""
-        g = [self._fluid(state.p[i])[2] for pair in self.ends for i in pair]
-        pair = np.array(g).reshape(-1, 2)
+        """What accelerates each column [J/kg], and what its round-off belongs to.
+
+        That is the sum of what it is the difference of, and of pressure over density: near ambient
+        pressure the energy itself is small, its round-off is that of the pressure.
+        """
+        at_ends = state.p[self.ends]
+        fluid = np.array([self._fluid(p) for p in at_ends.ravel()]).reshape(-1, 2, 3)
+        g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
         drop = self.friction * state.m
-        return drop - (pair[:, 0] - pair[:, 1]), np.abs(drop) + np.abs(pair).sum(axis=1)
+        return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
     def _fluid(self, p: float) -> tuple[float, float, float]:
         rho, slope, g, _ = fluid_at(self.network.nodes.fluid, p, 0)
