@@ -45,6 +45,39 @@ calibration:
     offset: {key: measurement.sensor.offset, lower: -10 um, upper: 10 um}
   profile: [friction]
 """
+RELIEF_VALVE = """
+klack: 1
+title: relief poppet with inlet pipe
+network:
+  fluid: {name: oil, density: 860 kg/m^3, bulk_modulus: 1.4 GPa, bulk_modulus_slope: 0.01,
+          kinematic_viscosity: 10 mm^2/s, gas_fraction: 0}
+  components:
+    tank:
+      type: pressure-source
+      table: {time: [0 ms, 1 ms, 21 ms], pressure: [15 bar, 15 bar, 26 bar]}
+    pipe: {type: line, length: 2.0 m, diameter: 10 mm, pressure: 25 bar, friction: none}
+    inlet: {type: chamber, volume: 500 mm^3, pressure: 15 bar}
+    out:
+      {type: seat, shape: cone, diameter: 10 mm, half_angle: 45 deg, discharge: 0.7,
+       cavitation: null}
+    face: {type: pressure-face, direction: opening, outer_diameter: 10 mm}
+    poppet: {type: rigid-mass, mass: 20 g, points: [nose]}
+    spring: {type: spring, stiffness: 20 N/mm, preload: 157.0796 N, damping: 2 N*s/m}
+    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
+    stop: {type: end-stop, gap: 3 mm, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
+  connections:
+    - [tank.fluid, pipe.a]
+    - [pipe.b, inlet.fluid, out.a, face.fluid]
+    - [out.b, ambient]
+    - [poppet.nose, seat.upper, stop.lower, spring.end, face.body, out.needle]
+    - [ground, seat.lower]
+    - [ground, stop.upper]
+    - [ground, spring.base]
+    - [ground, out.body]
+run: {duration: 95 ms, step: 200 ns, record: 5 us, variants: [wet], lift: poppet.nose}
+"""
+"""A poppet behind a pipe whose supply rises slowly above its spring."""
+
 NO_PROFILE = TEXT.replace("  profile: [friction]\n", "")
 TRUTH = np.array([12.4, 0.5, 2.5e-6])
 SCATTER = np.array([0.06, 0.05, 0.2e-6])

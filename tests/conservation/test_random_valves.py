@@ -7,6 +7,7 @@ import runpy
 from pathlib import Path
 
 import pytest
+from rigid_valve import RELIEF_VALVE
 
 from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning
@@ -55,35 +56,9 @@ def test_a_magnet_that_pulls_through_its_stop_ends_the_run_with_gap_and_time():
         DRAWS["residuals"](case)
 
 
-BALANCED = """
-klack: 1
-title: a poppet whose spring and pressure balance
-network:
-  fluid: {name: oil, density: 860 kg/m^3, bulk_modulus: 1.4 GPa, bulk_modulus_slope: 0.01,
-    kinematic_viscosity: 10 mm^2/s, gas_fraction: 0}
-  components:
-    tank: {type: pressure-source, table: {time: [0 ms, 1 ms, 21 ms], pressure: [15 bar, 15 bar,
-      26 bar]}}
-    pipe: {type: line, length: 2.0 m, diameter: 10 mm, pressure: 25 bar, friction: none}
-    inlet: {type: chamber, volume: 500 mm^3, pressure: 15 bar}
-    out: {type: seat, shape: cone, diameter: 10 mm, half_angle: 45 deg, discharge: 0.7,
-      cavitation: null}
-    face: {type: pressure-face, direction: opening, outer_diameter: 10 mm}
-    poppet: {type: rigid-mass, mass: 20 g, points: [nose]}
-    spring: {type: spring, stiffness: 20 N/mm, preload: 157.0796 N, damping: 60 N*s/m}
-    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
-    stop: {type: end-stop, gap: 3 mm, law: {kind: linear, stiffness: 5e7 N/m}, restitution: 0.3}
-  connections:
-    - [tank.fluid, pipe.a]
-    - [pipe.b, inlet.fluid, out.a, face.fluid]
-    - [out.b, ambient]
-    - [poppet.nose, seat.upper, stop.lower, spring.end, face.body, out.needle]
-    - [ground, seat.lower]
-    - [ground, stop.upper]
-    - [ground, spring.base]
-    - [ground, out.body]
-run: {duration: 14 ms, step: 500 ns, record: 5 us, variants: [wet], lift: poppet.nose}
-"""
+BALANCED = RELIEF_VALVE.replace("damping: 2 N", "damping: 60 N").replace(
+    "duration: 95 ms, step: 200 ns", "duration: 14 ms, step: 500 ns"
+)
 
 
 def test_forces_that_hold_each_other_settle():

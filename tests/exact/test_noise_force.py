@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from klack.acoustics.force_bands import averaged, force_bands
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import band_edges
+from klack.errors import InputError
 from klack.signals import TimeSeries
 from klack.simulation.network_result import (
     ChannelData,
@@ -23,6 +24,7 @@ from klack.simulation.network_result import (
 )
 from klack.workflow import noise_source
 from klack.workflow.noise_force import before_impact, interrupted_impact, stop_force
+from klack.workflow.noise_window import first_part
 
 PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
 
@@ -168,6 +170,29 @@ def test_the_force_of_a_stop_keeps_the_impulse_of_every_record():
     np.testing.assert_allclose(force.values[:130], 12.0, rtol=1e-12)
     np.testing.assert_allclose(force.values[1500:], fine[1500:], rtol=1e-12)
     assert np.all(force.values[140:690] == 0.0)
+
+
+def test_of_a_long_stroke_the_first_part_is_followed():
+    """What is cut off changes nothing of what is left."""
+    whole = stroke_with_rest()
+    inside, across = (
+        replace(last_impact(end), time=begin) for begin, end in ((14e-6, 18e-6), (15e-6, 24e-6))
+    )
+    later = replace(last_impact(33e-6), time=31e-6)
+    whole = replace(whole, events=(inside, across, later))
+
+    part, note = first_part(whole, most=1040)  # 20 records of 50 steps, and some
+
+    assert part.time[-1] == pytest.approx(20e-6)
+    np.testing.assert_array_equal(
+        stop_force(part, "seat").values, stop_force(whole, "seat").values[:1000]
+    )
+    assert part.events[0] is inside
+    assert np.isnan(part.events[1].separation_time)
+    assert "Only the first 20 us of the run of 40 us are followed, with 2 of its 3 impacts" in note
+    assert first_part(whole, most=2000) == (whole, "")
+    with pytest.raises(InputError, match="no impact in its first 10 us"):
+        first_part(whole, most=500)
 
 
 def last_impact(separation: float) -> ImpactEvent:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_source import FlowSource
 from klack.hydraulics.fluid_library import library_fluid
@@ -206,6 +206,29 @@ def test_a_column_of_fluid_starts_with_its_steady_flow(column):
     stays(result, "second flow" if "second flow" in result.channels else "middle pressure", 1e-7)
 
 
+def test_next_to_no_flow_is_steady_as_well():
+    """A column between pressures that differ by less than the round-off of their energies."""
+    excess = 1.0
+    parts = {
+        "rail": PressureSource(pressure=AMBIENT.pressure + excess),
+        "hole": Orifice(diameter=0.05e-3),
+        "sac": Chamber(volume=1e-9),
+        "column": Inertance(length=0.02, diameter=3e-3),
+        "needle": RigidMass(mass=1e-3, points=("tip",)),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+    }
+    joints = [
+        ["rail.fluid", "hole.a"],
+        ["hole.b", "sac.fluid", "column.a"],
+        ["column.b", "ambient"],
+        ["needle.tip", "spring.end"],
+    ]
+
+    found = start(parts, joints, fluid="n-heptane")
+
+    assert found.pressure["sac"] == pytest.approx(AMBIENT.pressure, abs=0.05 * excess + 1e-9)
+
+
 def test_a_stated_pressure_is_kept_and_a_closed_volume_says_that_it_is():
     parts = {
         "rail": PressureSource(pressure=50e5),
@@ -326,6 +349,67 @@ def held(coil: Component, rate: float) -> tuple[StaticStart, NetworkResult]:
     result = run(parts, joints, duration=200e-6)
     assert result.start is not None
     return result.start, result
+
+
+def pulled_onto_a_stop(stiffness: float, gap: float = 60e-6) -> StaticStart:
+    """A magnet that pulls 200 N at its pole, 40 um of which stay open."""
+    parts = {
+        "armature": RigidMass(mass=5e-3, points=("at",)),
+        "spring": Spring(stiffness=1e3, preload=5.0),
+        "stop": EndStop(gap=60e-6, law={"kind": "linear", "stiffness": stiffness}),
+        "coil": Solenoid(
+            turns=100,
+            resistance=1.0,
+            gap=gap,
+            residual_gap=40e-6,
+            poles=[{"outer_radius": 4e-3, "fringing": "none"}],
+            start_current=1.0,
+        ),
+        "supply": VoltageTable(time=[0.0], voltage=[1.0]),
+    }
+    joints = [
+        ["armature.at", "spring.end", "stop.lower", "coil.armature"],
+        ["ground", "stop.upper"],
+        ["coil.terminals", "supply.terminals"],
+    ]
+    return start(parts, joints)
+
+
+def test_an_armature_rests_before_its_pole_and_not_beyond():
+    """Beyond the pole there is a second balance of forces, of which no armature knows."""
+    found = pulled_onto_a_stop(1e8)
+
+    def left(y: float) -> float:
+        pull = MU0 * pi * 4e-3**2 * 100.0**2 / (2.0 * (100e-6 - y) ** 2)
+        return pull - 5.0 - 1e3 * y - 1e8 * (y - 60e-6)
+
+    assert found.displacement["armature.at"] == pytest.approx(
+        brentq(left, 60e-6, 65e-6, xtol=1e-15), rel=1e-7
+    )
+
+
+@pytest.mark.slow
+def test_a_magnet_that_is_stronger_than_its_stop_is_named():
+    said = r"static start: coil: no equilibrium was found with a gap in the range of the magnet of"
+    with pytest.raises(ConvergenceError, match=said):
+        pulled_onto_a_stop(1e7)
+
+
+def test_a_body_that_is_pressed_far_into_its_stop_is_named():
+    parts = {
+        "body": RigidMass(mass=1e-3, points=("tip",)),
+        "seat": EndStop(gap=0.0, law={"kind": "linear", "stiffness": 1e8}),
+        "soft": EndStop(gap=1e-4, law={"kind": "linear", "stiffness": 1e4}),
+        "push": ConstantForce(force=12.0),
+    }
+    joints = [
+        ["body.tip", "seat.upper", "soft.lower", "push.end"],
+        ["ground", "soft.upper"],
+        ["ground", "seat.lower"],
+    ]
+
+    with pytest.raises(InputError, match=r"components\.soft: got bodies pressed 1.2 mm into"):
+        run(parts, joints)
 
 
 def test_a_body_that_nothing_holds_is_named():

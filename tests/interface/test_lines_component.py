@@ -72,6 +72,35 @@ def test_friction_chooses_segments_and_terms(given, parts, terms):
     assert row.vapour_pressure == fluid.vapour_pressure
 
 
+@pytest.mark.parametrize(
+    ("ends", "expected"),
+    [
+        ((3e4, None), 3e4),  # not at the ambient pressure from which the other is found
+        ((None, 2e5), 2e5),
+        ((3e4, 2e5), 2e5),
+        ((None, None), Ambient().pressure),
+    ],
+)
+def test_a_line_takes_the_pressure_that_the_case_states_at_an_end(ends, expected):
+    fluid = library_fluid("n-heptane").at(293.15, gas_fraction=0.01)
+    rows = Rows(ambient=Ambient(), fluid=fluid, component="line", handles={"a": 1, "b": 2})
+    for node, pressure in enumerate(ends, start=1):
+        rows.chamber(node, volume=1e-7, pressure=pressure)
+    line = Line(length=0.06, diameter=2.5e-3)
+
+    line.add_rows(rows)
+
+    assert rows.lines[0].delay == line.length / line.wave_speed(fluid, expected)
+
+
+def test_a_line_takes_the_pressure_of_a_source_at_time_zero():
+    fluid = library_fluid("n-heptane").at(293.15)
+    rows = Rows(ambient=Ambient(), fluid=fluid, component="line", handles={"a": 0, "b": 1})
+    rows.pressure(1, time=(-1e-3, 1e-3), pressure=(1e5, 5e5))
+
+    assert Line(length=0.06, diameter=2.5e-3).working_pressure(rows) == pytest.approx(3e5)
+
+
 def test_wall_needs_both_numbers():
     with pytest.raises(InputError, match="wall_modulus"):
         Line(**BORE, wall_thickness=1e-3)

@@ -290,3 +290,19 @@ def test_every_row_of_a_network_that_can_leave_a_range_is_watched():
     ]
     assert watched[1].valid == (-1.0, 1.0)
     assert np.isinf(watched[1].usable).all()
+
+
+def test_a_chamber_out_of_which_more_flows_than_it_holds_ends_the_run():
+    """A pump drains 1 mm^3 at 1 ml/s: after 1 ms nothing is left."""
+    text = CLOSED.replace("[q.a, ambient]", "[q.b, ambient]").replace(
+        "[q.b, c.fluid]", "[q.a, c.fluid]"
+    )
+    text = text.replace("1 l/min", "0.06 l/min").replace("duration: 0.1 ms", "duration: 2 ms")
+
+    with (
+        pytest.warns(AccuracyWarning),
+        pytest.raises(ConvergenceError, match=r"^c: the pressure is -[\d.]+ bar at") as caught,
+    ):
+        simulate_network(rows_of(text), duration=2e-3, step=20e-9)
+
+    assert moment(caught.value) == pytest.approx(1e-3, rel=0.01)

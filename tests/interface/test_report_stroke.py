@@ -251,7 +251,7 @@ def lonely(study: StrokeStudy) -> StrokeStudy:
         study,
         variants={"dry": replace(still, name="dry")},
         channels=channels,
-        switch_off=NAN,
+        switch_off=None,
         bodies=(),
         stops=(),
         fluid=None,

@@ -6,6 +6,7 @@ netCDF4-python, Octave, asammdf, the csv module, and klack's own reader of measu
 import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -116,6 +117,8 @@ def stroke_study() -> StrokeStudy:
     return fill(
         StrokeStudy,
         title=TITLE,
+        lift=1e-4,
+        switch_off=None,
         created="2026-03-01T08:30:00+00:00",
         versions={"numpy": "2.0"},
         stage_times={},
@@ -271,7 +274,7 @@ def test_csv_gives_the_same_doubles(table: ResultTable, tmp_path: Path):
     for path, (_, axis, channels) in zip(paths, curves(table), strict=False):
         with path.open(encoding="utf-8", newline="") as file:
             header, *rows = list(csv.reader(file))
-        numbers = np.array(rows, dtype=float).T
+        numbers = np.array([[text or "nan" for text in row] for row in rows], dtype=float).T
         assert header[0] == f"{axis.quantity} [{axis.unit}]"
         assert header[1:] == [f"{item.name} [{item.unit}]" for item in channels]
         np.testing.assert_array_equal(numbers, [axis.values, *(c.values for c in channels)])
@@ -283,6 +286,20 @@ def test_csv_gives_the_same_doubles(table: ResultTable, tmp_path: Path):
     assert [(r["run"], r["name"], r["unit"], r["value"]) for r in rows] == expected
     about = json.loads((tmp_path / "about.json").read_text(encoding="utf-8"))
     assert about["title"] == TITLE
+
+
+def test_no_text_says_nan(tables: dict[str, ResultTable], tmp_path: Path):
+    """What does not exist is left out, or empty: a restitution, the end of a drive."""
+    table = tables["stroke"]
+    write_csv(table, tmp_path)
+
+    told = [*table.about.values(), *table.about]
+    told += [item.meaning for run in table.runs for item in (*run.channels, *run.scalars)]
+    told += [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()]
+    assert table.about["lift"] == "0.0001 m"
+    assert "switch off" not in table.about
+    assert not any(re.search(r"\b(nan|NaN|None)\b", text) for text in told)
+    assert any(",,," in text or ",," in text for text in told)  # the missing restitution
 
 
 def test_csv_of_a_stroke_passes_as_a_measurement(tables: dict[str, ResultTable], tmp_path: Path):

@@ -98,6 +98,8 @@ def study() -> StrokeStudy:
     )
     return fill(
         StrokeStudy,
+        lift=1e-4,
+        switch_off=None,
         versions={"numpy": "2.0"},
         stage_times={"mesh": 0.5},
         variants={"wet": variant, "dry": replace(variant, name="dry", wet=False)},
@@ -144,6 +146,16 @@ def test_a_dry_valve_has_no_fluid(study: StrokeStudy, tmp_path: Path):
     save_stroke(replace(study, fluid=None, lines=()), tmp_path)
 
     assert load_stroke(tmp_path).fluid is None
+
+
+def test_nan_of_an_earlier_version_is_none(study: StrokeStudy, tmp_path: Path):
+    nan = float("nan")
+    save_stroke(replace(study, lift=nan, switch_off=nan), tmp_path)
+
+    found = load_stroke(tmp_path)
+
+    assert found.lift is None
+    assert found.switch_off is None
 
 
 def test_any_zarr_reader_finds_channels_with_their_unit(study: StrokeStudy, tmp_path: Path):

@@ -65,7 +65,7 @@ class Line(Component):
         default=None,
         gt=0,
         description="Absolute, about which waves run; sets sound speed and density. Default: the "
-        "higher start pressure of its ends.",
+        "higher start pressure that the case states at its ends.",
     )
     wall_thickness: Length | None = Field(
         default=None, gt=0, description="Of a tube; without it the wall is rigid."
@@ -129,14 +129,17 @@ class Line(Component):
         return 2.0 * self.length / self.wave_speed(fluid, pressure)
 
     def working_pressure(self, rows: Rows) -> float:
-        """Pressure [Pa] whose properties the line has: given, or the higher one of its ends."""
+        """Pressure [Pa] whose properties the line has: given, or the higher one of its ends.
+
+        An end whose start pressure the case states comes before one that begins in steady flow,
+        which is not known yet.
+        """
         if self.pressure is not None:
             return self.pressure
-        ends = [rows.nodes.get(rows.port(port)) for port in self.ports]
-        return max(
-            (float(end.pressure[0]) for end in ends if end is not None),
-            default=rows.ambient.pressure,
-        )
+        known = [rows.nodes.get(rows.port(port)) for port in self.ports]
+        ends = [end for end in known if end is not None]
+        stated = [end for end in ends if end.stated]
+        return max((end.at_start for end in stated or ends), default=rows.ambient.pressure)
 
     def add_rows(self, rows: Rows) -> None:
         """Add the delay line."""

@@ -72,9 +72,9 @@ BOOKS = (
 )
 
 CHANNELS = (
-    Channel("voltage", "V", 5),
+    Channel("voltage", "V", 5, derived=True),
     Channel("current", "A", 4),
-    Channel("flux", "Wb", 6),
+    Channel("flux", "Wb", 6, derived=True),
     Channel("driver state", "-", 0),
 )
 

@@ -58,7 +58,8 @@ class FmuCoupling:
         start, end = y0 - base0, y1 - base1
         now = state.tolist()
         if h == 0.0 or t < 0.0:  # the stores, of which there are none; the static start
-            force = 0.0 if h == 0.0 else self._at_rest(start)
+            force = 0.0 if h == 0.0 else self._before_start(end, (end - start) / h)
+            now[3] = force
             out[:] = (force, -force, *now, 0.0, 0.0)
             return 0
         if h > self.coupling_step * (1.0 + _ROUND_OFF):
@@ -75,11 +76,11 @@ class FmuCoupling:
         out[:] = (force, -force, *after, work + loss, loss)
         return 0
 
-    def _at_rest(self, displacement: float) -> float:
+    def _before_start(self, displacement: float, speed: float) -> float:
         if not self._ready:
             self.slave.begin()
             self._ready, self._began_from = True, -1.0
-        return self.slave.force(displacement, 0.0)
+        return self.slave.force(displacement, speed)
 
     def _is_due(self, state: list[float], t: float) -> bool:
         return state[0] == 0.0 or t - state[1] >= self.coupling_step * (1.0 - _ROUND_OFF)

@@ -166,7 +166,7 @@ class ImportedFmu(Component):
             parameters=(),
             state=(0.0,) * STATES,
             books=(Book("work", "supply"), Book("coupling error", "loss")),
-            channels=(Channel("force of the FMU", "N", 3),),
+            channels=(Channel("force of the FMU", "N", 3, derived=True),),
         )
 
 

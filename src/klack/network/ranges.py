@@ -10,6 +10,7 @@ from klack.units import format_si
 
 __all__ = ["check_ranges", "limits_of", "range_text", "value_text"]
 
+_EMPTY = -1e3  # [Pa] less than a millionth of the vapour is left: more flowed out than there was
 _ROUNDING = 1e-9  # of the start value: what sums of lengths leave
 
 
@@ -53,7 +54,7 @@ def _pressures(rows: Rows) -> list[LimitRow]:
             quantity="pressure",
             unit="Pa",
             valid=(known.lowest, known.highest),
-            usable=(-inf, known.usable),
+            usable=(_EMPTY, known.usable),
             law=f"the fluid '{name}'",
             source=known.source,
             effect=lambda value: (

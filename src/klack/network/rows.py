@@ -73,8 +73,8 @@ class Book:
 class Channel:
     """A state that is recorded under ``<component> <label>``; ``index`` counts in the state.
 
-    ``derived`` states follow from displacements and pressures of the same moment: before the first
-    step they are what the step function makes of those, not what the state starts with.
+    ``derived`` states follow from what else is known at the same moment: before the first step
+    they are what the step function makes of that, not what the state starts with.
     """
 
     label: str
@@ -158,6 +158,11 @@ class NodeRow:
     time: NDArray[np.float64]
     pressure: NDArray[np.float64]
     stated: bool = True
+
+    @property
+    def at_start(self) -> float:
+        """Pressure at time zero [Pa]; of a volume that is not stated, that of the surroundings."""
+        return float(np.interp(0.0, self.time, self.pressure))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

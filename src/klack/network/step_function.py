@@ -25,9 +25,11 @@ The solver books the rest of the hydraulic power: into the branch's supply, if i
 pump), else as its loss.
 
 The solver calls a function several times in a step, with better and better ``y1`` and pressures,
-and takes over the next state of the last call.  Before the first step it calls once with ``h = 0``
-and ``y0 = y1``: then only the stores are read; nothing may be divided by ``h``.  Status 0 is
-success; any other number stops the run, and the component says in words what it means.
+and takes over the next state of the last call.  Before the first step it calls with ``h = 0`` and
+``y0 = y1``: then only the stores are read; nothing may be divided by ``h``.  And it calls with
+short steps up to the time zero (``t = -h``), for the static start and the first record: no next
+state of an element is taken over from these.  Status 0 is success; any other number stops the run,
+and the component says in words what it means.
 """
 
 import ctypes

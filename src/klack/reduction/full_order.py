@@ -174,8 +174,8 @@ def _grow_until(
             raise ConvergenceError(
                 f"full_order_receptance of body '{space.body.name}': the error may still be "
                 f"{bound.max():.2g} with {space.size} vectors, above the tolerance {tolerance:g}.\n"
-                f"Try: a lower top frequency than {omega[-1] / (2 * np.pi):.4g} Hz, or a larger "
-                "max_vectors."
+                f"Try: a lower top frequency than {omega[-1] / (2 * np.pi):.4g} Hz (in a case: "
+                "run.transfer.to); in Python also a larger max_vectors."
             )
 
 

@@ -198,7 +198,7 @@ def _moments(
     touches = variant.needle_times
     times = (
         (touches.opening.touch, "opening stop touched"),
-        (study.switch_off if isfinite(study.switch_off) else None, "drive ends"),
+        (study.switch_off, "drive ends"),
         (touches.closing.touch, "seat touched"),
     )
     end = float(variant.result.time[-1])

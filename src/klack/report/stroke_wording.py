@@ -75,7 +75,7 @@ def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
     is_first = variant.needle_times.starts == "open"
     text = f"It {'touches' if is_first else 'is back on'} its seat at "
     text += quantity(passage.touch, "s", 4)
-    if isfinite(study.switch_off) and passage.touch > study.switch_off:
+    if study.switch_off is not None and passage.touch > study.switch_off:
         after = quantity(passage.touch - study.switch_off, "s", 3)
         text += f", {after} after the end of the drive"
     if event is None:

@@ -170,7 +170,7 @@ def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sum
     """Memory for a network of these sizes."""
     return Scratch(
         interfaces=np.zeros((8, interfaces)),
-        nodes=np.zeros((12, nodes)),
+        nodes=np.zeros((13, nodes)),
         branches=np.zeros((3, branches)),
         ends=np.zeros((3, ends)),
         matrix=np.zeros((nodes, nodes)),

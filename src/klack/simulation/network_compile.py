@@ -318,7 +318,7 @@ def _nodes(
     ambient = rows.ambient.pressure
     fluid = np.zeros(8)
     count = len(order)
-    p = np.array([node.pressure[0] for node in given], dtype=float)
+    p = np.array([node.at_start for node in given], dtype=float)
     density, rho, g = 1.0, np.ones(count), np.zeros(count)
     hint = np.zeros(count, np.int64)
     if rows.fluid is not None and count:

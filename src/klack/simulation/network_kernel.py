@@ -57,7 +57,6 @@ __all__ = [
     "STATUS_ELEMENT",
     "STATUS_FORCES",
     "STATUS_PRESSURES",
-    "read_stores",
     "record_points",
     "run_network",
 ]
@@ -114,13 +113,27 @@ def _table(time: Vector, value: Vector, first: int, last: int, t: float) -> floa
     return value[low] + share * (value[high] - value[low])
 
 
-@njit(cache=True)
-def _solve(A: Any, r: Any, n: int) -> None:
-    """Gauss without pivoting, ``A`` row by row: the matrix is diagonally dominant."""
+@njit(cache=True, error_model="numpy")
+def _solve(A: Any, own: Any, r: Any, n: int) -> None:
+    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
+
+    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
+    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
+    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
+    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
+    """
     for k in range(n):
+        pivot = own[k]
+        for i in range(k + 1, n):
+            pivot -= A[i * n + k]
+        A[k * n + k] = pivot
+        inverse = 1.0 / pivot
+        share = own[k] * inverse
+        for j in range(k + 1, n):
+            own[j] -= A[k * n + j] * share
         for i in range(k + 1, n):
             if A[i * n + k] != 0.0:
-                c = A[i * n + k] / A[k * n + k]
+                c = A[i * n + k] * inverse
                 for j in range(k + 1, n):
                     A[i * n + j] -= c * A[k * n + j]
                 r[i] -= c * r[k]
@@ -258,11 +271,10 @@ def _finite(S: Any, ports: int) -> bool:
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
-@njit(cache=True, _nrt=False)
+@njit(cache=True, _nrt=False, error_model="numpy")
 def run_network(
     macros: int,
     per_record: int,
-    record0: int,
     clock: Index,
     M: int,
     h: float,
@@ -284,8 +296,7 @@ def run_network(
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
     ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
-    ``record0`` is the first record to fill; ``report`` gets the row of a failure, its status and
-    its time.
+    ``report`` gets the row of a failure, its status and its time.
     """
     S = first(bodies.at)
     ports = bodies.first.size - 1
@@ -410,7 +421,7 @@ def run_network(
     )
     p_used, V, V_used = first(at_nodes[4]), first(at_nodes[5]), first(at_nodes[6])
     r, inflow, known = first(at_nodes[7]), first(at_nodes[8]), first(at_nodes[9])
-    lower, upper = first(at_nodes[10]), first(at_nodes[11])
+    lower, upper, own = first(at_nodes[10]), first(at_nodes[11]), first(at_nodes[12])
     mdot, slope_a, slope_b = first(at_branches[0]), first(at_branches[1]), first(at_branches[2])
     c_end, Z_end, q_end = at_ends[0], at_ends[1], at_ends[2]
     gammas = nodes.gamma.shape[1]
@@ -432,7 +443,7 @@ def run_network(
     step, last_level = clock[0], clock[1]
     inverse_h = 1.0 / h
     in_record = 0
-    record = record0
+    record = 0
     record_time = 0.0
     fine_steps, coarse_steps = 0, 0
 
@@ -498,6 +509,7 @@ def run_network(
             if ends > 0:
                 lines_incoming(lines, line_state, m, c_end, Z_end)
             # 2. sweeps
+            settled, lost = False, False
             for sweep in range(_MOST_SWEEPS):
                 own_G = shift(body_G, level * PORTS * PORTS)
                 _move_by_guess(S, own_G, body_first, body_last, ports)
@@ -545,9 +557,7 @@ def run_network(
                             r[i] = node_mass[i] - V[i] * rho[i]
                             for j in range(volumes):
                                 A[i * volumes + j] = 0.0
-                            A[i * volumes + i] = (
-                                V[i] * slope[i] + rho[i] * node_gamma[level * gammas + i]
-                            )
+                            own[i] = V[i] * slope[i] + rho[i] * node_gamma[level * gammas + i]
                         for k in range(count_branches):
                             i0, o0 = branch_input0[k], branch_output0[k]
                             q0, q1 = branch_port0[k], branch_port0[k + 1]
@@ -577,25 +587,25 @@ def run_network(
                             slope_b[k] = branch_outputs[o0 + 2]
                             if a < volumes:
                                 r[a] -= H * mdot[k]
-                                A[a * volumes + a] += H * slope_a[k]
                                 if b < volumes:
                                     A[a * volumes + b] += H * slope_b[k]
                                     A[b * volumes + a] -= H * slope_a[k]
+                                else:
+                                    own[a] += H * slope_a[k]
                             if b < volumes:
                                 r[b] += H * mdot[k]
-                                A[b * volumes + b] -= H * slope_b[k]
+                                if a >= volumes:
+                                    own[b] -= H * slope_b[k]
                         for e in range(ends):
                             i = node_end_node[e]
                             q_end[e] = (node_density * g[i] - c_end[e]) / Z_end[e]
                             if i < volumes:
                                 r[i] -= H * node_density * q_end[e]
-                                A[i * volumes + i] += (
-                                    H * node_density * (node_density / rho[i]) / Z_end[e]
-                                )
+                                own[i] += H * node_density * (node_density / rho[i]) / Z_end[e]
                         if volumes == 1:
-                            r[0] /= A[0]
+                            r[0] /= own[0]
                         else:
-                            _solve(A, r, volumes)
+                            _solve(A, own, r, volumes)
                         worst, total = 0.0, 0.0
                         for i in range(volumes):
                             total += r[i]
@@ -624,11 +634,16 @@ def run_network(
                             p[i] += share * r[i]
                         # at once, while it can be seen which branch is to blame
                         if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
+                            if level == 1:  # fine steps may do
+                                lost = True
+                                break
                             report[0], report[2] = 0.0, t
                             for i in range(volumes):
                                 if abs(r[i]) / max(p[i], node_ambient) == worst:
                                     report[0] = i
                             return STATUS_PRESSURES
+                    if lost:
+                        break
                     # the last Newton step, taken with the slopes: mass is conserved exactly
                     for k in range(count_branches):
                         a, b = branch_a[k], branch_b[k]
@@ -938,46 +953,6 @@ def run_network(
     clock[2] += fine_steps
     clock[3] += coarse_steps
     return STATUS_DONE
-
-
-@njit(cache=True)
-def read_stores(
-    rows: StepRows,
-    head: int,
-    y: Vector,
-    p: Vector,
-    rho: Vector,
-    books: Vector,
-    book_kind: Index,
-) -> int:
-    """Fill the stores of elements (``head`` 0) or branches (3) at the start; a failed row or -1."""
-    for k in range(rows.function.size):
-        i0, o0 = rows.input0[k], rows.output0[k]
-        q0, q1 = rows.port0[k], rows.port0[k + 1]
-        rows.inputs[i0] = rows.inputs[i0 + 1] = 0.0
-        first = 2
-        if head > 0:
-            a, b = rows.a[k], rows.b[k]
-            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
-            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
-            first = 6
-        for j in range(q0, q1):
-            for end in range(2):
-                rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
-        status = call(
-            rows.function[k],
-            pointer(rows.parameters, rows.parameter0[k]),
-            pointer(rows.state, rows.state0[k]),
-            pointer(rows.inputs, i0),
-            pointer(rows.outputs, o0),
-        )
-        if status != 0:
-            return k
-        o0 += head + q1 - q0 + rows.states[k]
-        for j in range(rows.books[k]):
-            if book_kind[rows.book0[k] + j] == STORE:
-                books[rows.book0[k] + j] = rows.outputs[o0 + j]
-    return -1
 
 
 @njit(cache=True)

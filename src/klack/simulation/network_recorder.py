@@ -6,7 +6,6 @@ the records are thinned to the spacing that was asked for, and the steps are kep
 more room for them.  So the memory of a run follows from the number of its records alone.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,6 +119,7 @@ class Recorder:
         self._fine: list[list[Matrix]] = [[] for _ in range(count)]
         self._room = [_MOST_FINE] * count
         self._complete = [True] * count
+        self._begun = False
         self.looked = 0
 
     def begin(self) -> None:
@@ -143,11 +143,33 @@ class Recorder:
         )
         self._points[:, 0] = self.recording.points[0]
         if fresh:  # a run that goes on knows this moment
-            for name, value in self._derived_states():
-                place = next(i for i, column in enumerate(self.points) if column.name == name)
-                self._points[place, 0] = value
             none = [np.empty((0, _FINE))] * len(self._fine)
             finder.feed(np.array([time]), self._velocities(1), none)
+
+    def port_speeds(self) -> Vector:
+        """Velocity [m/s] of every port at the start, the ground last."""
+        ports = len(self.network.ports)
+        return np.append(self._points[ports : 2 * ports, 0], 0.0)
+
+    def first(self, acting: Vector, states: Vector | None = None) -> None:
+        """Put what acts at the start in front of the records.
+
+        Parameters
+        ----------
+        acting : array
+            Forces of elements [N], flows [kg/s], forces of interfaces [N], then their peaks [N].
+        states : array, optional
+            Recorded states of elements, then of branches; those that the rows hold by default.
+        """
+        self._means[:, 0], self._peaks[:, 0] = np.split(acting, [len(self.means)])
+        if states is not None:
+            end = len(self.points) - len(self._fine)
+            self._points[end - len(states) : end, 0] = states
+        self._begun = True
+
+    def last(self, records: int) -> Vector:
+        """Return the values with which a run that goes on begins: see :meth:`first`."""
+        return np.concatenate([self._means[:, records], self._peaks[:, records]])
 
     def take(self, time: Vector, finder: ImpactFinder) -> None:
         """Take over a chunk of as many looks as there are times [s]."""
@@ -170,8 +192,8 @@ class Recorder:
             (self.points, self._points),
             (self.peaks, self._peaks),
         ):
-            if columns is not self.points:
-                values[:, 0] = values[:, 1]  # there is no record before the first moment
+            if columns is not self.points and not self._begun:  # state of an earlier version
+                values[:, 0] = values[:, 1]
             for column, row in zip(columns, values, strict=True):
                 result[column.name] = ChannelData(unit=column.unit, values=row[: records + 1])
         return result
@@ -208,22 +230,6 @@ class Recorder:
                 if found is None or look < found[0]:
                     found = int(look), columns[column].name
         return found
-
-    def _derived_states(self) -> Iterator[tuple[str, float]]:
-        """Derived states as the step functions gave them in the call before the first step."""
-        network = self.network
-        for k, row in enumerate(network.rows.elements):
-            begin = network.elements.output0[k] + len(row.ports)
-            for channel in row.channels:
-                if channel.derived:
-                    value = network.elements.outputs[begin + channel.index]
-                    yield _column(row, channel.label), float(value)
-        for k, branch in enumerate(network.rows.branches):
-            begin = network.branches.output0[k] + 3 + len(branch.ports)
-            for channel in branch.channels:
-                if channel.derived:
-                    value = network.branches.outputs[begin + channel.index]
-                    yield _column(branch, channel.label), float(value)
 
     def _velocities(self, count: int) -> dict[str, Vector]:
         """Of the centres of mass [m/s] in the present chunk, by component."""

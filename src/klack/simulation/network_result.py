@@ -30,7 +30,8 @@ class ChannelData:
     unit : str
         SI.
     values : array, shape (n,)
-        At :attr:`NetworkResult.time`; forces and flows are means over the record before.
+        At :attr:`NetworkResult.time`; forces and flows are means over the record before, the first
+        one the value at the start.
     """
 
     unit: str

@@ -12,11 +12,14 @@ from klack import energy_balance
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.network_arrays import (
     PORTS,
+    STORE,
     WORK,
+    Y0,
     Y1,
     Recording,
     Scratch,
@@ -32,12 +35,12 @@ from klack.simulation.network_kernel import (
     STATUS_DONE,
     STATUS_ELEMENT,
     STATUS_PRESSURES,
-    read_stores,
     run_network,
 )
 from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
+from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
 from klack.units import format_si
 
@@ -141,6 +144,12 @@ def simulate_network(
     _read_stores(network)
     before = energy_stores(network)
     recorder.start(step * first_step, finder, fresh=fresh)
+    if state is None:
+        short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
+        _call_rows(network, -short, short, speeds)
+        recorder.first(*values_now(network, speeds, short))
+    elif _LAST in state:
+        recorder.first(np.asarray(state[_LAST], dtype=float))
     limits = Limits(network, [column.name for column in recorder.points])
     start_point, start_time = recorder.recording.points[:1], np.array([step * first_step])
     limits.tell(start_point, start_time)
@@ -167,7 +176,7 @@ def simulate_network(
         fine_steps=int(clock[2] - done_before[0]),
         coarse_steps=int(clock[3] - done_before[1]),
         wall_time=wall_time,
-        state=_save(network, clock) | {_IMPACTS: finder.state},
+        state=_save(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
         failure="" if failure is None else str(failure),
         start=begun,
     )
@@ -319,7 +328,6 @@ def _try_chunk(
             clock,
             count * grid.look,
             grid.look,
-            0,
             grid.step,
             grid.block,
             grid.coarse,
@@ -348,7 +356,6 @@ def _advance(
     clock: NDArray[np.int64],
     macros: int,
     per_record: int,
-    record0: int,
     step: float,
     block: int,
     allow_coarse: bool,
@@ -358,7 +365,6 @@ def _advance(
     status = run_network(
         macros,
         per_record,
-        record0,
         clock,
         block,
         step,
@@ -483,25 +489,31 @@ def _numbers(values: Vector) -> str:
     return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
 
 
-def _read_stores(network: CompiledNetwork) -> None:
+def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector) -> None:
+    """Ask all rows for a step that ends in the present state: see :func:`call_rows`."""
     nodes = network.nodes
     rho = np.array([fluid_at(nodes.fluid, p, 0)[0] for p in nodes.p])
+    at = network.bodies.at[Y0 : Y0 + len(speeds)]
     for rows, head in ((network.elements, 0), (network.branches, 3)):
-        failed = read_stores(
-            rows,
-            head,
-            network.bodies.at,
-            nodes.p,
-            rho,
-            network.books,
-            network.book_kind,
-        )
+        failed, code = call_rows(rows, head, t, h, at, speeds, nodes.p, rho)
         if failed >= 0:
             status = STATUS_BRANCH if head else STATUS_ELEMENT
-            raise _failure(network, status, np.array([float(failed), 0.0, 0.0]))
+            raise _failure(network, status, np.array([float(failed), float(code), 0.0]))
+
+
+def _read_stores(network: CompiledNetwork) -> None:
+    _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1))
+    for rows, head in ((network.elements, 0), (network.branches, 3)):
+        for k in range(rows.function.size):
+            first = rows.output0[k] + head + rows.port0[k + 1] - rows.port0[k] + rows.states[k]
+            for j in range(rows.books[k]):
+                book = rows.book0[k] + j
+                if network.book_kind[book] == STORE:
+                    network.books[book] = rows.outputs[first + j]
 
 
 _IMPACTS = "impacts.unfinished"
+_LAST = "record.last"
 _SAVED = {
     "bodies": ("fine", "at"),
     "elements": ("state",),

@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at
-from klack.network.step_function import call, pointer
 from klack.simulation.network_arrays import Nodes, StepRows
+from klack.simulation.row_calls import call_rows
 
 __all__ = ["at_rest", "slopes_at_rest"]
 
@@ -17,37 +17,6 @@ Matrix = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _PRESS = 1e-9  # change of a pressure to see what follows from it, over the pressure
-
-
-@njit(cache=True)
-def _call_all(
-    rows: StepRows, head: int, h: float, y: Vector, p: Vector, rho: Vector, report: Index
-) -> bool:
-    """Call every row over a short step up to the time zero in which nothing moves."""
-    for k in range(rows.function.size):
-        i0 = rows.input0[k]
-        rows.inputs[i0], rows.inputs[i0 + 1] = -h, h
-        first = 2
-        if head > 0:
-            a, b = rows.a[k], rows.b[k]
-            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
-            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
-            first = 6
-        q0 = rows.port0[k]
-        for j in range(q0, rows.port0[k + 1]):
-            for end in range(2):
-                rows.inputs[i0 + first + 2 * (j - q0) + end] = y[rows.ports[j]]
-        status = call(
-            rows.function[k],
-            pointer(rows.parameters, rows.parameter0[k]),
-            pointer(rows.state, rows.state0[k]),
-            pointer(rows.inputs, i0),
-            pointer(rows.outputs, rows.output0[k]),
-        )
-        if status != 0:
-            report[0], report[1], report[2] = head, k, status
-            return False
-    return True
 
 
 @njit(cache=True)
@@ -97,7 +66,9 @@ def at_rest(
     inflow[:] = 0.0
     size[:] = 0.0
     ports = force.size
-    if not _call_all(elements, 0, h, y, p, rho, report):
+    still = np.zeros(y.size)
+    report[0], (report[1], report[2]) = 0, call_rows(elements, 0, -h, h, y, still, p, rho)
+    if report[1] >= 0:
         return False
     for k in range(elements.function.size):
         q0 = elements.port0[k]
@@ -105,7 +76,8 @@ def at_rest(
             push = elements.outputs[elements.output0[k] + j - q0]
             force[elements.ports[j]] += push
             size[elements.ports[j]] += abs(push)
-    if not _call_all(branches, 3, h, y, p, rho, report):
+    report[0], (report[1], report[2]) = 3, call_rows(branches, 3, -h, h, y, still, p, rho)
+    if report[1] >= 0:
         return False
     for k in range(branches.function.size):
         o0, q0 = branches.output0[k], branches.port0[k]

@@ -19,6 +19,9 @@ Numer. Anal. 35 (1998) 508): implicit Euler steps in which a body creeps with
 :math:`V \varrho' \Delta p = \tau \sum \dot m`.  Steps :math:`\tau` grow from microseconds until
 they are so long that nothing but the equilibrium is left; a step whose Newton iteration fails is
 shortened.  What moves ever on has no equilibrium.
+
+No state is tried in which a magnet is beyond the range of its gaps: past its pole it would pull all
+the same, and hold an armature where none can be.
 """
 
 import warnings
@@ -29,6 +32,9 @@ from numpy.typing import NDArray
 
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
+from klack.network.ranges import range_text, value_text
+from klack.network.rows import LimitRow
+from klack.network.travel import Travel
 from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import start_lines
 from klack.simulation.interface_step import NO_LAW
@@ -43,6 +49,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
+from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_rows import at_rest, slopes_at_rest
 from klack.units import format_si
 
@@ -57,7 +64,6 @@ _GROWTH = 8.0  # from one to the next
 _MOST_NEWTON = 60
 _HALVINGS = 12  # of a Newton step that leads where a part knows no answer
 _FALL = 0.1  # least share of a pressure that a Newton step leaves
-_SHARE_OF_STEP = 1e-6  # of the step: sources are asked for over so short a time
 _FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
 _STUCK = 1e-8  # the same, where round-off lets it fall no more
 _LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this covers in a step
@@ -66,6 +72,8 @@ _FAR = 2e9  # [m/s] ... and for what a body that nothing holds has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
 _EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
+_SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
+_DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
 _NEARLY = 1e-9  # the same where they come no closer
 
@@ -167,7 +175,7 @@ class _Balance:
         self, network: CompiledNetwork, step: float, held: set[int], *, enclosed: bool
     ) -> None:
         self.network, self.step, self.enclosed = network, step, enclosed
-        self.h, self.move = _SHARE_OF_STEP * step, _MOVE * step
+        self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
         self.ports = count
@@ -217,6 +225,8 @@ class _Balance:
             ]
         )
         self.code = np.zeros(3, np.int64)
+        self.ranges = [limit for limit in rows.limits if limit.ports]
+        self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
     def _columns(self) -> None:
         """Lines and inertances with a free volume at one end carry an unknown flow."""
@@ -255,12 +265,8 @@ class _Balance:
     def first(self) -> _State:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
         nodes = self.network.nodes
-        p = nodes.p.copy()
-        for i in range(nodes.volumes, p.size):  # sources at time zero
-            here = slice(*nodes.table0[i - nodes.volumes : i - nodes.volumes + 2])
-            p[i] = np.interp(0.0, nodes.time[here], nodes.pressure[here])
         z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
-        return _State(z, y, p, np.zeros(len(self.ends)))
+        return _State(z, y, nodes.p.copy(), np.zeros(len(self.ends)))
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
         """Rigid modes that are free to creep; None if all is in equilibrium.
@@ -290,7 +296,7 @@ class _Balance:
 
     def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
         """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
-        state, before = start.copy(), np.inf
+        state, before, self.beyond = start.copy(), np.inf, None
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
         mass = self._masses(start)[0]
         for _ in range(_MOST_NEWTON):
@@ -336,9 +342,20 @@ class _Balance:
 
     def answers(self, state: _State) -> bool:
         """Whether every part knows its force or flow in this state."""
-        return self._keep_states(state.y) and bool(
-            at_rest(
-                *self._rows, self.h, state.y, state.p, self.force, self.inflow, self.size, self.code
+        return (
+            self._in_range(state.y)
+            and self._keep_states(state.y)
+            and bool(
+                at_rest(
+                    *self._rows,
+                    self.h,
+                    state.y,
+                    state.p,
+                    self.force,
+                    self.inflow,
+                    self.size,
+                    self.code,
+                )
             )
         )
 
@@ -384,6 +401,16 @@ class _Balance:
             for kind, first, series, g in kinds
         ]
 
+    def _in_range(self, y: Vector) -> bool:
+        """Whether no armature is beyond its pole, and none far outside its map."""
+        for limit in self.ranges:
+            moved = sum(factor * y[self.network.port_of[port]] for port, factor in limit.ports)
+            value = limit.start + float(moved)
+            if not limit.valid[0] - limit.slack <= value <= limit.usable[1]:
+                self.beyond = limit, value
+                return False
+        return True
+
     def _keep_states(self, y: Vector) -> bool:
         """Give every element that says so the state in which it stays; False if it has none."""
         elements = self.network.elements
@@ -401,7 +428,6 @@ class _Balance:
         """Repeat the slopes with those ports whose motion changes such a state."""
         elements = self.network.elements
         force, inflow = self.force.copy(), self.inflow.copy()
-        size = self.size.copy()
         for k, _ in self.kept:
             for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
                 if port == self.ports:
@@ -411,9 +437,8 @@ class _Balance:
                 if self.answers(moved):
                     self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
                     self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
-        if self.kept:
-            self._keep_states(state.y)
-        self.force[:], self.inflow[:], self.size[:] = force, inflow, size
+        if self.kept:  # what the rows gave out last belongs to the state itself
+            self.answers(state)
 
     def _moved(self, state: _State, change: Vector) -> _State:
         n, r, f = self.ports, self.of_body.size, self.free.size
@@ -436,11 +461,16 @@ class _Balance:
         return np.where(self.shut, 0.0, inflow[self.free])
 
     def _columns_left(self, state: _State) -> tuple[Vector, Vector]:
-        """What accelerates each column [J/kg], and the sum of what it is the difference of."""
-        g = [self._fluid(state.p[i])[2] for pair in self.ends for i in pair]
-        pair = np.array(g).reshape(-1, 2)
+        """What accelerates each column [J/kg], and what its round-off belongs to.
+
+        That is the sum of what it is the difference of, and of pressure over density: near ambient
+        pressure the energy itself is small, its round-off is that of the pressure.
+        """
+        at_ends = state.p[self.ends]
+        fluid = np.array([self._fluid(p) for p in at_ends.ravel()]).reshape(-1, 2, 3)
+        g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
         drop = self.friction * state.m
-        return drop - (pair[:, 0] - pair[:, 1]), np.abs(drop) + np.abs(pair).sum(axis=1)
+        return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
     def _fluid(self, p: float) -> tuple[float, float, float]:
         rho, slope, g, _ = fluid_at(self.network.nodes.fluid, p, 0)
@@ -536,6 +566,8 @@ class _Balance:
         """Error of a network that comes to no end."""
         if not self.evaluate(state):
             return self.failed()
+        if self.beyond is not None:
+            return _out_of_range(*self.beyond)
         left = self.left_on_bodies()
         name = max(left, key=lambda key: abs(left[key])) if left else "the network"
         force = format_si(abs(left.get(name, 0.0)), "N", 3)
@@ -551,11 +583,31 @@ class _Balance:
         """Put the network into this state, and say where that is."""
         if not self.evaluate(state):
             raise self.failed()
+        self._check_stops(state)
         self._put_bodies(state)
         if state.p.size:
             self._put_fluid(state)
         self._put_interfaces(state)
         return self._told(state, notes)
+
+    def _check_stops(self, state: _State) -> None:
+        """Refuse bodies that are pressed far deeper into a stop than they can move away."""
+        rows, interfaces = self.network.rows, self.network.interfaces
+        gap = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
+        for row, depth in zip(rows.interfaces, -gap, strict=True):
+            if row.law is None or depth <= _SHALLOW:
+                continue
+            factors = Travel.factors(rows, ((row.upper, 1.0), (row.lower, -1.0)))
+            way = row.gap + Travel.of(rows).highest(factors)[0]
+            if depth > _DEEP * way > 0.0:
+                raise InputError(
+                    f"static start: components.{row.component}",
+                    got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
+                    expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, all that the "
+                    "stops let them move apart",
+                    hint="check the stiffness of the stop and the forces at time zero, with their "
+                    "units.",
+                )
 
     def _put_bodies(self, state: _State) -> None:
         network = self.network
@@ -696,6 +748,16 @@ def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
         hint="look at the signs of preloads and forces (positive opens; the preload of a spring "
         "closes), add a stop, let the force begin later, or give the body a 'speed': then it "
         "starts in flight.",
+    )
+
+
+def _out_of_range(limit: LimitRow, value: float) -> ConvergenceError:
+    return ConvergenceError(
+        f"static start: {limit.component}: no equilibrium was found with a {limit.quantity} in the "
+        f"range of {limit.law}, {range_text(limit)}; the forces at time zero lead to "
+        f"{value_text(value, limit.unit)} and beyond.\n"
+        f"Try: {limit.advice} Or look for a magnet that is stronger at the start than the stop "
+        "that holds it."
     )
 
 

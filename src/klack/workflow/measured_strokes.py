@@ -206,11 +206,12 @@ class _Reading:
         return tuple(hits[real[0] : real[-1] + 1]) if real else ()
 
 
-def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float) -> _Reading:
+def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float | None) -> _Reading:
     measures = measure_stroke(time, lift, sensor=sensor)
     seat, by_drawing = measures.seat_level, False
-    reached = float(np.max(lift)) > sensor.offset + (1.0 - _REACHED) * way
-    if not isfinite(measures.opening_level) and isfinite(seat) and reached:
+    unread = isfinite(seat) and not isfinite(measures.opening_level)
+    highest = float(np.max(lift)) - sensor.offset
+    if unread and way is not None and highest > (1.0 - _REACHED) * way:
         measures = measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way)
         by_drawing = True
     half = 0.5 * (float(np.min(lift)) + float(np.max(lift)))

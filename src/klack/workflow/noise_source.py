@@ -1,7 +1,7 @@
 """Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from klack.workflow.noise_force import (
     interrupted_impact,
     stop_forces,
 )
+from klack.workflow.noise_window import first_part
 from klack.workflow.progress import Progress, silent
 from klack.workflow.record_store import stored_format
 from klack.workflow.store import IMPACT_FORMAT, load_study
@@ -218,6 +219,8 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
     for name in wanted:
         _require("variant", name, study.variants)
         variant = study.variants[name]
+        followed, cut = first_part(variant.result)
+        variant = replace(variant, result=followed)
         net = _net_force(study, variant)
         last = interrupted_impact(variant.result.events, net)
         found.append(
@@ -236,6 +239,7 @@ def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[No
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
                 notes=(
+                    *filter(None, [cut]),
                     *_notes(variant, last),
                     *_contact_notes(study.stops if variant.flexible else ()),
                 ),

@@ -254,22 +254,20 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
 
 def _highest_pressure(rows: Rows) -> float:
     """Highest pressure of the valve at the start, absolute [Pa]."""
-    return max(
-        (float(node.pressure[0]) for node in rows.nodes.values()), default=rows.ambient.pressure
-    )
+    return max((node.at_start for node in rows.nodes.values()), default=rows.ambient.pressure)
 
 
-def _lift(rows: Rows, needle: str) -> float:
-    """Travel between the stops [m], unloaded; nan if nothing ends it."""
+def _lift(rows: Rows, needle: str) -> float | None:
+    """Travel between the stops [m], unloaded; None if nothing ends it."""
     travel = Travel.of(rows)
     lift = travel.highest({needle: 1.0})[0] - travel.lowest({needle: 1.0})[0]
-    return lift if isfinite(lift) else float("nan")
+    return lift if isfinite(lift) else None
 
 
-def _switch_off(network: Network) -> float:
-    """When the drivers' command ends [s]; nan if no driver says."""
+def _switch_off(network: Network) -> float | None:
+    """When the drivers' command ends [s]; None if no driver says."""
     ends = [part.end for part in network.components.values() if isinstance(part, TimedDriver)]
-    return max((end for end in ends if end is not None), default=float("nan"))
+    return max((end for end in ends if end is not None), default=None)
 
 
 def _channels(

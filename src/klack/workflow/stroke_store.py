@@ -4,6 +4,8 @@
 run; its unit stands beside it as ``unit``.
 """
 
+from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
 from klack.reduction.structure import STRUCTURE_UNITS
@@ -70,4 +72,9 @@ def load_stroke(folder: Path) -> StrokeStudy:
         If there is no result, it comes from something else, or a part of it is missing.
     """
     study: StrokeStudy = load_record(folder, STROKE_FORMAT)
-    return study
+    return replace(study, lift=_known(study.lift), switch_off=_known(study.switch_off))
+
+
+def _known(value: float | None) -> float | None:
+    """None for the nan with which earlier versions said that there is none."""
+    return value if value is not None and isfinite(value) else None

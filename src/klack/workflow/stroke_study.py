@@ -246,10 +246,10 @@ class StrokeStudy:
     stage_times : mapping of str to float [s]
     needle : str
         Component of the body that moves.
-    lift : float [m]
-        Travel from the seat to the opening stop, both unloaded.
-    switch_off : float [s]
-        When the drivers' command ends; nan if no driver says.
+    lift : float or None [m]
+        Travel from the seat to the opening stop, both unloaded; None if no stop ends it.
+    switch_off : float or None [s]
+        When the drivers' command ends; None if no driver says.
     duration, step : float [s]
     variants : mapping of name to StrokeVariant
         The first one is the one to compare with; the last one may be incomplete, see
@@ -279,8 +279,8 @@ class StrokeStudy:
     wall_time: float
     stage_times: Mapping[str, float]
     needle: str
-    lift: float
-    switch_off: float
+    lift: float | None
+    switch_off: float | None
     duration: float
     step: float
     variants: Mapping[str, StrokeVariant]

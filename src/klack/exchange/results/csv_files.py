@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 
 from klack.exchange.results.naming import file_stems
@@ -17,7 +18,7 @@ def write_csv(table: ResultTable, folder: Path) -> tuple[Path, ...]:
 
     UTF-8, comma and decimal point; the one line above the numbers names each column with its unit,
     ``contact force [N]``; the first column is the axis.  Every number is the shortest text that
-    gives the same double again.
+    gives the same double again; one that does not exist is left empty.
 
     Parameters
     ----------
@@ -52,12 +53,12 @@ def write_csv(table: ResultTable, folder: Path) -> tuple[Path, ...]:
 
 
 def _write_curves(path: Path, axis: ResultAxis, channels: Sequence[ResultChannel]) -> None:
+    known = [item.values for item in channels]
     first = "frequency" if axis.quantity == "frequency" else "time"
     with path.open("w", encoding="utf-8", newline="") as file:
         header = [f"{first} [{axis.unit}]", *(f"{item.name} [{item.unit}]" for item in channels)]
         csv.writer(file, lineterminator="\n").writerow(header)
-        columns = [map(repr, axis.values.tolist())]
-        columns += [map(repr, item.values.tolist()) for item in channels]
+        columns = [map(_text, values.tolist()) for values in (axis.values, *known)]
         file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
@@ -67,4 +68,8 @@ def _write_numbers(path: Path, table: ResultTable) -> None:
         writer.writerow(["run", "name", "value", "unit", "meaning"])
         for run in table.runs:
             for item in run.scalars:
-                writer.writerow([run.name, item.name, repr(item.value), item.unit, item.meaning])
+                writer.writerow([run.name, item.name, _text(item.value), item.unit, item.meaning])
+
+
+def _text(value: float) -> str:
+    return "" if isnan(value) else repr(value)

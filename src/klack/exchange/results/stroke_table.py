@@ -21,9 +21,9 @@ _EVENT = (
     ("peak force", "N", "peak_force", "contact and film together"),
     ("peak time", "s", "peak_time", "on the time axis"),
     ("contact time", "s", "contact_time", "closed, all contacts of the impact"),
-    ("separation time", "s", "separation_time", "on the time axis; nan if it stays closed"),
+    ("separation time", "s", "separation_time", "on the time axis; missing if it stays closed"),
     ("impulse", "N s", "impulse", "contact and film together"),
-    ("restitution", "1", "restitution", "nan without separation"),
+    ("restitution", "1", "restitution", "missing without separation"),
     ("energy loss", "J", "energy_loss", "kinetic, of the centre of mass"),
 )
 
@@ -38,8 +38,8 @@ def stroke_table(study: StrokeStudy) -> ResultTable:
     own = {
         "reference": study.reference.name,
         "needle": study.needle,
-        "lift": f"{study.lift!r} m",
-        "switch off": f"{study.switch_off!r} s",
+        **_known("lift", study.lift, "m"),
+        **_known("switch off", study.switch_off, "s"),
         "lift channel": study.channels.lift,
         "velocity channel": study.channels.velocity,
     }
@@ -49,6 +49,10 @@ def stroke_table(study: StrokeStudy) -> ResultTable:
     return ResultTable(
         kind="stroke", about=about_study(study, own), case_text=study.case_text, runs=runs
     )
+
+
+def _known(name: str, value: float | None, unit: str) -> dict[str, str]:
+    return {} if value is None else {name: f"{value!r} {unit}"}
 
 
 def _variant(variant: StrokeVariant, step: float) -> ResultRun:

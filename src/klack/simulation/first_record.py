@@ -1,0 +1,79 @@
+"""What acts at the moment at which a run begins: the record before its first step.
+
+Later records hold means over the time before them; the first one holds the limit of that, values of
+the started state itself.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.network.rows import BranchRow, ElementRow
+from klack.simulation.contact_step import mean_force
+from klack.simulation.interface_step import NO_LAW, film_force
+from klack.simulation.network_arrays import StepRows
+from klack.simulation.network_compile import CompiledNetwork
+
+__all__ = ["values_now"]
+
+Vector = NDArray[np.float64]
+
+
+def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vector, Vector]:
+    """Forces, flows and recorded states now, once all rows were asked for a short step up to now.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+    speeds : array [m/s]
+        Of all ports, the ground last.
+    h : float [s]
+        Length of that step.
+
+    Returns
+    -------
+    acting : array
+        Forces of elements [N], flows of branches [kg/s], contact and film force of every
+        interface [N], then their sums [N].
+    states : array
+        Recorded states of elements, then of branches.
+    """
+    elements, branches, rows = network.elements, network.branches, network.rows
+    forces = [
+        elements.outputs[elements.output0[k] :][: len(row.ports)]
+        for k, row in enumerate(rows.elements)
+    ]
+    flows = branches.outputs[branches.output0[:-1]]
+    pressing = _interfaces(network, speeds, h)
+    states = [*_states(elements, rows.elements, 0), *_states(branches, rows.branches, 3)]
+    return (
+        np.concatenate([*forces, flows, pressing.ravel(), pressing.sum(axis=1)]),
+        np.array(states, dtype=float),
+    )
+
+
+def _states(data: StepRows, rows: Sequence[ElementRow | BranchRow], head: int) -> list[float]:
+    """Recorded states as they are, derived ones as the step functions gave them."""
+    found = []
+    for k, row in enumerate(rows):
+        after = data.outputs[data.output0[k] + head + len(row.ports) :]
+        now = data.state[data.state0[k] :]
+        found += [(after if c.derived else now)[c.index] for c in row.channels]
+    return found
+
+
+def _interfaces(network: CompiledNetwork, speeds: Vector, h: float) -> Vector:
+    """Contact and film force [N] of every interface, shape (n, 2)."""
+    at = network.interfaces
+    found = np.zeros((len(network.rows.interfaces), 2))
+    for c in range(len(found)):
+        gap = float(at.gap[c] + at.e[c])  # between the surfaces
+        opening = float(speeds[at.upper[c]] - speeds[at.lower[c]])
+        if at.kind[c] != NO_LAW and gap < 0.0:
+            found[c, 0], _, _ = mean_force(int(at.kind[c]), at.law, int(at.law0[c]), -gap, -gap, 0)
+        before = gap - h * opening
+        film = (float(at.cubic[c]), float(at.linear[c]), float(at.cut_off[c]))
+        if max(film[:2]) > 0.0 and min(before, gap) >= 0.0:
+            found[c, 1] = max(film_force(*film, h, before, gap), -float(at.suction[c]))
+    return found
