@@ -2,11 +2,11 @@
 
 from number import Number, Size
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
 from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
 from klack.contact.restitution import Deviation
-from klack.workflow.impact import run_impact
-from klack.workflow.study import ImpactStudy
 
 __all__ = ["axisymmetric_twin", "numbers", "whole_rim"]
 

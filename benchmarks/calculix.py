@@ -22,6 +22,8 @@ from number import Number, Size
 from solid_valve import coarse_witness
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.comparison.calculix import energy_balance
+from klack.assembling.problem import ContactProblem, build_problem
 from klack.case import find_case, load_case
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
@@ -31,8 +33,6 @@ from klack.exchange.calculix_deck import CalculixImpact, write_deck
 from klack.exchange.calculix_result import other_run, read_calculix
 from klack.exchange.calculix_run import run_calculix
 from klack.transient.full_order import simulate_full_order
-from klack.workflow.compare import energy_balance
-from klack.workflow.problem import ContactProblem, build_problem
 
 _PENALTY = 1e18  # [N/m^3]
 _STEPS: dict[Size, tuple[float, float]] = {  # of CalculiX and of klack [s]

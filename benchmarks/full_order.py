@@ -15,11 +15,11 @@ from machine import peak_gigabytes
 from number import Number, Size
 from solid_valve import solid_valve
 
+from klack.analyses.impact.run import run_impact
 from klack.case import load_case, shipped_cases
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
 from klack.verification.impacts import needle_over_seat
-from klack.workflow.impact import run_impact
 
 __all__ = ["main", "numbers"]
 

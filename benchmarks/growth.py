@@ -8,14 +8,14 @@ from number import Number, Size, exponent
 from solid_valve import solid_valve
 from threadpoolctl import threadpool_limits
 
+from klack.assembling.bodies import assemble_body, build_bodies
+from klack.assembling.ladder import closing_force, impact_energy, static_ladder
+from klack.assembling.modes import mode_pool
 from klack.case.schema import Case
 from klack.elasticity.statics import Flexibility
+from klack.progress import silent
 from klack.reduction.selection import ByCount
 from klack.transient.full_order import simulate_full_order
-from klack.workflow.bodies import assemble_body, build_bodies
-from klack.workflow.ladder import closing_force, impact_energy, static_ladder
-from klack.workflow.levels import mode_pool
-from klack.workflow.progress import silent
 
 __all__ = ["numbers"]
 

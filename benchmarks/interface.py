@@ -13,16 +13,22 @@ from time import perf_counter
 import numpy as np
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.full_level import run_full
+from klack.analyses.impact.interface_level import (
+    ExactGaps,
+    build_interface,
+    exact_gaps,
+    simulate_case,
+)
+from klack.assembling.modes import kept_modes, mode_pools
+from klack.assembling.problem import build_problem
 from klack.case import load_case, shipped_cases
 from klack.case.placement import Placement
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
+from klack.progress import silent
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
-from klack.workflow.interface_level import ExactGaps, build_interface, exact_gaps, simulate_case
-from klack.workflow.levels import kept_modes, mode_pools, run_full
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
 
 _PLACEMENTS = {
     "centred": Placement(),

@@ -16,13 +16,13 @@ from number import Number, Size
 from numpy.typing import NDArray
 from solid_valve import solid_valve
 
+from klack.assembling.bodies import build_bodies
 from klack.case import load_case, shipped_cases
 from klack.elasticity.assembly import assemble
 from klack.elasticity.factorization import factorize
 from klack.elasticity.statics import Flexibility
+from klack.progress import silent
 from klack.simulation.kernel import FAST
-from klack.workflow.bodies import build_bodies
-from klack.workflow.progress import silent
 
 __all__ = ["bandwidth", "numbers"]
 

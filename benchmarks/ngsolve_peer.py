@@ -21,6 +21,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from solid_valve import solid_valve
 from threadpoolctl import threadpool_limits
 
+from klack.assembling.bodies import build_bodies
 from klack.elasticity.assembly import assemble
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import eigenmodes
@@ -28,8 +29,7 @@ from klack.elasticity.factorization import factorize
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.mesh.mesh import ElementBlock, Mesh
-from klack.workflow.bodies import build_bodies
-from klack.workflow.progress import silent
+from klack.progress import silent
 
 __all__ = ["numbers", "straightened"]
 

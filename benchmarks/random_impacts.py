@@ -22,12 +22,12 @@ import numpy as np
 import yaml
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
 from klack.case import read_case
 from klack.case.schema import Case
 from klack.contact.hertz import line_half_width, point_radius
 from klack.errors import KlackError
-from klack.workflow.impact import run_impact
-from klack.workflow.study import ImpactStudy
 
 MATERIALS: Mapping[str, tuple[float, float, float]] = {
     "steel": (210e9, 0.3, 7850.0),

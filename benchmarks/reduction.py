@@ -7,12 +7,13 @@ from machine import peak_gigabytes
 from number import Number, Size
 from solid_valve import solid_valve
 
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.case import load_case, shipped_cases
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
-from klack.workflow.levels import first_stiffness, mode_pools, own_pair
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
+from klack.progress import silent
 
 __all__ = ["numbers"]
 

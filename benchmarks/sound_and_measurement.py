@@ -126,8 +126,8 @@ def calibrate_rows() -> list[Row]:
 
 def noise_rows() -> list[Row]:
     """Wall time from a stored stroke to loudness."""
-    from klack.workflow.noise import run_noise
-    from klack.workflow.noise_source import load_sources
+    from klack.analyses.noise.run import run_noise
+    from klack.analyses.noise.source import load_sources
 
     with tempfile.TemporaryDirectory() as folder:
         klack("stroke", str(CASES / "demo-stroke"), "--variant", "wet", "--out", folder, "-q")

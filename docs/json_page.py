@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from klack.workflow.json_results import result_schema
+from klack.analyses.json_results import result_schema
 
 __all__ = ["page"]
 

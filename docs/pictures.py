@@ -17,22 +17,22 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from klack.report.calibration_figures import stroke_chart as calibration_chart
+from klack.analyses.calibration.analysis import CALIBRATION
+from klack.analyses.calibration.figures import stroke_chart as calibration_chart
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.figures import force_chart
+from klack.analyses.impact.pressure_figure import draw_pressure
+from klack.analyses.impact.pressure_view import PressureView, pressure_view
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.section_figure import section_figure
+from klack.analyses.noise.analysis import NOISE
+from klack.analyses.noise.figures import click_charts
+from klack.analyses.store import stored_format
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.figures import actuation_chart
+from klack.analyses.stroke.record import StrokeStudy
 from klack.report.chart import AxisSpec, Chart
-from klack.report.figures import force_chart
-from klack.report.noise_figures import click_charts
-from klack.report.pressure_figure import draw_pressure
-from klack.report.pressure_view import PressureView, pressure_view
 from klack.report.printed import svg_chart
-from klack.report.section_figure import section_figure
-from klack.report.stroke_figures import actuation_chart
-from klack.workflow.calibration_store import CALIBRATION_FORMAT, load_calibration
-from klack.workflow.noise_store import NOISE_FORMAT, load_noise
-from klack.workflow.record_store import stored_format
-from klack.workflow.store import load_study
-from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke
-from klack.workflow.stroke_study import StrokeStudy
-from klack.workflow.study import ImpactStudy
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -43,19 +43,19 @@ def main(results: list[Path]) -> None:
     compared: list[ImpactStudy] = []
     for result in results:
         form = stored_format(result)
-        if form == STROKE_FORMAT.name:
-            (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(load_stroke(result))))
+        if form == STROKE.form.name:
+            (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(STROKE.load(result))))
             continue
-        if form == CALIBRATION_FORMAT.name:
-            study = load_calibration(result)
+        if form == CALIBRATION.form.name:
+            study = CALIBRATION.load(result)
             chart = calibration_chart(study, study.channels[0])
             (IMAGES / "calibration.svg").write_bytes(svg_chart(chart))
             continue
-        if form == NOISE_FORMAT.name:
-            chart = click_charts(load_noise(result))[0]
+        if form == NOISE.form.name:
+            chart = click_charts(NOISE.load(result))[0]
             (IMAGES / "click.svg").write_bytes(svg_chart(chart))
             continue
-        impact = load_study(result)
+        impact = IMPACT.load(result)
         if {"interface", "full"} <= impact.levels.keys():
             compared.append(impact)
         elif impact.sections:

@@ -24,17 +24,17 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from klack import __version__
+from klack.analyses.shots.draw import ShotDraw, draw_shot
+from klack.analyses.shots.model import build_shots
+from klack.analyses.shots.one_shot import ShotSetup, run_shot
+from klack.analyses.stroke.run import run_variant, variant_network
+from klack.assembling.valve import Valve, build_valve
 from klack.case.reader import parse, text_of, validated
 from klack.case.schema import Case
 from klack.case.shipped import shipped_cases
 from klack.case.valve import ValveCase, Variant
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
-from klack.workflow.shot_draw import ShotDraw, draw_shot
-from klack.workflow.shot_model import build_shots
-from klack.workflow.shot_run import ShotSetup, run_shot
-from klack.workflow.stroke import run_variant, variant_network
-from klack.workflow.valve import Valve, build_valve
 
 Floats = NDArray[np.float64]
 

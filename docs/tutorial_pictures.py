@@ -15,16 +15,16 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from klack.analyses.calibration.analysis import CALIBRATION
+from klack.analyses.calibration.figures import stroke_chart as calibration_chart
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.figures import force_chart, spectrum_chart
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.figures import actuation_chart
 from klack.mesh.mesh import Mesh
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step
-from klack.report.calibration_figures import stroke_chart as calibration_chart
-from klack.report.figures import force_chart, spectrum_chart
 from klack.report.printed import STYLE, svg, svg_chart
-from klack.report.stroke_figures import actuation_chart
-from klack.workflow.calibration_store import load_calibration
-from klack.workflow.store import load_study
-from klack.workflow.stroke_store import load_stroke
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -55,7 +55,7 @@ def own_step(folder: Path) -> dict[str, bytes]:
         axes.view_init(elev=22, azim=-60)
         axes.set_axis_off()
         parts = svg(figure, dpi=150)
-    study = load_study(folder / "pin")
+    study = IMPACT.load(folder / "pin")
     return {"pin-parts": parts, "pin-force": svg_chart(force_chart(study))}
 
 
@@ -73,12 +73,12 @@ def _draw_part(axes: Any, mesh: Mesh, colour: str) -> None:
 
 def own_inp(folder: Path) -> dict[str, bytes]:
     """Force of the plunger."""
-    return {"plunger-force": svg_chart(force_chart(load_study(folder / "plunger")))}
+    return {"plunger-force": svg_chart(force_chart(IMPACT.load(folder / "plunger")))}
 
 
 def dry_impact(folder: Path) -> dict[str, bytes]:
     """Force of all levels; spectrum without the lumped one."""
-    study = load_study(folder / "fine")
+    study = IMPACT.load(folder / "fine")
     flexible = replace(study, levels={k: v for k, v in study.levels.items() if k != "lumped"})
     return {
         "dry-force": svg_chart(force_chart(study)),
@@ -88,7 +88,7 @@ def dry_impact(folder: Path) -> dict[str, bytes]:
 
 def wet_stroke(folder: Path) -> dict[str, bytes]:
     """Current, magnetic force and lift, wet and dry."""
-    whole = actuation_chart(load_stroke(folder / "stroke"))
+    whole = actuation_chart(STROKE.load(folder / "stroke"))
     kept = [panel for panel in whole.panels if panel.y.label in ("current", "magnet", "lift")]
     first = kept[0]
     top = max(float(curve.y.max()) for curve in first.curves)
@@ -99,7 +99,7 @@ def wet_stroke(folder: Path) -> dict[str, bytes]:
 
 def measurement(folder: Path) -> dict[str, bytes]:
     """Lift before and after the fit."""
-    study = load_calibration(folder / "fit")
+    study = CALIBRATION.load(folder / "fit")
     return {"fit": svg_chart(calibration_chart(study, study.channels[0]))}
 
 
@@ -107,7 +107,7 @@ def system_tool(folder: Path) -> dict[str, bytes]:
     """Force of klack and of the FMU."""
     from fmpy import simulate_fmu
 
-    history = load_study(folder / "disc").levels["reduced"].history
+    history = IMPACT.load(folder / "disc").levels["reduced"].history
     time, force = history.time, history.force
     run = simulate_fmu(
         str(folder / "models" / "disc_pair.fmu"),

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 import pytest
 
 from klack import energy_balance
-from klack.workflow import workers
+from klack.analyses import workers
 
 LIMITS = {
     "simulate": 1e-9,  # a discrete-gradient step is exact; round-off of up to 1e6 steps is left

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from klack.analyses.json_results import result_schema
 from klack.cli import output
-from klack.workflow.json_results import result_schema
 
 __all__ = ["every_result_is_documented", "require_documented"]
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from rigid_valve import write_bench
 
+from klack.analyses.calibration.analysis import CALIBRATION
+from klack.analyses.calibration.log import TRIAL_LOG
+from klack.analyses.calibration.motion import MotionModel
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
-from klack.workflow.calibration_log import TRIAL_LOG
-from klack.workflow.calibration_motion import MotionModel
-from klack.workflow.calibration_store import load_calibration
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_json_has_values_errors_and_units_in_si(done):
 
 
 def test_stored_study_is_the_one_of_the_json(done):
-    study = load_calibration(done)
+    study = CALIBRATION.load(done)
     data = json.loads((done.parent / "numbers.json").read_text())
     for item in study.parameters:
         assert data["parameters"][item.name]["value"] == item.value
@@ -78,7 +78,7 @@ def test_calibrated_case_holds_the_values_and_runs(done, tmp_path):
     assert "to 3 strokes of strokes.csv" in text
     assert text.endswith("  # the end\n")
     case = load_valve_case(done / "case_calibrated.yaml")
-    found = {item.name: item.value for item in load_calibration(done).parameters}
+    found = {item.name: item.value for item in CALIBRATION.load(done).parameters}
     assert case.network.components["spring"].preload == pytest.approx(found["preload"], rel=1e-6)
     assert case.measurement.sensor.offset == pytest.approx(found["offset"], rel=1e-6)
     run = ["stroke", str(done / "case_calibrated.yaml"), "--out", str(tmp_path), "--no-report"]
@@ -105,7 +105,7 @@ def test_an_interrupted_calibration_goes_on_to_the_same_bits(
 
     monkeypatch.setattr(MotionModel, "run", run)
     assert main(command(bench, tmp_path, "--no-report", "--quiet")) == 0
-    again, before = load_calibration(tmp_path), load_calibration(done)
+    again, before = CALIBRATION.load(tmp_path), CALIBRATION.load(done)
     assert again.resumed == 8
     assert again.evaluations == before.evaluations
     for a, b in zip(again.parameters, before.parameters, strict=True):

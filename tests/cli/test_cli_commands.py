@@ -174,9 +174,9 @@ def test_schema_is_printed_and_written(capsys):
 
 def play(monkeypatch: pytest.MonkeyPatch, run: Callable[..., object]) -> None:
     """Replace the calculation by ``run``; all else is the real command."""
-    module = ModuleType("klack.workflow.impact")
+    module = ModuleType("klack.analyses.impact.run")
     module.run_impact = run  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "klack.workflow.impact", module)
+    monkeypatch.setitem(sys.modules, "klack.analyses.impact.run", module)
 
 
 def raising(error: BaseException) -> Callable[..., object]:

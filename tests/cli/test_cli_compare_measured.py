@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.stroke.analysis import STROKE
 from klack.cli.main import main
-from klack.workflow.stroke_store import load_stroke
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 STROKES, NOISE, RATE = 3, 0.2e-6, 400e3
@@ -41,7 +41,7 @@ def result(tmp_path_factory) -> Path:
 
 def record(result: Path, path: Path, variant: str = "wet", **changes: float) -> Path:
     """Write strokes of the result behind each other, with semicolons and decimal commas."""
-    run = load_stroke(result).variants[variant].result
+    run = STROKE.load(result).variants[variant].result
     lift = run.channels["needle.tip displacement"].values
     period = REST + float(run.time[-1])
     time = np.arange(0.0, changes.get("strokes", STROKES) * period, 1.0 / RATE)

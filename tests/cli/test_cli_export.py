@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import scipy.io
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.run import run_impact
 from klack.case import find_case
 from klack.case.reader import read_case
 from klack.cli.main import main
-from klack.workflow.impact import run_impact
-from klack.workflow.store import save_study
 
 VALVE = find_case("demo-valve-axisymmetric")
 
@@ -26,7 +26,7 @@ def study():
 @pytest.fixture(scope="module")
 def stored(study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("result")
-    save_study(study, folder)
+    IMPACT.save(study, folder)
     return folder
 
 

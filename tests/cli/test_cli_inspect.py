@@ -127,7 +127,7 @@ def test_a_wrong_name_of_a_face_is_told_with_its_key(
     def never(*args: object) -> None:
         raise AssertionError("meshed")
 
-    monkeypatch.setattr("klack.workflow.generated_mesh.mesh_step", never)
+    monkeypatch.setattr("klack.assembling.generated_mesh.mesh_step", never)
     for command in (["inspect", str(path)], ["impact", str(path), "--out", str(tmp_path / "o")]):
         assert main(command) == 2
         told = capsys.readouterr().err

@@ -13,11 +13,11 @@ from shutil import copytree
 import numpy as np
 import pytest
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.noise.analysis import NOISE
+from klack.analyses.noise.content import noise_content
+from klack.analyses.noise.summary import NOISE_COLUMNS, noise_rows
 from klack.cli.main import main
-from klack.report.noise_content import noise_content
-from klack.workflow.noise_store import load_noise
-from klack.workflow.noise_summary import NOISE_COLUMNS, noise_rows
-from klack.workflow.store import load_study, save_study
 
 ROOT = Path(__file__).parents[2]
 HOW_TO = ROOT / "docs" / "how-to"
@@ -79,7 +79,7 @@ def test_numbers_have_the_promised_keys(numbers):
 
 
 def test_third_octaves_are_those_of_the_stored_force(impact, numbers):
-    history = load_study(impact).levels["reduced"].history
+    history = IMPACT.load(impact).levels["reduced"].history
     levels = {round(b["center_Hz"]): b["level_dB"] for b in numbers["third_octave"]}
     time, step = history.time, history.step
     for k in (-10, 0, 10, 15, 20):
@@ -93,7 +93,7 @@ def test_third_octaves_are_those_of_the_stored_force(impact, numbers):
 
 
 def test_injected_energy_is_what_the_impact_left_in_the_modes(impact, numbers):
-    result = load_study(impact).levels["reduced"]
+    result = IMPACT.load(impact).levels["reduced"]
     (modal,) = [item for item in result.modal_energy if item.body == "housing"]
 
     # no damping: all that went in is still there; the impact knows it from its own propagation
@@ -102,7 +102,7 @@ def test_injected_energy_is_what_the_impact_left_in_the_modes(impact, numbers):
 
 
 def test_the_stop_has_the_impulse_of_the_impact(impact, numbers):
-    history = load_study(impact).levels["reduced"].history
+    history = IMPACT.load(impact).levels["reduced"].history
 
     (stop,) = numbers["stops"].values()
     assert stop["impulse_Ns"] == pytest.approx(history.impulse, rel=1e-12)
@@ -125,7 +125,7 @@ def test_sounds_have_the_stated_level(heard, numbers):
 
 def test_the_table_says_how_levels_are_weighted(heard):
     """A-weighting takes from what is radiated below 1 kHz and adds a decibel at 2 to 4 kHz."""
-    study = load_noise(heard)
+    study = NOISE.load(heard)
     (row,) = noise_rows(study)
     shown = dict(zip(NOISE_COLUMNS, row, strict=True))
     levels = study.designs[0].sound.statistics
@@ -137,7 +137,7 @@ def test_the_table_says_how_levels_are_weighted(heard):
 
 def test_the_click_carries_the_radiated_energy(heard):
     """Monopole: the exposure on a sphere about it, over the impedance of air, is the energy."""
-    (design,) = load_noise(heard).designs
+    (design,) = NOISE.load(heard).designs
     audible = design.radiated_bands[design.band_middle < 20e3].sum()
     settings = design.settings
     impedance = settings.air_density * settings.sound_speed
@@ -159,7 +159,7 @@ def test_the_report_holds_players_and_says_what_it_is(heard):
 
 
 def test_a_stored_study_comes_back(heard):
-    (design,) = load_noise(heard).designs
+    (design,) = NOISE.load(heard).designs
 
     assert design.bodies[0].mobility.dtype == np.complex128
     assert design.sound.pressure.unit == "Pa"
@@ -192,7 +192,7 @@ def test_two_designs_stand_side_by_side(impact, tmp_path, capsys):
 
 def test_differences_of_two_designs_are_levels(heard):
     """Truth: 3.01 dB of twice the energy."""
-    study = load_noise(heard)
+    study = NOISE.load(heard)
     (design,) = study.designs
     bodies = tuple(replace(body, injected=2.0 * body.injected) for body in design.bodies)
     loud = replace(design, name="loud", net_share=4.0 * design.net_share, bodies=bodies)
@@ -228,7 +228,7 @@ def test_a_rigid_valve_has_spectra_alone():
     assert found["injected_energy_J"] is None
     assert found["loudness_max_sone"] is None
     assert not list(Path("rigid").glob("*.wav"))
-    content = noise_content(load_noise(Path("rigid")))
+    content = noise_content(NOISE.load(Path("rigid")))
     assert any("only the spectra of the force are known" in text for text in content.warnings)
     assert [section.title for section in content.sections] == [
         "Force of the stops",
@@ -255,7 +255,7 @@ def _variant(impact: Path, heard: Path, folder: Path) -> list[str]:
 
 
 def _older(impact: Path, heard: Path, folder: Path) -> list[str]:
-    save_study(replace(load_study(impact), structures=()), folder / "old")
+    IMPACT.save(replace(IMPACT.load(impact), structures=()), folder / "old")
     return [str(folder / "old")]
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-import klack.workflow.shots as workflow
+import klack.analyses.shots.run as workflow
+from klack.analyses.shots.log import SHOT_LOG
 from klack.cli.main import main
-from klack.workflow.shots_log import SHOT_LOG
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = HOW_TO / "guided_needle.yaml"

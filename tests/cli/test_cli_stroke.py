@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from klack.analyses.stroke.analysis import STROKE
 from klack.cli.main import main
 from klack.contact.laws import gonthier_coefficient
-from klack.workflow.stroke_store import load_stroke
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = HOW_TO / "small_valve.yaml"
@@ -156,8 +156,8 @@ def test_two_runs_are_one(run):
     assert main([*half, "--out", "first"]) == 0
     assert main([*half, "--out", "second", "--continue", "first"]) == 0
 
-    whole = load_stroke(run / "out").variants["dry"].result
-    parts = [load_stroke(Path(name)).variants["dry"].result for name in ("first", "second")]
+    whole = STROKE.load(run / "out").variants["dry"].result
+    parts = [STROKE.load(Path(name)).variants["dry"].result for name in ("first", "second")]
     assert len(parts[0].events) > 3 < len(parts[1].events)
     # the impact in which the first half ends is told again, whole
     found = {(e.stop, e.time): e for part in parts for e in part.events}
@@ -291,4 +291,4 @@ def test_a_valve_that_does_not_open_says_so(tmp_path, capsys, recwarn, quiet):
 
 
 def test_a_valve_that_opens_has_no_such_note(run):
-    assert not any("never left" in note for note in load_stroke(run / "out").warnings)
+    assert not any("never left" in note for note in STROKE.load(run / "out").warnings)

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from klack import energy_balance
+from klack.analyses.impact import interface_level
+from klack.analyses.impact.run import run_impact
 from klack.case.reader import load_case
 from klack.transient import interface_run
-from klack.workflow import interface_level
-from klack.workflow.impact import run_impact
 
 CASE = Path(__file__).parents[1] / "data" / "tiny_rods.yaml"
 

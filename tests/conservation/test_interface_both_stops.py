@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.interface_level import build_interface
+from klack.assembling.bodies import find_touch
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import ContactProblem, build_problem
 from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
 from klack.contact.restitution import measure_impact
 from klack.errors import InputError
+from klack.progress import silent
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
-from klack.workflow.bodies import find_touch
-from klack.workflow.interface_level import build_interface
-from klack.workflow.levels import mode_pools
-from klack.workflow.problem import ContactProblem, build_problem
-from klack.workflow.progress import silent
 
 _POLE = """
   pole:

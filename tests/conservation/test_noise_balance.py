@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from klack.acoustics.force_bands import force_bands
+from klack.analyses.noise.balance import net_share, share_at
 from klack.signals import TimeSeries
-from klack.workflow.noise_balance import net_share, share_at
 
 STEP, PERIOD, BLOW, BOUNCES = 1e-7, 1e-3, 40e-6, 20
 PEAK = 300.0

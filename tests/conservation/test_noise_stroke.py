@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from klack.acoustics.force_bands import force_bands
+from klack.analyses.noise.record import NoiseDesign
+from klack.analyses.noise.run import run_noise
+from klack.analyses.noise.source import NoiseSource, stroke_sources
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.run import run_stroke
 from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case
 from klack.signals import TimeSeries
-from klack.workflow.noise import run_noise
-from klack.workflow.noise_source import NoiseSource, stroke_sources
-from klack.workflow.noise_study import NoiseDesign
-from klack.workflow.stroke import run_stroke
-from klack.workflow.stroke_study import StrokeStudy
 
 pytestmark = pytest.mark.slow
 

@@ -9,6 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.contact_check import check_contact
+from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.run import run_stroke
+from klack.analyses.stroke.summary import stroke_to_json
+from klack.assembling.stops import split_law
+from klack.assembling.valve import Valve, build_valve
 from klack.case import read_case
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case, read_valve_case
@@ -16,13 +23,6 @@ from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.workflow.contact_check import check_contact
-from klack.workflow.impact import run_impact
-from klack.workflow.stops import split_law
-from klack.workflow.stroke import run_stroke
-from klack.workflow.stroke_study import StrokeStudy
-from klack.workflow.stroke_summary import stroke_to_json
-from klack.workflow.valve import Valve, build_valve
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
 SPEED = 0.8  # [m/s]

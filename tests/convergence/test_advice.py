@@ -12,19 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.advice.advice import Advice, Counsel, settle
-from klack.advice.impact import advise_impact
-from klack.advice.ladder import score
-from klack.advice.modes import counted, interface_history
-from klack.advice.settings import applied
-from klack.advice.target import HISTORY, impact_errors, impact_measures
+from klack.analyses.advice.advice import Advice, Counsel, settle
+from klack.analyses.advice.impact import advise_impact
+from klack.analyses.advice.ladder import score
+from klack.analyses.advice.modes import counted, interface_history
+from klack.analyses.advice.settings import applied
+from klack.analyses.advice.target import HISTORY, impact_errors, impact_measures
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import ContactProblem, build_problem
+from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.case.reader import read_case
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
+from klack.progress import silent
 from klack.simulation.impact import simulate_impact
-from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
-from klack.workflow.problem import ContactProblem, build_problem
-from klack.workflow.progress import silent
 
 pytestmark = pytest.mark.slow
 

@@ -6,17 +6,17 @@ The demo stroke with coarse contacts and few modes, until its needle has opened.
 import numpy as np
 import pytest
 
-from klack.advice.settings import applied
-from klack.advice.stroke import (
+from klack.analyses.advice.settings import applied
+from klack.analyses.advice.stroke import (
     advise_stroke,
     first_impacts,
     step_ladder,
     stroke_measures,
 )
+from klack.assembling.valve import build_valve
 from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case
-from klack.workflow.valve import build_valve
 
 pytestmark = pytest.mark.slow
 

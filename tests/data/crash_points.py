@@ -208,13 +208,14 @@ def readable(out: Path) -> bool:
 
 
 def can_be_read(out: Path) -> bool:
-    from klack.cli.stored import is_result, load_stored
+    from klack.analyses.catalogue import load_result
+    from klack.cli.stored import is_result
     from klack.errors import InputError
 
     if not is_result(out):
         return True
     try:
-        load_stored(out)
+        load_result(out)
     except InputError as error:
         print(error, file=sys.stderr)
         return False
@@ -275,9 +276,10 @@ def warm() -> None:
     import importlib
 
     modules = ["scipy.sparse.linalg", "zarr", "klack.cli.stored", "klack.case.valve_reader"]
-    modules += ["klack.workflow.impact", "klack.workflow.stroke", "klack.workflow.reduce"]
-    modules += ["klack.workflow.shots", "klack.workflow.calibration", "klack.workflow.noise"]
-    modules += [f"klack.workflow.{name}store" for name in ("", "stroke_", "shots_", "noise_")]
+    stored = ("impact", "stroke", "shots", "noise")
+    for analysis in (*stored, "reduction", "calibration"):
+        modules += [f"klack.analyses.{analysis}.run"]
+    modules += [f"klack.analyses.{analysis}.store" for analysis in stored]
     for name in modules:
         importlib.import_module(name)
 

@@ -100,10 +100,11 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     """Which of the two results stands in a folder: a, b, none or mixed."""
-    from klack.cli.stored import is_result, load_stored
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.noise.summary import noise_to_json
+    from klack.cli.stored import is_result
     from klack.errors import InputError
     from klack.whole_file import completed
-    from klack.workflow.noise_summary import noise_to_json
 
     there = contents(completed(out))
     logs = {name: there.pop(name) for name in list(there) if "unfinished" in name}
@@ -115,7 +116,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     if names != {name.split("/")[0] for name in whole["a"]} or not is_result(out):
         return f"mixed: {sorted(names)}, {sorted(logs)}"
     try:
-        study = load_stored(out)
+        study = load_result(out)
     except InputError as error:
         return f"mixed: {error}"
     beside = {n: d for n, d in there.items() if not n.startswith("result.zarr")}
@@ -127,7 +128,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
         elif command == "shots":
             same = study.seed == {"a": 1, "b": 2}[name]
         else:
-            reference = load_stored(Path(f"{command}-{name}"))
+            reference = load_result(Path(f"{command}-{name}"))
             same = noise_to_json(study) == noise_to_json(reference)
         if same and (command == "calibrate" or beside == of_it):
             return name

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from klack.analyses.store import RecordFormat, load_record, save_record, stored_format
 from klack.errors import InputError
-from klack.workflow.record_store import RecordFormat, load_record, save_record, stored_format
 
 os.fsync = lambda handle: None  # type: ignore[assignment]  # more writing in less time
 

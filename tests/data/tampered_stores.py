@@ -121,27 +121,27 @@ def in_a_child(act: Any) -> tuple[str, str]:
 
 
 def digest(study: Any) -> str:
-    from klack.workflow.summary import study_to_json
+    from klack.analyses.impact.summary import study_to_json
 
     return json.dumps(study_to_json(study), sort_keys=True)
 
 
 def look(result: Path, whole: str) -> str:
     """Read a result as the commands do."""
-    from klack.cli.stored import load_stored
+    from klack.analyses.catalogue import load_result
     from klack.errors import KlackError
 
     try:
-        study = load_stored(result)
+        study = load_result(result)
         return "same" if digest(study) == whole else "other"
     except KlackError as error:
         return "traceback in a message" if "Traceback" in str(error) else f"refused {error}"
 
 
 def stores(result: Path, folder: Path, count: int, draw: random.Random) -> dict:
-    from klack.cli.stored import load_stored
+    from klack.analyses.catalogue import load_result
 
-    whole = digest(load_stored(result))
+    whole = digest(load_result(result))
     found: dict = {"wrong": []}
     for _ in range(count):
         copy = folder / "copy"

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from klack.advice.advice import Advice, Measured, settle
-from klack.advice.cost import added
-from klack.advice.ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
-from klack.advice.settings import Setting, SettingValue, rounded_down, rounded_up
+from klack.analyses.advice.advice import Advice, Measured, settle
+from klack.analyses.advice.cost import added
+from klack.analyses.advice.ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
+from klack.analyses.advice.settings import Setting, SettingValue, rounded_down, rounded_up
 
 MEASURES = (Measure(name="history", limit=0.01), Measure(name="bands", limit=1.0, decibel=True))
 

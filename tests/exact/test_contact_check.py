@@ -12,6 +12,14 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from klack.analyses.impact.contact_check import (
+    FEWEST_POINTS,
+    ContactCheck,
+    check_contact,
+    ends_reached,
+)
+from klack.analyses.impact.run import run_impact
+from klack.assembling.problem import build_problem
 from klack.case import read_case
 from klack.case.schema import Case
 from klack.contact.statics import COARSE
@@ -21,10 +29,7 @@ from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_revolved
-from klack.workflow.contact_check import FEWEST_POINTS, ContactCheck, check_contact, ends_reached
-from klack.workflow.impact import run_impact
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
+from klack.progress import silent
 
 CASE = """
 klack: 1

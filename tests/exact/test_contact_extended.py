@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.full_level import run_full
+from klack.assembling.modes import kept_modes, mode_pools
+from klack.assembling.problem import build_problem
 from klack.case import load_case
 from klack.contact.history import ImpactHistory
 from klack.contact.mortar import ContactSpace
@@ -16,10 +19,8 @@ from klack.contact.statics import (
     static_contact,
 )
 from klack.elasticity.statics import Flexibility
+from klack.progress import silent
 from klack.verification.indentation import half_spaces, parabola
-from klack.workflow.levels import kept_modes, mode_pools, run_full
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
 
 BALL = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

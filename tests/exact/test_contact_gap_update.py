@@ -129,9 +129,9 @@ def test_gaps_travel_to_other_processes(pair):
 
 
 def test_axisymmetric_bodies_are_refused():
+    from klack.assembling.bodies import build_bodies
     from klack.case import find_case, load_case
-    from klack.workflow.bodies import build_bodies
-    from klack.workflow.progress import silent
+    from klack.progress import silent
 
     pair = build_bodies(load_case(find_case("demo-valve-axisymmetric")), silent)
     bodies = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)

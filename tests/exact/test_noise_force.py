@@ -13,6 +13,9 @@ from scipy.integrate import quad
 from klack.acoustics.force_bands import averaged, force_bands
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import band_edges
+from klack.analyses.noise import source as noise_source
+from klack.analyses.noise.force import before_impact, interrupted_impact, stop_force
+from klack.analyses.noise.window import first_part
 from klack.errors import InputError
 from klack.signals import TimeSeries
 from klack.simulation.network_result import (
@@ -22,9 +25,6 @@ from klack.simulation.network_result import (
     InterfaceRecord,
     NetworkResult,
 )
-from klack.workflow import noise_source
-from klack.workflow.noise_force import before_impact, interrupted_impact, stop_force
-from klack.workflow.noise_window import first_part
 
 PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
 

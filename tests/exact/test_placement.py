@@ -12,6 +12,7 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
+from klack.assembling.bodies import build_bodies
 from klack.case import find_case, read_case
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
@@ -23,8 +24,7 @@ from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose, rotation_matrix
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.swept import sweep
-from klack.workflow.bodies import build_bodies
-from klack.workflow.progress import silent
+from klack.progress import silent
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 DEMO = find_case("demo-valve")

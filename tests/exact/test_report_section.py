@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from klack.analyses.impact.record import SectionPicture
+from klack.analyses.impact.section import section_picture
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, Mesh
 from klack.mesh.swept import sweep
-from klack.workflow.section import section_picture
-from klack.workflow.study import SectionPicture
 
 CORNERS = np.array(
     [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
 from klack.case import read_case
-from klack.workflow.impact import run_impact
-from klack.workflow.study import ImpactStudy
 
 METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from klack.assembling.ladder import effective_mass
+from klack.assembling.problem import build_problem
 from klack.case.reader import load_case
 from klack.contact.statics import ReachError
-from klack.workflow.ladder import effective_mass
-from klack.workflow.problem import build_problem
 
 RADIUS, YOUNG, POISSON = 20e-3, 210e9, 0.3
 CROWN = Path(__file__).parents[1] / "data" / "case" / "crown.yaml"

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.stroke.times import all_lift_times, lift_times
 from klack.case.valve_reader import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.network_run import simulate_network
-from klack.workflow.stroke_times import all_lift_times, lift_times
 
 TIME = np.linspace(0.0, 10e-3, 10_001)
 LIFT = 100e-6

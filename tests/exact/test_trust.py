@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from klack.analyses.impact.levels import deviations, level_result
+from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.trust import best_level, trust_notes
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.workflow.levels import deviations, level_result
-from klack.workflow.study import LevelResult
-from klack.workflow.trust import best_level, trust_notes
 
 TIME, MASS, SPEED = 40e-6, 3e-3, 0.3
 

@@ -12,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from property_profiles import examples
 
+from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.run import run_stroke
 from klack.case import read_case
 from klack.case.valve_reader import read_any_case
 from klack.elasticity.body import elastic_body
@@ -21,8 +23,6 @@ from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, write_step_revolved
-from klack.workflow.impact import run_impact
-from klack.workflow.stroke import run_stroke
 
 ROOT = Path(__file__).parents[2]
 BLOCK = ROOT / "tests" / "data" / "block.inp"

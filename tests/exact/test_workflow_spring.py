@@ -8,8 +8,8 @@ from math import sqrt
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
 from klack.case import find_case, read_case
-from klack.workflow.impact import run_impact
 
 GAP, PRELOAD, RATE, SPEED = 20e-6, 10.0, 1e6, 0.3
 

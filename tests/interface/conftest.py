@@ -11,13 +11,7 @@ import pytest
 from json_schema_check import every_result_is_documented  # noqa: F401
 
 from klack.acoustics.comparison import compare_histories
-from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.contact.restitution import measure_impact
-from klack.mesh.mesh import ElementBlock, Mesh
-from klack.reduction.transfer import TransferComparison
-from klack.workflow.section import section_picture
-from klack.workflow.study import (
-    BodySummary,
+from klack.analyses.impact.record import (
     ContactSummary,
     ImpactStudy,
     LawSummary,
@@ -25,6 +19,12 @@ from klack.workflow.study import (
     ModalEnergy,
     SectionPicture,
 )
+from klack.analyses.impact.section import section_picture
+from klack.assembling.body_summary import BodySummary
+from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.contact.restitution import measure_impact
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.reduction.transfer import TransferComparison
 
 MASS, SPEED = 2.96e-3, 0.5
 

@@ -14,6 +14,12 @@ from klack.acoustics.mobility import drive_point_mobility
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.port_forces import port_forces
 from klack.acoustics.surface_bands import face_band_velocity
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.store import RESULT_NAME
+from klack.assembling.structures import radiating_surfaces
+from klack.assembling.valve import build_valve
 from klack.case.bodies import SurfaceName
 from klack.case.noise import CaseNoise
 from klack.case.shipped import find_case
@@ -26,11 +32,6 @@ from klack.reduction.structure_building import build_structure
 from klack.signals import TimeSeries
 from klack.verification.reduction import rod
 from klack.verification.vibration import oscillator, pulses, rod_structure
-from klack.workflow.impact import run_impact
-from klack.workflow.store import RESULT_NAME, load_study, save_study
-from klack.workflow.structures import radiating_surfaces
-from klack.workflow.study import ImpactStudy
-from klack.workflow.valve import build_valve
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +91,8 @@ def test_an_impact_stores_its_held_body(tmp_path: Path) -> None:
     assert not isinstance(case, ValveCase)
 
     study = run_impact(case, levels=["reduced"], certify=False)
-    save_study(study, tmp_path)
-    (structure,) = load_study(tmp_path).structures
+    IMPACT.save(study, tmp_path)
+    (structure,) = IMPACT.load(tmp_path).structures
 
     assert structure.name == "rod"
     assert structure.port_stops == ("contact",)
@@ -103,22 +104,22 @@ def test_an_impact_stores_its_held_body(tmp_path: Path) -> None:
 
 def test_a_result_without_structures_is_read(lonely_study: ImpactStudy, tmp_path: Path) -> None:
     """Results of earlier versions have no such field."""
-    save_study(lonely_study, tmp_path)
+    IMPACT.save(lonely_study, tmp_path)
     group = zarr.open_group(tmp_path / RESULT_NAME / "study", mode="r+")
     values = {key: x for key, x in group.attrs["values"].items() if key != "structures"}
     order = [key for key in group.attrs["order"] if key != "structures"]
     group.attrs.put({"values": values, "order": order})  # nor a checksum of its words
 
-    assert load_study(tmp_path).structures == ()
+    assert IMPACT.load(tmp_path).structures == ()
 
 
 def test_structures_are_stored_with_units_and_small(
     lonely_study: ImpactStudy, structures: tuple[Structure, ...], tmp_path: Path
 ) -> None:
-    save_study(replace(lonely_study, structures=structures), tmp_path)
+    IMPACT.save(replace(lonely_study, structures=structures), tmp_path)
     folder = tmp_path / RESULT_NAME / "study" / "structures"
 
-    loaded = load_study(tmp_path).structures
+    loaded = IMPACT.load(tmp_path).structures
 
     for ours, theirs in zip(structures, loaded, strict=True):
         assert ours.group_names == theirs.group_names

@@ -2,7 +2,7 @@
 
 import pytest
 
-from klack.advice.regions import coarse_contact_notes
+from klack.analyses.advice.regions import coarse_contact_notes
 from klack.contact.statics import COARSE
 
 

@@ -14,6 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.reduction.run import run_reduce
+from klack.assembling.generated_mesh import meshed_profiles, meshed_step
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
 from klack.cache import setting
 from klack.cache.setting import result_cache
 from klack.case import find_case
@@ -29,13 +35,7 @@ from klack.materials import Material
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import write_step_revolved
-from klack.workflow.generated_mesh import meshed_profiles, meshed_step
-from klack.workflow.impact import run_impact
-from klack.workflow.levels import mode_pools
-from klack.workflow.problem import build_problem
-from klack.workflow.reduce import run_reduce
-from klack.workflow.stages import stages_with_cached
-from klack.workflow.study import ImpactStudy
+from klack.stages import stages_with_cached
 
 TIMES = {"wall_time", "setup_time", "stage_times", "created"}
 PATH = find_case("demo-valve-axisymmetric")

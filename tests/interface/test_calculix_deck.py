@@ -28,9 +28,9 @@ from klack.materials import Material
 from klack.mesh.files.abaqus.reader import read_abaqus_model
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
+from klack.progress import silent
 from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
-from klack.workflow.progress import silent
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=105e9, poisson=0.34, density=8400.0)

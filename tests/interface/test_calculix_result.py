@@ -13,10 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.errors import InputError
-from klack.exchange.calculix_result import CalculixResult, other_run, read_calculix
-from klack.workflow.compare import (
+from klack.analyses.comparison.calculix import (
     COMPARISON_COLUMNS,
     compare_with,
     comparison_rows,
@@ -24,7 +21,10 @@ from klack.workflow.compare import (
     energy_balance,
     with_other,
 )
-from klack.workflow.study import ImpactStudy
+from klack.analyses.impact.record import ImpactStudy
+from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.errors import InputError
+from klack.exchange.calculix_result import CalculixResult, other_run, read_calculix
 
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"
 MASS, SPEED = 1.5667291666666663e-05, 0.5

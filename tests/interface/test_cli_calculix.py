@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.comparison.calculix import COMPARISON_COLUMNS
+from klack.analyses.impact.analysis import IMPACT
 from klack.case import find_case
 from klack.cli.main import app, main
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
-from klack.workflow.compare import COMPARISON_COLUMNS
-from klack.workflow.store import save_study
 
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to" / "check-with-calculix.md"
@@ -174,7 +174,7 @@ def stored(impact_study) -> Path:
     study = replace(
         impact_study, levels={"full": replace(full, history=history)}, deviations={}, transfer=()
     )
-    save_study(study, Path("result"))
+    IMPACT.save(study, Path("result"))
     return Path("result")
 
 

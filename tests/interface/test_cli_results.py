@@ -8,8 +8,8 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+from klack.analyses.impact.analysis import IMPACT
 from klack.cli.main import main
-from klack.workflow.store import load_study
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 
@@ -30,9 +30,9 @@ def asked(monkeypatch, impact_study):
         progress("mesh", 1.0)
         return got.study
 
-    module = ModuleType("klack.workflow.impact")
+    module = ModuleType("klack.analyses.impact.run")
     module.run_impact = run_impact
-    monkeypatch.setitem(sys.modules, "klack.workflow.impact", module)
+    monkeypatch.setitem(sys.modules, "klack.analyses.impact.run", module)
     return got
 
 
@@ -40,7 +40,7 @@ def asked(monkeypatch, impact_study):
 def quick_report(monkeypatch):
     """Write a word instead of a report, which takes seconds to draw."""
     for name in ("html.write_report", "pdf.write_pdf"):
-        monkeypatch.setattr(f"klack.report.{name}", lambda study, path: path.write_text(study.case))
+        monkeypatch.setattr(f"klack.report.{name}", lambda page, path: path.write_text(page.title))
 
 
 def names(folder: Path) -> list[str]:
@@ -64,7 +64,7 @@ def test_impact_writes_result_report_and_numbers(asked, capsys):
     numbers = json.loads(Path("numbers.json").read_text())
     peak = asked.study.levels["full"].measures.peak_force
     assert numbers["levels"]["full"]["peak_force_N"] == pytest.approx(peak, rel=1e-12)
-    assert load_study(folder).levels["full"].measures.peak_force == peak
+    assert IMPACT.load(folder).levels["full"].measures.peak_force == peak
 
 
 def test_options_of_impact(asked, capsys):
@@ -120,7 +120,7 @@ def test_ctrl_c_while_the_report_is_written_keeps_the_result(
     asked, quick_report, monkeypatch, capsys
 ):
     assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 0
-    before = load_study(Path("r")).created
+    before = IMPACT.load(Path("r")).created
 
     def interrupted(study, path):
         path.write_text("half")
@@ -131,7 +131,7 @@ def test_ctrl_c_while_the_report_is_written_keeps_the_result(
     assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 130
 
     assert names(Path("r")) == ["result.zarr"]  # and no report of the run before
-    assert load_study(Path("r")).created == "later" != before
+    assert IMPACT.load(Path("r")).created == "later" != before
     assert "stopped; the result is in r; klack report r" in capsys.readouterr().err
 
 

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.comparison.calculix import level_of
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.run import run_impact
+from klack.analyses.incomplete import IncompleteImpactError
+from klack.analyses.noise.source import impact_sources, load_sources
 from klack.case import load_case
 from klack.cli.main import main
 from klack.contact.complementarity import ComplementaritySolver
 from klack.errors import ConvergenceError, InputError
 from klack.transient import full_order, interface_run
-from klack.workflow.compare import level_of
-from klack.workflow.impact import run_impact
-from klack.workflow.incomplete import IncompleteImpactError
-from klack.workflow.noise_source import impact_sources, load_sources
-from klack.workflow.store import load_study
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 SAID = "level 'full' failed, there are no numbers of it: simulate_full_order: step"
@@ -53,7 +53,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_levels_that_did_not_fail_are_kept_to_the_last_bit(stored):
-    study = load_study(stored)
+    study = IMPACT.load(stored)
     healthy = run_impact(load_case(CASE), levels=("reduced", "interface"))
 
     assert list(study.levels) == list(healthy.levels)
@@ -110,17 +110,17 @@ def test_export_of_an_incomplete_result(stored, tmp_path, capsys):
 def test_noise_and_comparison_of_an_incomplete_result(stored):
     (source,) = load_sources(stored)
     assert source.run == "interface"
-    assert source.notes == (f"The impact is incomplete: {load_study(stored).warnings[0]}",)
+    assert source.notes == (f"The impact is incomplete: {IMPACT.load(stored).warnings[0]}",)
 
     why = re.escape("it failed (simulate_full_order: step")
     with pytest.raises(InputError, match=why):
         load_sources(stored, ("full",))
     with pytest.raises(InputError, match=why):
-        level_of(load_study(stored), "full")
+        level_of(IMPACT.load(stored), "full")
 
 
 def test_noise_says_what_speaks_against_the_contact(stored):
-    study = load_study(stored)
+    study = IMPACT.load(stored)
     contact = replace(study.contact, doubts=("it lies on a sharp edge",))
 
     (source,) = impact_sources(replace(study, contact=contact))

@@ -11,6 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from klack.analyses.noise.source import _notes
+from klack.analyses.stroke import run as stroke
+from klack.analyses.stroke.analysis import STROKE
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
 from klack.errors import ConvergenceError
@@ -25,9 +28,6 @@ from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import python_step
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.workflow import stroke
-from klack.workflow.noise_source import _notes
-from klack.workflow.stroke_store import load_stroke
 
 LATE = 30.03e-6  # [s]
 
@@ -192,7 +192,7 @@ def test_a_stroke_that_fails_late_is_written_and_marked(
     assert [item["complete"] for item in said.values()] == [True, False][2 - failed :]
     assert said[name]["failure"].startswith("magnet: it burnt")
     assert said[name]["end_time_s"] == pytest.approx(0.6e-3, rel=1e-2)
-    study = load_stroke(out)
+    study = STROKE.load(out)
     assert study.variants[name].result.failure.startswith("magnet: it burnt")
     assert len(study.variants[name].result.events) == len(said[name]["events"])
     assert "is incomplete, it ends at" in (out / "report.html").read_text()
@@ -211,7 +211,7 @@ def test_a_cut_fine_record_is_said_everywhere(
         ["stroke", str(case), "--variant", "dry", "--out", str(out), "--json", str(numbers)]
     )
     printed = " ".join(capsys.readouterr().out.split())
-    study = load_stroke(out)
+    study = STROKE.load(out)
     record = study.variants["dry"].result.interfaces["stop"]
     end = float(record.time[-1] + record.step[-1])
 

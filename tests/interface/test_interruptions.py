@@ -16,14 +16,15 @@ import numpy as np
 import pytest
 from rigid_valve import write_bench
 
-from klack.cli.stored import is_result, load_stored
+from klack.analyses.calibration.log import TRIAL_LOG, TrialKey, trial_log
+from klack.analyses.calibration.motion import Motion
+from klack.analyses.catalogue import load_result
+from klack.cli.stored import is_result
 from klack.errors import InputError
 from klack.folder_lock import locked
 from klack.held_folder import HeldFolder
 from klack.stage import Stage
 from klack.whole_file import completed, mark_of, outdated, whole_file, whole_files
-from klack.workflow.calibration_log import TRIAL_LOG, TrialKey, trial_log
-from klack.workflow.calibration_motion import Motion
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and forks")
 
@@ -248,7 +249,7 @@ def test_a_run_stopped_at_any_time_leaves_a_whole_result(number, code, tmp_path:
             assert err.splitlines()[-1].startswith("klack impact: stopped; ")
             assert "Traceback" not in err
         assert names(tmp_path / "out") == ["result.zarr"]
-        assert load_stored(tmp_path / "out") is not None
+        assert load_result(tmp_path / "out") is not None
 
 
 @pytest.mark.slow
@@ -280,7 +281,7 @@ def test_a_calibration_goes_on_after_kill_9_at_any_time(tmp_path: Path):
         process.communicate(timeout=BUSY)
         assert wait_until(lambda group=process.pid: not members(group), BUSY)
         assert lines(log) >= kept or is_result(out)
-        assert not is_result(out) or load_stored(out).evaluations == total
+        assert not is_result(out) or load_result(out).evaluations == total
         found.append(lines(log))
     process = start(*words, "--out", "out", folder=tmp_path)
     _, err = process.communicate(timeout=BUSY)

@@ -11,6 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.assembled_bodies import assembled_body, assembled_from_matrices
+from klack.assembling.bodies import build_bodies, mesh_body
 from klack.case import load_case
 from klack.cli.main import main
 from klack.elasticity.body import elastic_body
@@ -19,13 +22,10 @@ from klack.materials import Material
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import Mesh
+from klack.progress import silent
 from klack.unit_systems import unit_system
 from klack.verification.lattice import lattice_mesh
 from klack.verification.matrix_files import write_matrices
-from klack.workflow.assembled_bodies import assembled_body, assembled_from_matrices
-from klack.workflow.bodies import build_bodies, mesh_body
-from klack.workflow.impact import run_impact
-from klack.workflow.progress import silent
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "bring-matrices.md"
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)

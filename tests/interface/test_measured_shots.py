@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.comparison.analysis import MEASURED_SHOTS
+from klack.analyses.comparison.shots import compare_shots, mean_of_highest
+from klack.analyses.comparison.shots_summary import bias_sentence, drop_verdict
+from klack.analyses.shots.analysis import SHOTS
+from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
 from klack.case.measurement import CaseMeasurement
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
-from klack.workflow.measured_shots import compare_shots, mean_of_highest
-from klack.workflow.measured_shots_summary import bias_sentence, drop_verdict
-from klack.workflow.measured_store import load_measured_shots
-from klack.workflow.shots_store import save_shots
-from klack.workflow.shots_study import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
 
 SPEED, FORCE, MASS = 0.3, 6.0, 5e-3
 DECELERATION = FORCE / MASS
@@ -177,7 +177,7 @@ def test_drops_that_tell_nothing_are_one_message(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_stores_and_reports(drops, tmp_path, capsys):
-    save_shots(shots(SAME), tmp_path)
+    SHOTS.save(shots(SAME), tmp_path)
     words = ["compare", str(tmp_path), "--measurement", str(drops), "--case", "demo-shots"]
     assert main([*words, "--json", str(tmp_path / "numbers.json")]) == 0
 
@@ -190,7 +190,7 @@ def test_the_command_stores_and_reports(drops, tmp_path, capsys):
         restitution["expected_highest"] - restitution["centred"]
     )
     assert f"beside {DROPS} measured drops" in capsys.readouterr().out
-    stored = load_measured_shots(tmp_path / "measured")
+    stored = MEASURED_SHOTS.load(tmp_path / "measured")
     assert stored.distributions[0].measured == pytest.approx(SAME, abs=0.005)
     page = (tmp_path / "measured" / "report.html").read_text()
     for words in ("Distribution of the restitution", "highest rebound, measured", "mean highest"):

@@ -11,6 +11,8 @@ import psutil
 import pytest
 
 from klack import memory
+from klack.assembling.bodies import mesh_body
+from klack.assembling.mesh_messages import meshed_for_case
 from klack.case import find_case, load_case
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
@@ -20,8 +22,6 @@ from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, write_step_revolved
 from klack.units import LENGTH, parse_quantity
-from klack.workflow.bodies import mesh_body
-from klack.workflow.mesh_messages import meshed_for_case
 
 PIN = Profile((0, 0), (Line((1e-3, 0)), Line((1e-3, 4e-3)), Line((0, 4e-3)), Line((0, 0))))
 

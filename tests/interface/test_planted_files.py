@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from rigid_valve import write_bench
 
+from klack.analyses.calibration.log import TRIAL_LOG, trial_log
+from klack.analyses.calibration.motion import Motion
+from klack.analyses.catalogue import load_result
+from klack.analyses.shots.log import SHOT_LOG, shot_log
 from klack.cache.entry import Entry
 from klack.cache.result_cache import ResultCache
 from klack.cli.main import main
-from klack.cli.stored import load_stored
 from klack.errors import InputError
-from klack.workflow.calibration_log import TRIAL_LOG, trial_log
-from klack.workflow.calibration_motion import Motion
-from klack.workflow.shots_log import SHOT_LOG, shot_log
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users, links and pipes")
 
@@ -128,7 +128,7 @@ def test_an_unpacked_result_with_pipes_and_links_is_refused(kind, result: Path, 
         shutil.rmtree(path) if path.is_dir() else path.unlink()
         os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
         with pytest.raises(InputError, match="pipe" if kind == "pipe" else "symbolic link"):
-            load_stored(copy)
+            load_result(copy)
 
 
 @pytest.mark.slow
@@ -234,7 +234,7 @@ def test_a_run_stopped_in_its_report_keeps_its_result(
     assert said == (
         f"klack {command}: stopped; the result is in {out}; klack report {out} writes its report."
     )
-    assert load_stored(out) is not None
+    assert load_result(out) is not None
     extra = {
         "calibrate": {"case_calibrated.yaml"},
         "noise": {path.name for path in out.glob("*.wav")},

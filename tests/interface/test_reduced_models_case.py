@@ -9,6 +9,12 @@ import numpy as np
 import pytest
 import scipy.io
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.run import run_impact
+from klack.analyses.impact.summary import study_to_json
+from klack.analyses.reduction.run import run_reduce
+from klack.assembling.given_pair import build_given_pair
 from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
 from klack.case.valve_reader import load_any_case
@@ -20,20 +26,14 @@ from klack.materials import Material
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_revolved
+from klack.progress import silent
 from klack.reduction.damping import LossFactor
 from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
-from klack.report.content import report_content
 from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.workflow.given_pair import build_given_pair
-from klack.workflow.impact import run_impact
-from klack.workflow.progress import silent
-from klack.workflow.reduce import run_reduce
-from klack.workflow.store import load_study, save_study
-from klack.workflow.summary import study_to_json
 
 STEEL = {"area": 1e-5, "young": 2.1e11, "density": 7850.0}
 NEEDLE = rod_body("rod", length=0.02, elastic_modes=10, **STEEL)
@@ -107,8 +107,8 @@ def test_study_of_two_reduced_bodies(tmp_path):
 def test_study_is_stored_reported_and_exported(tmp_path):
     case = case_of(tmp_path)
     study = run_impact(case, levels=["reduced"])
-    save_study(study, tmp_path / "out")
-    again = load_study(tmp_path / "out")
+    IMPACT.save(study, tmp_path / "out")
+    again = IMPACT.load(tmp_path / "out")
     np.testing.assert_array_equal(again.contact.approach, study.contact.approach)
     numbers = study_to_json(study)
     assert numbers["levels"]["reduced"]["peak_force_N"] > 50

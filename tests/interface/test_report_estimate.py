@@ -4,11 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.estimate_wording import (
+    ESTIMATE_COLUMNS,
+    estimate_rows,
+    estimate_sentence,
+)
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.wording import answer
 from klack.contact.restitution import Deviation
-from klack.report.content import report_content
-from klack.report.estimate_wording import ESTIMATE_COLUMNS, estimate_rows, estimate_sentence
-from klack.report.wording import answer
-from klack.workflow.study import ImpactStudy
 
 
 def deviation(peak: float, restitution: float = 0.0) -> Deviation:

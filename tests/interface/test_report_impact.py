@@ -13,17 +13,18 @@ import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
 
+from klack.analyses.impact.content import Content, report_content
+from klack.analyses.impact.figures import charts
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.section_figure import section_figure
+from klack.analyses.impact.wording import answer
 from klack.errors import InputError
 from klack.report.chart import AxisSpec, BarChart, Chart, Curve, Mark, Panel
-from klack.report.content import Content, report_content
-from klack.report.figures import charts
 from klack.report.html import render_html, write_report
 from klack.report.interactive import plotly_bars, plotly_chart
 from klack.report.pdf import render_pdf, write_pdf
 from klack.report.printed import svg_bars, svg_chart
-from klack.report.section_figure import section_figure
-from klack.report.wording import answer, quantity
-from klack.workflow.study import ImpactStudy
+from klack.report.wording import quantity
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 
@@ -116,7 +117,7 @@ def test_the_page_carries_the_whole_library_packed(page: str) -> None:
 
 
 def test_writing_leaves_one_complete_file(lonely_study: ImpactStudy, tmp_path: Path) -> None:
-    write_report(lonely_study, tmp_path / "new" / "report.html")
+    write_report(report_content(lonely_study), tmp_path / "new" / "report.html")
 
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["report.html"]
     assert (tmp_path / "new" / "report.html").read_text().rstrip().endswith("</html>")
@@ -142,7 +143,7 @@ def test_the_paper_has_pages_also_with_hostile_words(impact_study: ImpactStudy) 
 
 
 def test_a_single_level_without_extras_is_enough(lonely_study: ImpactStudy, tmp_path: Path) -> None:
-    write_pdf(lonely_study, tmp_path / "report.pdf")
+    write_pdf(report_content(lonely_study), tmp_path / "report.pdf")
 
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
     assert page_count((tmp_path / "report.pdf").read_bytes()) >= 3

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from klack.report.contact_map import (
+from klack.analyses.impact.contact_map import (
     Cells,
     ContactMap,
     averaged,
@@ -13,11 +13,9 @@ from klack.report.contact_map import (
     contact_map,
     line_load_weights,
 )
-from klack.report.content import report_content
-from klack.report.html import render_html
-from klack.report.pdf import render_pdf
-from klack.report.pressure_figure import draw_pressure, pressure_figure
-from klack.report.pressure_view import (
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.pressure_figure import draw_pressure, pressure_figure
+from klack.analyses.impact.pressure_view import (
     PressureView,
     common_cells,
     line_load,
@@ -25,8 +23,10 @@ from klack.report.pressure_view import (
     pressure_view,
     study_views,
 )
-from klack.report.pressure_wording import pressure_rows
-from klack.workflow.study import ImpactStudy, PressureRecord
+from klack.analyses.impact.pressure_wording import pressure_rows
+from klack.analyses.impact.record import ImpactStudy, PressureRecord
+from klack.report.html import render_html
+from klack.report.pdf import render_pdf
 
 RADIUS, HALF_WIDTH, PEAK, DURATION = 0.4e-3, 20e-6, 1.5e9, 40e-6  # [m], [m], [Pa], [s]
 TIME = (np.arange(100) + 0.5) * DURATION / 100

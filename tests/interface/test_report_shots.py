@@ -10,20 +10,20 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from klack.analyses.impact.content import Content
+from klack.analyses.impact.record import PressureRecord
+from klack.analyses.shots.analysis import SHOTS
+from klack.analyses.shots.content import shots_content
+from klack.analyses.shots.figures import distribution_chart
+from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
 from klack.cli.main import main
 from klack.report.chart import Chart
-from klack.report.content import Content
 from klack.report.html import render_html
 from klack.report.interactive import plotly_chart
 from klack.report.pdf import render_pdf
 from klack.report.printed import svg_chart
-from klack.report.shots_content import shots_content
-from klack.report.shots_figures import distribution_chart
-from klack.workflow.shots_store import load_shots, save_shots
-from klack.workflow.shots_study import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
-from klack.workflow.study import PressureRecord
 
-SHOTS = 40
+COUNT = 40
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 CENTRED = {"restitution": 0.9951, "rebound_height": 4.4e-5, "peak_force": 121.0}
 
@@ -85,15 +85,15 @@ def pressure() -> PressureRecord:
 def study() -> ShotsStudy:
     """Rebound falls with eccentricity; the shot with the smallest one is number 17."""
     random = np.random.default_rng(2)
-    eccentricity = np.append(random.uniform(0.4e-6, 3e-6, SHOTS - 1), 0.0)
+    eccentricity = np.append(random.uniform(0.4e-6, 3e-6, COUNT - 1), 0.0)
     eccentricity = np.concatenate([eccentricity[:17], [0.2e-6], eccentricity[17:-1]])
     loss = 0.01 * (eccentricity / 3e-6) ** 2
     shots = columns(
-        SHOTS,
+        COUNT,
         eccentricity=eccentricity,
-        direction=random.uniform(0, 2 * np.pi, SHOTS),
-        tilt=random.uniform(0, 5e-4, SHOTS),
-        tilt_direction=random.uniform(0, 2 * np.pi, SHOTS),
+        direction=random.uniform(0, 2 * np.pi, COUNT),
+        tilt=random.uniform(0, 5e-4, COUNT),
+        tilt_direction=random.uniform(0, 2 * np.pi, COUNT),
         restitution=CENTRED["restitution"] - loss,
         rebound_height=CENTRED["rebound_height"] * (1 - 2 * loss),
         peak_force=CENTRED["peak_force"] * (1 - 3 * loss),
@@ -126,7 +126,7 @@ def study() -> ShotsStudy:
         approach=4e-6,
         shots=shots,
         centric=columns(1),
-        shot_traces=traces(SHOTS),
+        shot_traces=traces(COUNT),
         centric_traces=traces(1),
         highest=17,
         rule=RuleVerdict(
@@ -179,8 +179,8 @@ def test_only_what_varies_is_on_an_axis(content: Content, study: ShotsStudy) -> 
         return [chart.name for chart in of.sections[0].charts]
 
     assert names(content) == ["rebound-eccentricity", "rebound-tilt"]
-    forces = np.linspace(19.0, 21.0, SHOTS)
-    shots = replace(study.shots, force=forces, tilt=np.zeros(SHOTS))
+    forces = np.linspace(19.0, 21.0, COUNT)
+    shots = replace(study.shots, force=forces, tilt=np.zeros(COUNT))
     pushed = replace(study, shots=shots, pressures={})
     assert names(shots_content(pushed)) == ["rebound-eccentricity"]
     heights = replace(shots, rebound_height=-1e-6 * forces)
@@ -202,7 +202,7 @@ def test_the_bias_is_a_line_from_the_highest_to_the_centred_value(content: Conte
 def test_the_distribution_counts_every_shot(study: ShotsStudy) -> None:
     histogram, below = distribution_chart(study).panels
 
-    assert histogram.curves[0].y.sum() == SHOTS
+    assert histogram.curves[0].y.sum() == COUNT
     assert below.curves[0].y[-1] == 100.0
     assert [mark.label for mark in histogram.marks] == ["highest rebound", "centred impact"]
 
@@ -217,7 +217,7 @@ def test_a_shot_without_a_rebound_height_keeps_its_restitution(study: ShotsStudy
 
     assert "rank correlation −1.00" in shots_content(lost).sections[0].paragraphs[0]
     assert chart.x.label == "restitution"
-    assert chart.panels[0].curves[0].y.sum() == SHOTS
+    assert chart.panels[0].curves[0].y.sum() == COUNT
     assert json.dumps(
         [plotly_chart(c) for s in shots_content(lost).sections for c in s.charts], allow_nan=False
     )
@@ -226,7 +226,7 @@ def test_a_shot_without_a_rebound_height_keeps_its_restitution(study: ShotsStudy
 def test_all_shots_are_listed_with_what_varies(content: Content) -> None:
     (table,) = next(s for s in content.sections if s.title == "All shots").tables
 
-    assert len(table.rows) == SHOTS + 1
+    assert len(table.rows) == COUNT + 1
     assert table.rows[0][0] == "centred"
     assert table.rows[18][0] == "17\nhighest"
     assert table.rows[18][1] == "0.20"
@@ -291,12 +291,12 @@ def test_the_paper_has_pages(content: Content) -> None:
 def test_a_stored_result_is_reported_again(
     study: ShotsStudy, content: Content, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    save_shots(study, tmp_path)
+    SHOTS.save(study, tmp_path)
 
     assert main(["report", str(tmp_path), "--out", str(tmp_path / "again")]) == 0
 
     assert (tmp_path / "again" / "report.pdf").read_bytes().startswith(b"%PDF-")
     page = (tmp_path / "again" / "report.html").read_text()
     assert page == render_html(content)
-    assert page == render_html(shots_content(load_shots(tmp_path)))
+    assert page == render_html(shots_content(SHOTS.load(tmp_path)))
     assert "report.html" in capsys.readouterr().out

@@ -14,11 +14,22 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.content import stroke_charts, stroke_content
+from klack.analyses.stroke.record import (
+    FluidSummary,
+    LineSummary,
+    StopSummary,
+    StrokeChannels,
+    StrokeStudy,
+    StrokeVariant,
+)
+from klack.analyses.stroke.summary import first_impact, stroke_to_json
+from klack.analyses.stroke.wording import stroke_answer
+from klack.assembling.body_summary import BodySummary
 from klack.report.chart import BarChart, Chart
 from klack.report.html import render_html, write_report
 from klack.report.pdf import render_pdf
-from klack.report.stroke_content import stroke_charts, stroke_content
-from klack.report.stroke_wording import stroke_answer
 from klack.report.thinning import thinned
 from klack.report.wording import quantity
 from klack.simulation.network_result import (
@@ -28,17 +39,6 @@ from klack.simulation.network_result import (
     InterfaceRecord,
     NetworkResult,
 )
-from klack.workflow.stroke_store import load_stroke, save_stroke
-from klack.workflow.stroke_study import (
-    FluidSummary,
-    LineSummary,
-    StopSummary,
-    StrokeChannels,
-    StrokeStudy,
-    StrokeVariant,
-)
-from klack.workflow.stroke_summary import first_impact, stroke_to_json
-from klack.workflow.study import BodySummary
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 STEP, RECORD, END = 20e-9, 1e-6, 2e-3
@@ -317,7 +317,7 @@ def test_the_paper_has_pages(study: StrokeStudy):
 
 def test_a_valve_that_does_nothing_has_a_report(study: StrokeStudy, tmp_path: Path):
     still = lonely(study)
-    write_report(still, tmp_path / "report.html")
+    write_report(stroke_content(still), tmp_path / "report.html")
 
     names = {item.name for item in stroke_charts(still)}
     assert names == {"actuation", "energy"}
@@ -334,9 +334,9 @@ def test_a_speed_before_the_film_is_not_told_as_that_of_the_touch(study: StrokeS
 
 
 def test_a_stored_study_gives_the_same_page(study: StrokeStudy, page: str, tmp_path: Path):
-    save_stroke(study, tmp_path)
+    STROKE.save(study, tmp_path)
 
-    assert render_html(stroke_content(load_stroke(tmp_path))) == page
+    assert render_html(stroke_content(STROKE.load(tmp_path))) == page
 
 
 # --------------------------------------------------------------------------- figures
@@ -441,8 +441,8 @@ def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: 
     doubts = ("it lies on a sharp edge", "2 contact points across are too few")
     seat = replace(study.stops[1], points_across=2, doubts=doubts)
     doubtful = replace(study, stops=(study.stops[0], seat))
-    save_stroke(doubtful, tmp_path)
-    said = stroke_to_json(load_stroke(tmp_path))["stops"]
+    STROKE.save(doubtful, tmp_path)
+    said = stroke_to_json(STROKE.load(tmp_path))["stops"]
 
     assert said[seat.name]["doubts"] == list(doubts)
     assert said[seat.name]["points_across"] == 2

@@ -5,16 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from klack.report.content import report_content
-from klack.report.wording import answer, listed, quantity, share, signed, signed_share
-from klack.workflow.study import ImpactStudy
-from klack.workflow.summary import (
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.summary import (
     SUMMARY_COLUMNS,
     answer_line,
     contact_doubt,
     study_to_json,
     summary_rows,
 )
+from klack.analyses.impact.wording import answer
+from klack.report.wording import listed, quantity, share, signed, signed_share
 
 
 def plain(text: str) -> str:

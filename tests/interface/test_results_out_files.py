@@ -18,6 +18,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.stroke.record import StopSummary, StrokeChannels, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.times import LiftTimes, Passage
+from klack.assembling.body_summary import BodySummary
 from klack.errors import InputError
 from klack.exchange.results.csv_files import write_csv
 from klack.exchange.results.mat import write_mat
@@ -37,9 +41,6 @@ from klack.simulation.network_result import (
     InterfaceRecord,
     NetworkResult,
 )
-from klack.workflow.stroke_study import StopSummary, StrokeChannels, StrokeStudy, StrokeVariant
-from klack.workflow.stroke_times import LiftTimes, Passage
-from klack.workflow.study import BodySummary, ImpactStudy
 
 TITLE = "Ventil für <Öl> & Wasser, 80 µm"
 STEP = 1e-6

@@ -8,12 +8,12 @@ from shutil import copy
 import pytest
 from ruamel.yaml import YAML
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
 from klack.case.measurement import CaseMeasurement
 from klack.exchange.results.study_table import result_table
 from klack.mechanics.imported_fmu import ImportedFmu
 from klack.network.declaration import NetworkSection
-from klack.workflow.store import save_study
-from klack.workflow.study import ImpactStudy
 
 DOCS = Path(__file__).parents[2] / "docs/how-to"
 RESULTS = (DOCS / "export-results.md").read_text()
@@ -27,10 +27,9 @@ def test_a_stored_result_goes_out_as_the_page_says(
     """The page loads a stroke; an impact goes the same way."""
     pytest.importorskip("h5netcdf")
     monkeypatch.chdir(tmp_path)
-    save_study(impact_study, tmp_path / "klack-results/demo-stroke")
-    code = PYTHON[0].replace("stroke_store", "store").replace("load_stroke", "load_study")
+    IMPACT.save(impact_study, tmp_path / "klack-results/demo-stroke")
 
-    exec(compile(code, "export-results.md", "exec"), {})
+    exec(compile(PYTHON[0], "export-results.md", "exec"), {})
 
     assert (tmp_path / "stroke.nc").is_file()
 

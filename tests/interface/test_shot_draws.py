@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from klack.analyses.shots.draw import centric_draw, draw_shot, extreme_placements, polar
+from klack.analyses.shots.one_shot import rigid_placement
 from klack.case import load_case
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
 from klack.case.shots import Shots, Waviness
 from klack.errors import InputError
 from klack.mesh.rigid import Pose
-from klack.workflow.shot_draw import centric_draw, draw_shot, extreme_placements, polar
-from klack.workflow.shot_run import rigid_placement
 
 GUIDED = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
 TOUCH = -0.42e-3

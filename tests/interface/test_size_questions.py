@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from klack.assembling.given_shapes import require_given_shapes, require_usual_sizes
 from klack.case.reader import read_case
 from klack.cli.main import main
 from klack.errors import InputError
-from klack.workflow.given_shapes import require_given_shapes, require_usual_sizes
 
 RODS = (Path(__file__).parents[1] / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")
 MODEL = "      model: axisymmetric\n"

@@ -14,10 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.store import RESULT_NAME
 from klack.errors import InputError
 from klack.reduction.storage import read_arrays
-from klack.workflow.store import RESULT_NAME, load_study, save_study
-from klack.workflow.study import ImpactStudy
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
 SEED = int(os.environ.get("KLACK_SEED", "1"))
@@ -26,7 +27,7 @@ SEED = int(os.environ.get("KLACK_SEED", "1"))
 @pytest.fixture(scope="module")
 def stored(lonely_study: ImpactStudy, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stored")
-    save_study(lonely_study, folder)
+    IMPACT.save(lonely_study, folder)
     return folder
 
 
@@ -55,7 +56,7 @@ def damage(raw: bytes, draw: random.Random) -> bytes:
 
 
 def test_damaged_bytes(stored: Path, tmp_path: Path):
-    whole = words(load_study(stored))
+    whole = words(IMPACT.load(stored))
     files = sorted(path for path in (stored / RESULT_NAME).rglob("*") if path.is_file())
     draw = random.Random(SEED)
     copy = tmp_path / "copy"
@@ -67,7 +68,7 @@ def test_damaged_bytes(stored: Path, tmp_path: Path):
         other.write_bytes(damage(file.read_bytes(), draw))
         found = None
         try:
-            found = load_study(copy)
+            found = IMPACT.load(copy)
         except InputError:
             refused += 1
         assert found is None or words(found) == whole, (file, other.read_bytes()[:300])
@@ -100,7 +101,7 @@ def test_the_same_bytes_of_another_type_or_shape_are_refused(stored: Path, tmp_p
 
     for change in (whole_numbers, table):
         with pytest.raises(InputError):
-            load_study(changed(stored, tmp_path / change.__name__, change))
+            IMPACT.load(changed(stored, tmp_path / change.__name__, change))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
@@ -113,7 +114,7 @@ def test_a_huge_array_takes_no_memory(stored: Path, tmp_path: Path):
 
     folder = changed(stored, tmp_path / "huge", huge)
     with pytest.raises(InputError, match=r"more than 4 GB"):
-        load_study(folder)
+        IMPACT.load(folder)
 
 
 def test_names_that_lead_out_of_the_store_are_refused(stored: Path, tmp_path: Path):
@@ -124,7 +125,7 @@ def test_names_that_lead_out_of_the_store_are_refused(stored: Path, tmp_path: Pa
     for other in ("..", "../../..", "/etc", "a/../../b"):
         file.write_text(text.replace(f'"{name}"', json.dumps(other)))
         with pytest.raises(InputError):
-            load_study(tmp_path / "out")
+            IMPACT.load(tmp_path / "out")
 
 
 class Bomb:

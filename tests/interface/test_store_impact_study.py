@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import zarr
 
+from klack.analyses import store as record_store
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.store import RESULT_NAME
 from klack.errors import InputError
-from klack.workflow import record_store
-from klack.workflow.store import RESULT_NAME, load_study, save_study
-from klack.workflow.study import ImpactStudy
 
 
 def assert_same(a: object, b: object, where: str = "study") -> None:
@@ -37,10 +38,10 @@ def assert_same(a: object, b: object, where: str = "study") -> None:
 
 
 def test_a_study_comes_back_to_the_last_bit(impact_study: ImpactStudy, tmp_path: Path) -> None:
-    assert save_study(impact_study, tmp_path) == tmp_path / RESULT_NAME
+    assert IMPACT.save(impact_study, tmp_path) == tmp_path / RESULT_NAME
 
-    assert_same(load_study(tmp_path), impact_study)
-    assert_same(load_study(tmp_path / RESULT_NAME), impact_study)
+    assert_same(IMPACT.load(tmp_path), impact_study)
+    assert_same(IMPACT.load(tmp_path / RESULT_NAME), impact_study)
     assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
 
 
@@ -54,13 +55,13 @@ def test_numbers_that_json_lacks_and_odd_names_come_back(
         lonely_study, title="a/b: <é> 100 %", levels={"reduced/1 §": result}, versions={"a/b": "1"}
     )
 
-    save_study(odd, tmp_path)
+    IMPACT.save(odd, tmp_path)
 
-    assert_same(load_study(tmp_path), odd)
+    assert_same(IMPACT.load(tmp_path), odd)
 
 
 def test_arrays_carry_units_for_other_readers(impact_study: ImpactStudy, tmp_path: Path) -> None:
-    save_study(impact_study, tmp_path)
+    IMPACT.save(impact_study, tmp_path)
 
     force = zarr.open_array(tmp_path / RESULT_NAME / "study/levels/full/history/force", mode="r")
 
@@ -71,10 +72,10 @@ def test_arrays_carry_units_for_other_readers(impact_study: ImpactStudy, tmp_pat
 def test_saving_again_replaces_the_result(
     impact_study: ImpactStudy, lonely_study: ImpactStudy, tmp_path: Path
 ) -> None:
-    save_study(impact_study, tmp_path)
-    save_study(lonely_study, tmp_path)
+    IMPACT.save(impact_study, tmp_path)
+    IMPACT.save(lonely_study, tmp_path)
 
-    assert list(load_study(tmp_path).levels) == ["reduced"]
+    assert list(IMPACT.load(tmp_path).levels) == ["reduced"]
     assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
 
 
@@ -84,17 +85,17 @@ def test_an_interrupted_save_leaves_the_old_result(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    save_study(impact_study, tmp_path)
+    IMPACT.save(impact_study, tmp_path)
 
     def interrupt(*_: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(record_store, "_checksum", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        save_study(lonely_study, tmp_path)
+        IMPACT.save(lonely_study, tmp_path)
     monkeypatch.undo()
 
-    assert list(load_study(tmp_path).levels) == ["full", "reduced"]
+    assert list(IMPACT.load(tmp_path).levels) == ["full", "reduced"]
     assert [path.name for path in tmp_path.iterdir()] == [RESULT_NAME]
 
 
@@ -105,43 +106,43 @@ def test_a_result_exchanged_while_it_is_read_is_read_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """No numbers of two results may mix: checksums alone would not see it."""
-    save_study(impact_study, tmp_path)
+    IMPACT.save(impact_study, tmp_path)
     usual, times = record_store._load, []
 
     def exchanged(path: Path, form: record_store.RecordFormat) -> object:
         record = usual(path, form)
         if not times:
-            save_study(lonely_study, tmp_path)
+            IMPACT.save(lonely_study, tmp_path)
         times.append(path)
         return record
 
     monkeypatch.setattr(record_store, "_load", exchanged)
 
-    assert list(load_study(tmp_path).levels) == ["reduced"]
+    assert list(IMPACT.load(tmp_path).levels) == ["reduced"]
     assert len(times) == 2
 
 
 def test_no_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"folder that does not exist.*\nTry: run"):
-        load_study(tmp_path / "nowhere")
+        IMPACT.load(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no klack result"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)
 
 
 def test_a_foreign_store_is_refused(tmp_path: Path) -> None:
     zarr.open_group(tmp_path / RESULT_NAME, mode="w", zarr_format=3)
 
     with pytest.raises(InputError, match="format None"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)
 
 
 def test_another_format_version_is_refused(lonely_study: ImpactStudy, tmp_path: Path) -> None:
-    save_study(lonely_study, tmp_path)
+    IMPACT.save(lonely_study, tmp_path)
     root = zarr.open_group(tmp_path / RESULT_NAME, mode="r+")
     root.attrs["format_version"] = 99
 
     with pytest.raises(InputError, match="format version 99"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)
 
 
 FORCE = "study/levels/reduced/history/force"
@@ -163,7 +164,7 @@ def test_a_store_with_a_lost_part_is_refused(
     lost: str, lonely_study: ImpactStudy, tmp_path: Path
 ) -> None:
     """Zarr itself reads a lost chunk as zeros: only the checksum notices."""
-    save_study(lonely_study, tmp_path)
+    IMPACT.save(lonely_study, tmp_path)
     path = tmp_path / RESULT_NAME / lost
     if path.is_dir():
         shutil.rmtree(path)
@@ -171,14 +172,14 @@ def test_a_store_with_a_lost_part_is_refused(
         path.unlink()
 
     with pytest.raises(InputError, match=r"result .*\nTry: (copy|run)"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)
 
 
 @pytest.mark.parametrize("cut", [f"{FORCE}/c/0", f"{FORCE}/zarr.json", "study/zarr.json"])
 def test_a_cut_file_is_refused(cut: str, lonely_study: ImpactStudy, tmp_path: Path) -> None:
-    save_study(lonely_study, tmp_path)
+    IMPACT.save(lonely_study, tmp_path)
     path = tmp_path / RESULT_NAME / cut
     path.write_bytes(path.read_bytes()[:-20])
 
     with pytest.raises(InputError, match=r"result .*\nTry: copy"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)

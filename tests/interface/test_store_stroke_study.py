@@ -9,6 +9,19 @@ import numpy as np
 import pytest
 import zarr
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.store import stored_format
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.record import (
+    FluidSummary,
+    LineSummary,
+    StopSummary,
+    StrokeChannels,
+    StrokeStudy,
+    StrokeVariant,
+)
+from klack.analyses.stroke.times import LiftTimes, Passage
+from klack.assembling.body_summary import BodySummary
 from klack.errors import InputError
 from klack.simulation.network_result import (
     ChannelData,
@@ -17,19 +30,6 @@ from klack.simulation.network_result import (
     InterfaceRecord,
     NetworkResult,
 )
-from klack.workflow.record_store import stored_format
-from klack.workflow.store import load_study
-from klack.workflow.stroke_store import STROKE_FORMAT, load_stroke, save_stroke
-from klack.workflow.stroke_study import (
-    FluidSummary,
-    LineSummary,
-    StopSummary,
-    StrokeChannels,
-    StrokeStudy,
-    StrokeVariant,
-)
-from klack.workflow.stroke_times import LiftTimes, Passage
-from klack.workflow.study import BodySummary
 
 
 def fill(kind: type, **known: Any) -> Any:
@@ -137,29 +137,29 @@ def assert_same(one: Any, other: Any) -> None:
 
 
 def test_a_study_comes_back_whole(study: StrokeStudy, tmp_path: Path):
-    save_stroke(study, tmp_path)
+    STROKE.save(study, tmp_path)
 
-    assert_same(load_stroke(tmp_path), study)
+    assert_same(STROKE.load(tmp_path), study)
 
 
 def test_a_dry_valve_has_no_fluid(study: StrokeStudy, tmp_path: Path):
-    save_stroke(replace(study, fluid=None, lines=()), tmp_path)
+    STROKE.save(replace(study, fluid=None, lines=()), tmp_path)
 
-    assert load_stroke(tmp_path).fluid is None
+    assert STROKE.load(tmp_path).fluid is None
 
 
 def test_nan_of_an_earlier_version_is_none(study: StrokeStudy, tmp_path: Path):
     nan = float("nan")
-    save_stroke(replace(study, lift=nan, switch_off=nan), tmp_path)
+    STROKE.save(replace(study, lift=nan, switch_off=nan), tmp_path)
 
-    found = load_stroke(tmp_path)
+    found = STROKE.load(tmp_path)
 
     assert found.lift is None
     assert found.switch_off is None
 
 
 def test_any_zarr_reader_finds_channels_with_their_unit(study: StrokeStudy, tmp_path: Path):
-    path = save_stroke(study, tmp_path)
+    path = STROKE.save(study, tmp_path)
 
     channel = zarr.open_group(path)["study/variants/wet/result/channels/sac pressure"]
 
@@ -168,11 +168,11 @@ def test_any_zarr_reader_finds_channels_with_their_unit(study: StrokeStudy, tmp_
 
 
 def test_the_two_kinds_of_studies_are_told_apart(study: StrokeStudy, tmp_path: Path):
-    save_stroke(study, tmp_path)
+    STROKE.save(study, tmp_path)
 
-    assert stored_format(tmp_path) == STROKE_FORMAT.name
+    assert stored_format(tmp_path) == STROKE.form.name
     with pytest.raises(InputError, match="klack impact"):
-        load_study(tmp_path)
+        IMPACT.load(tmp_path)
 
 
 def test_events_and_reference_are_found(study: StrokeStudy):

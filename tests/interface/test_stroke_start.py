@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.run import run_stroke
+from klack.analyses.stroke.summary import start_text, stroke_to_json
 from klack.case.valve_reader import read_valve_case
-from klack.workflow.stroke import run_stroke
-from klack.workflow.stroke_store import load_stroke, save_stroke
-from klack.workflow.stroke_summary import start_text, stroke_to_json
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 
@@ -16,8 +16,8 @@ def study(tmp_path, **changes):
         assert before in text
         text = text.replace(before, after)
     made = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"))
-    save_stroke(made, tmp_path)
-    return load_stroke(tmp_path)
+    STROKE.save(made, tmp_path)
+    return STROKE.load(tmp_path)
 
 
 def test_displacements_and_pressures_are_told_after_storing(tmp_path):

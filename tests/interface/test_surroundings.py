@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.catalogue import load_result
 from klack.cli.main import main
 from klack.cli.printable import printable
-from klack.cli.stored import load_stored
 from klack.errors import InputError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="mounts and capabilities")
@@ -141,7 +141,7 @@ def test_a_disk_that_fills_at_any_time(result: Path, small_disk: Path):
             assert code in (0, 2), (room, words, said)
             assert code == 0 or "No space left" in said or "no space is left" in said, (words, said)
             assert code == 0 or said.count("\n") <= 3, (words, said)
-            assert load_stored(small_disk / "r") is not None
+            assert load_result(small_disk / "r") is not None
             if words[0] == "impact" and code == 2:
                 assert tree(small_disk / "r").keys() == before.keys()
         hidden = [path for path in small_disk.rglob(".klack-*")]
@@ -244,7 +244,7 @@ def test_a_result_folder_that_is_a_file_or_a_link(result: Path, tmp_path: Path, 
         main(["impact", RODS, "--no-certify", "-q", "--no-report", "--out", str(tmp_path / "link")])
         == 0
     )
-    assert load_stored(tmp_path / "real") is not None
+    assert load_result(tmp_path / "real") is not None
     (tmp_path / "lost").symlink_to("nowhere")
     assert main(["export", str(result), "--to", "csv", "--out", str(tmp_path / "lost")]) == 2
     assert "Traceback" not in capsys.readouterr().err
@@ -252,7 +252,7 @@ def test_a_result_folder_that_is_a_file_or_a_link(result: Path, tmp_path: Path, 
 
 def test_a_folder_that_goes_while_a_run_computes(tmp_path: Path, monkeypatch):
     """It is made again: what was computed is not lost."""
-    import klack.workflow.impact as workflow
+    import klack.analyses.impact.run as workflow
 
     usual = workflow.run_impact
 
@@ -267,7 +267,7 @@ def test_a_folder_that_goes_while_a_run_computes(tmp_path: Path, monkeypatch):
         main(["impact", RODS, "--no-certify", "-q", "--no-report", "--out", str(tmp_path / "r")])
         == 0
     )
-    assert load_stored(tmp_path / "r") is not None
+    assert load_result(tmp_path / "r") is not None
 
 
 @pytest.mark.slow
@@ -294,7 +294,7 @@ def test_two_processes_write_into_one_folder(tmp_path: Path):
     while any(process.poll() is None for process in running):
         if (tmp_path / "r").is_dir():
             try:
-                seen.add(load_stored(tmp_path / "r").speed)
+                seen.add(load_result(tmp_path / "r").speed)
             except InputError as error:
                 seen.add(error.got)
     for process in running:
@@ -304,7 +304,7 @@ def test_two_processes_write_into_one_folder(tmp_path: Path):
     assert seen <= {1.0, 2.0, "no klack result"}  # the last one before there is any
     names = sorted(path.name for path in (tmp_path / "r").iterdir())
     assert names == ["report.html", "report.pdf", "result.zarr"]
-    study = load_stored(tmp_path / "r")
+    study = load_result(tmp_path / "r")
     title = (tmp_path / "r" / "report.html").read_text()
     assert f"{study.speed:g} m/s" in title
 

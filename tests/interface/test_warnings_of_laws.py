@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.valve import build_valve
 from klack.case.reader import load_case
 from klack.case.valve_reader import load_valve_case
 from klack.contact import local_law
-from klack.workflow.impact import run_impact
-from klack.workflow.stages import collected_warnings
-from klack.workflow.valve import build_valve
+from klack.stages import collected_warnings
 
 CASES = Path(__file__).parents[1] / "data" / "case"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.workflow.workers import WorkerPool
+from klack.analyses.workers import WorkerPool
 
 DYING = """
 import os, signal, sys, threading, time
@@ -21,7 +21,7 @@ if any("spawn_main" in word for word in sys.orig_argv):
 """
 PROGRAM = """
 import time
-from klack.workflow.workers import WorkerDied, WorkerPool
+from klack.analyses.workers import WorkerDied, WorkerPool
 with WorkerPool(2, bytes(1_000_000)) as pool:
     for _ in range(2):
         try:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.bodies import build_bodies
 from klack.case import load_case, shipped_cases
 from klack.case.reader import read_case
 from klack.errors import InputError
 from klack.mesh.solid import write_step_revolved
-from klack.workflow.bodies import build_bodies
-from klack.workflow.impact import run_impact
-from klack.workflow.progress import silent
+from klack.progress import silent
 
 STEP = """
 klack: 1

@@ -7,23 +7,24 @@ import numpy as np
 import pytest
 from energy_ledger import allowed
 
-from klack.case import load_case
-from klack.errors import ConvergenceError, InputError
-from klack.workflow.progress import silent
-from klack.workflow.record_store import stored_format
-from klack.workflow.shot_draw import centric_draw, draw_shot
-from klack.workflow.shot_model import build_shots
-from klack.workflow.shot_run import columns_of, run_shot, simulate_shot
-from klack.workflow.shots import judge_rule, run_shots
-from klack.workflow.shots_log import SHOT_LOG, shot_log, shots_mark
-from klack.workflow.shots_pool import run_shots_on
-from klack.workflow.shots_store import SHOTS_FORMAT, load_shots, save_shots
-from klack.workflow.shots_study import MEASURES, ShotColumns
-from klack.workflow.shots_summary import (
+from klack.analyses.shots.analysis import SHOTS
+from klack.analyses.shots.draw import centric_draw, draw_shot
+from klack.analyses.shots.log import SHOT_LOG, shot_log, shots_mark
+from klack.analyses.shots.measures import FIRST_IMPACT
+from klack.analyses.shots.model import build_shots
+from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
+from klack.analyses.shots.pool import run_shots_on
+from klack.analyses.shots.record import ShotColumns
+from klack.analyses.shots.run import judge_rule, run_shots
+from klack.analyses.shots.summary import (
     DISTRIBUTION_COLUMNS,
     distribution_rows,
     shots_to_json,
 )
+from klack.analyses.store import stored_format
+from klack.case import load_case
+from klack.errors import ConvergenceError, InputError
+from klack.progress import silent
 
 CASE = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
 
@@ -199,10 +200,10 @@ def test_shots_whose_workers_die_end_with_a_way_out(model, draws, alone, tmp_pat
 
 
 def test_a_study_comes_back_from_disk(study, tmp_path: Path):
-    save_shots(study, tmp_path)
-    back = load_shots(tmp_path)
+    SHOTS.save(study, tmp_path)
+    back = SHOTS.load(tmp_path)
 
-    assert stored_format(tmp_path) == SHOTS_FORMAT.name
+    assert stored_format(tmp_path) == SHOTS.form.name
     same(back.shots, study.shots)
     assert back.rule == study.rule
     assert back.distributions == study.distributions
@@ -227,7 +228,7 @@ def test_numbers_for_scripts(study):
     assert spread["mean"] == pytest.approx(np.mean(values))
     assert spread["quantile_1"] == max(values)
     rows = distribution_rows(study)
-    assert len(rows) == len(MEASURES)
+    assert len(rows) == len(FIRST_IMPACT)
     assert all(len(row) == len(DISTRIBUTION_COLUMNS) for row in rows)
 
 

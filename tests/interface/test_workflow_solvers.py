@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
 from klack.case import load_case, shipped_cases
 from klack.elasticity.factorization import available_backends
-from klack.workflow.impact import run_impact
 
 
 @pytest.mark.slow

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact import run as impact
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.impact.summary import answer_line, estimate_lines, study_to_json
 from klack.case.reader import load_case, read_case
 from klack.case.schema import Case, LinearLocalLaw, Spring
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.workflow import impact
-from klack.workflow.impact import run_impact
-from klack.workflow.stages import for_comparison
-from klack.workflow.study import ImpactStudy
-from klack.workflow.summary import answer_line, estimate_lines, study_to_json
+from klack.stages import for_comparison
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

@@ -11,6 +11,7 @@ from scipy.sparse import block_diag, coo_array, csr_array, triu
 from scipy.sparse.linalg import norm
 
 from klack.acoustics.comparison import compare_histories
+from klack.assembling.problem import build_problem
 from klack.case import find_case, load_case
 from klack.case.schema import Case
 from klack.contact.restitution import measure_impact
@@ -25,10 +26,9 @@ from klack.exchange.calculix_deck import (
 from klack.exchange.calculix_result import other_run, read_calculix
 from klack.exchange.calculix_run import find_calculix, run_calculix
 from klack.materials import Material
+from klack.progress import silent
 from klack.transient.full_order import simulate_full_order
 from klack.verification.lattice import lattice_mesh
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
 
 pytestmark = [
     pytest.mark.slow,

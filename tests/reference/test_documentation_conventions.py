@@ -84,7 +84,7 @@ def test_zero_decibels_are_where_the_page_says():
 
 @pytest.mark.slow
 def test_a_positive_force_opens_and_the_spring_closes():
-    from klack.workflow.stroke import run_stroke
+    from klack.analyses.stroke.run import run_stroke
 
     page = (DOCS / "reference" / "valve-case.md").read_text(encoding="utf-8")
     example = re.search(r"```yaml\n(.*?)```", page, re.DOTALL)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
 from klack.case.schema import LEVELS
-from klack.workflow.impact import run_impact
 
 PAGE = Path(__file__).parents[2] / "docs" / "theory" / "levels.md"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.workflow.store import load_study
+from klack.analyses.impact.analysis import IMPACT
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
@@ -47,7 +47,7 @@ def test_the_commands_run_and_give_the_quoted_numbers(tmp_path):
     which = r"(?: \(contact \d of \d\))?"
     row = rf"^([a-z-]+) +([\d.]+){which} +([\d.]+){which} +([\d.]+) +([\d.]+) "
     rows = re.findall(row, PAGE, re.MULTILINE)
-    study = load_study(folder)
+    study = IMPACT.load(folder)
     assert {row[0] for row in rows} == set(study.levels)
     for level, peak, time, impulse, restitution in rows:
         measures = study.levels[level].measures

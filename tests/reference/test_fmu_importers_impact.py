@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from c_compiler import needs_compiler, needs_gcc
 
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
+from klack.progress import silent
 from klack.simulation.impact import simulate
-from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import silent
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")

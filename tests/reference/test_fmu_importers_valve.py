@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from c_compiler import needs_compiler
 
+from klack.assembling.valve import build_valve
 from klack.case import find_case
 from klack.case.valve_reader import load_any_case
 from klack.contact.laws import HuntCrossley
@@ -18,7 +19,6 @@ from klack.exchange.fmu.build import build_fmu
 from klack.mechanics.force import ConstantForce
 from klack.network.network import Network
 from klack.simulation.network_run import simulate_network
-from klack.workflow.valve import build_valve
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")

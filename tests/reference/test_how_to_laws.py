@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
 from klack.contact.restitution import ImpactMeasures
-from klack.workflow.impact import run_impact
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 SHOWN = re.compile(r"```yaml\n(.*?)```", re.DOTALL)

@@ -14,16 +14,16 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from klack.analyses.comparison.analysis import MEASURED_STROKES
+from klack.analyses.comparison.strokes import compare_strokes
+from klack.analyses.comparison.strokes_record import MeasuredStrokeStudy
+from klack.analyses.comparison.strokes_summary import agreement
+from klack.analyses.stroke.run import run_stroke
 from klack.case.key_path import quantity_at, split_path
 from klack.case.shipped import shipped_cases
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.measurement.loading import load_stroke_set
-from klack.workflow.measured_store import save_measured_strokes
-from klack.workflow.measured_strokes import compare_strokes
-from klack.workflow.measured_study import MeasuredStrokeStudy
-from klack.workflow.measured_summary import agreement
-from klack.workflow.stroke import run_stroke
 
 CASE = shipped_cases()["measured"]
 FOLDER = CASE.parent
@@ -125,7 +125,7 @@ def test_nominal_values_do_not(hidden):
 
 @pytest.mark.slow
 def test_the_python_example_of_the_page_runs(hidden, tmp_path, monkeypatch):
-    save_measured_strokes(hidden, tmp_path / "klack-results" / "measured" / "measured")
+    MEASURED_STROKES.save(hidden, tmp_path / "klack-results" / "measured" / "measured")
     monkeypatch.chdir(tmp_path)
     code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert code is not None

@@ -12,6 +12,8 @@ import pytest
 import scipy.io
 from scipy.sparse import coo_array
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.given_bodies import reduced_from_file
 from klack.case import load_case
 from klack.case.schema import Case
 from klack.contact.laws import LinearLaw
@@ -30,8 +32,6 @@ from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import ContactPair, ReducedSystem
 from klack.unit_systems import unit_system
-from klack.workflow.given_bodies import reduced_from_file
-from klack.workflow.impact import run_impact
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 SEAT = rod_body(

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from energy_ledger import allowed
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.shots.run import run_shots
 from klack.case import load_case, read_case, shipped_cases
 from klack.case.schema import Case
 from klack.contact.laws import LinearLaw
 from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.workflow.impact import run_impact
-from klack.workflow.shots import run_shots
-from klack.workflow.study import ImpactStudy
 
 pytestmark = pytest.mark.slow
 

@@ -9,10 +9,10 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.run import run_stroke
 from klack.case import shipped_cases
 from klack.case.valve_reader import load_valve_case
-from klack.workflow.stroke import run_stroke
-from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 
 pytestmark = pytest.mark.slow
 

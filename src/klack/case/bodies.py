@@ -305,6 +305,11 @@ class CaseFile(Section):
         return self._source
 
     @property
+    def own_components(self) -> Mapping[str, str]:
+        """Components that are not part of klack, with a digest of their code: here none."""
+        return {}
+
+    @property
     def name(self) -> str:
         """Short name: of the file, or of its folder if the file is just called ``case.yaml``."""
         if self._path is None:

@@ -11,7 +11,7 @@ from klack.input.problem import Key
 from klack.network.component import Component
 from klack.network.own_component import component_word
 
-__all__ = ["CaseTree", "exchanged", "read_case_tree"]
+__all__ = ["CaseTree", "exchanged", "read_case_tree", "tree_of"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,7 +51,11 @@ class CaseTree:
 
 def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
     """Read the file of a case; ``components`` are those of the user's own that it may name."""
-    text = text_of(path)
+    return tree_of(text_of(path), path, components)
+
+
+def tree_of(text: str, path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+    """Parse the text of a case that lies (or will lie) at ``path``."""
     data, lines = parse(text, path)
     own = {component_word(kind): kind for kind in components}
     return CaseTree(path=path, text=text, data=data, lines=lines, components=own)

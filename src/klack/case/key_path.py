@@ -12,7 +12,7 @@ from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
 from klack.units import RATIO, Kind
 
-__all__ = ["Quantity", "kind_in", "quantity_at", "split_path", "written_at"]
+__all__ = ["Quantity", "kind_at", "kind_in", "node_at", "quantity_at", "split_path", "written_at"]
 
 
 class Quantity:
@@ -78,13 +78,13 @@ def split_path(text: str) -> Key:
     return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
-def quantity_at(case: Section, key: Key) -> Quantity:
-    """Find a number with a unit in a checked case.
+def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
+    """Find what stands at a key of a checked case, and the field that describes it.
 
     Raises
     ------
     CaseProblem
-        If a part of the path does not exist, or no such number stands there.
+        If a part of the path does not exist.
     """
     node: Any = case
     field: FieldInfo | None = None
@@ -101,9 +101,27 @@ def quantity_at(case: Section, key: Key) -> Quantity:
         if isinstance(node, Section):
             field = _fields(node)[str(part)]
         node = found[part]
+    return node, field
+
+
+def kind_at(node: Any, field: FieldInfo | None) -> Kind | None:
+    """Kind of quantity that stands at a place; None for anything else."""
     kind = None if field is None else kind_in(field.annotation, field.metadata)
-    if kind is None and isinstance(node, float):
-        kind = RATIO  # a plain number
+    if kind is None and field is not None and isinstance(node, float):
+        return RATIO  # a plain number
+    return kind
+
+
+def quantity_at(case: Section, key: Key) -> Quantity:
+    """Find a number with a unit in a checked case.
+
+    Raises
+    ------
+    CaseProblem
+        If a part of the path does not exist, or no such number stands there.
+    """
+    node, field = node_at(case, key)
+    kind = kind_at(node, field)
     if kind is None or field is None or isinstance(node, bool) or not isinstance(node, float | int):
         got = "no value" if node is None else "no number with a unit"
         raise CaseProblem(

@@ -21,7 +21,7 @@ from klack.cli.progress import show_progress
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from klack.advice.advice import Advice
+    from klack.analyses.advice.advice import Advice
 
 __all__ = ["advise"]
 
@@ -94,9 +94,9 @@ def advise(
     checked = read_any_case(tree.text, tree.path, tree.components.values())
 
     from klack import __version__
-    from klack.advice.advised_case import advice_yaml, advised_text, changed_values
-    from klack.advice.any_case import advise_case
-    from klack.advice.summary import advice_to_json
+    from klack.analyses.advice.advised_case import advice_yaml, advised_text, changed_values
+    from klack.analyses.advice.any_case import advise_case
+    from klack.analyses.advice.summary import advice_to_json
 
     with show_progress(quiet) as progress:
         advice = advise_case(
@@ -177,7 +177,7 @@ def _write_whole(path: Path, text: str) -> None:
 
 
 def _print_advice(advice: "Advice", yaml: str, written: Path | None, *, to_stderr: bool) -> None:
-    from klack.advice.summary import ADVICE_COLUMNS, advice_lines, advice_rows
+    from klack.analyses.advice.summary import ADVICE_COLUMNS, advice_lines, advice_rows
 
     title = f"{advice.title}: advice for the {advice.level} level"
     print_table(title, ADVICE_COLUMNS, advice_rows(advice), to_stderr=to_stderr)

@@ -9,7 +9,7 @@ from klack.cli.options import Json
 from klack.cli.output import require_json_target, write_json
 
 if TYPE_CHECKING:
-    from klack.workflow.json_results import CacheJson
+    from klack.analyses.json_results import CacheJson
 
 __all__ = ["cache"]
 

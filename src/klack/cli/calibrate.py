@@ -1,12 +1,11 @@
 """``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
+from klack.cli.ending import Ending
 from klack.cli.options import (
     CaseArgument,
     Components,
@@ -18,13 +17,11 @@ from klack.cli.options import (
     require_files,
     require_threads,
 )
-from klack.cli.output import require_folder, require_json_target, write_json
+from klack.cli.output import require_json_target
 from klack.cli.progress import show_progress
-from klack.cli.reports import REPORTS, write_result
-from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from klack.workflow.calibration_study import CalibrationStudy
+    pass
 
 __all__ = ["calibrate"]
 
@@ -74,26 +71,26 @@ def calibrate(
         if number is not None:
             require_positive(option, number, unit)
 
+    from klack.analyses.calibration.run import calibration_of, run_calibration
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
-    from klack.workflow.calibration import calibration_of, run_calibration
 
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     fitted = calibration_of(checked).channels
     folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
-    require_folder(folder)
+    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+    ending.require_possible()
 
+    from klack.analyses.calibration.analysis import CALIBRATION
+    from klack.analyses.calibration.calibrated_case import CALIBRATED_NAME, calibrated_text
+    from klack.analyses.calibration.log import TRIAL_LOG
     from klack.measurement.loading import load_stroke_set
-    from klack.workflow.calibrated_case import CALIBRATED_NAME, calibrated_text
-    from klack.workflow.calibration_log import TRIAL_LOG
-    from klack.workflow.calibration_store import save_calibration
-    from klack.workflow.calibration_summary import calibration_to_json
 
-    def save(study: "CalibrationStudy", stage: Path) -> None:
-        save_calibration(study, stage)
+    def calibrated(stage: Path) -> tuple[str, ...]:
         text = calibrated_text(tree, study, folder)
         (stage / CALIBRATED_NAME).write_text(text, encoding="utf-8")
+        return (CALIBRATED_NAME,)
 
     with show_progress(quiet) as progress:
         try:
@@ -118,33 +115,4 @@ def calibrate(
             kept = f"{count} computed strokes are kept in {folder / TRIAL_LOG.file}"
             stop.add_note(f"{kept}, the same command goes on.")
             raise
-        failure = write_result(
-            study, folder, save, report=report, progress=progress, unfinished=TRIAL_LOG
-        )
-    if not quiet:
-        made = report and failure is None
-        _print_study(study, folder, made, to_stderr=str(json) == "-")
-    else:
-        print_notes(study.warnings, to_stderr=True)
-    if json is not None:
-        write_json(json, calibration_to_json(study))
-    if failure:
-        raise failure
-    return 0
-
-
-def _print_study(study: "CalibrationStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.calibrated_case import CALIBRATED_NAME
-    from klack.workflow.calibration_summary import PARAMETER_COLUMNS, parameter_rows
-
-    title = f"{study.title}: {len(study.strokes)} strokes, {study.variant}"
-    print_table(title, PARAMETER_COLUMNS, parameter_rows(study), to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    print(
-        f"Lift inside the windows: {1e6 * study.residual_rms:.3g} um rms from the mean stroke "
-        f"({1e6 * study.residual_rms_before:.3g} um before).",
-        file=stream,
-    )
-    print_notes(study.warnings, to_stderr=to_stderr)
-    made = ["result.zarr", CALIBRATED_NAME, *(REPORTS if report else ())]
-    print(f"Results in {folder}: {', '.join(made)}", file=stream)
+    return ending.end(CALIBRATION, study, beside=calibrated, unfinished=TRIAL_LOG)

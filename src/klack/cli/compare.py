@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from klack.cli.ending import Ending
 from klack.cli.notes import print_notes
 from klack.cli.options import Components, Json, Quiet, imported
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 from klack.cli.progress import show_progress
-from klack.cli.reports import REPORTS, write_result
 from klack.cli.tables import print_table
 from klack.errors import InputError
 
 if TYPE_CHECKING:
+    from klack.analyses.comparison.calculix import Comparison
     from klack.case.measurement import CaseMeasurement
     from klack.case.valve_reader import OwnComponents
-    from klack.workflow.compare import Comparison
-    from klack.workflow.measured_shots_study import MeasuredShotsStudy
-    from klack.workflow.measured_study import MeasuredStrokeStudy
 
 __all__ = ["compare"]
 
@@ -103,8 +101,8 @@ def compare(
         return 0
     folder = out if out is not None else result / _MEASURED
     own = imported(component)
-    _with_measurement(result, measurement or [], case, own, folder, report, json, quiet)
-    return 0
+    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+    return _with_measurement(result, measurement or [], case, own, ending)
 
 
 # --------------------------------------------------------------------------- measurement
@@ -115,97 +113,34 @@ def _with_measurement(
     given: Sequence[str],
     case: Path | None,
     own: "OwnComponents",
-    folder: Path,
-    report: bool,
-    json: Path | None,
-    quiet: bool,
-) -> None:
-    from klack.workflow.record_store import stored_format
-    from klack.workflow.shots_store import SHOTS_FORMAT
-    from klack.workflow.stroke_store import STROKE_FORMAT
+    ending: Ending,
+) -> int:
+    from klack.analyses.catalogue import analysis_in, load_result
+    from klack.analyses.comparison.analysis import MEASURED_SHOTS, MEASURED_STROKES
+    from klack.analyses.comparison.shots import compare_shots
+    from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.shots.record import ShotsStudy
+    from klack.analyses.stroke.record import StrokeStudy
 
-    kind = stored_format(result)
-    if kind not in (STROKE_FORMAT.name, SHOTS_FORMAT.name):
+    study = load_result(result)
+    if not isinstance(study, StrokeStudy | ShotsStudy):
         raise InputError(
             f"result {result}",
-            got=f"a result of another kind ({kind})",
+            got=f"a result of another kind ({analysis_in(result).form.name})",
             expected="one of klack stroke or klack shots",
             hint="run `klack stroke CASE` for strokes, `klack shots CASE` for drops.",
         )
-    require_folder(folder)
-    if kind == STROKE_FORMAT.name:
-        _strokes(result, given, case, own, folder, report, json, quiet)
-    else:
-        _drops(result, given, case, own, folder, report, json, quiet)
-
-
-def _strokes(
-    result: Path,
-    given: Sequence[str],
-    case: Path | None,
-    own: "OwnComponents",
-    folder: Path,
-    report: bool,
-    json: Path | None,
-    quiet: bool,
-) -> None:
-    from klack.workflow.measured_store import save_measured_strokes
-    from klack.workflow.measured_strokes import compare_strokes
-    from klack.workflow.measured_summary import measured_to_json
-    from klack.workflow.stroke_store import load_stroke
-
-    study = load_stroke(result)
-    files = _files(given, study.reference.name)
+    ending.require_possible()
     section, text = _section(study.case_text, result, case, own)
-    with show_progress(quiet) as progress:
-        compared = compare_strokes(study, files, section, case_text=text, progress=progress)
-        failure = write_result(
-            compared, folder, save_measured_strokes, report=report, progress=progress
-        )
-    if not quiet:
-        _print_strokes(compared, to_stderr=str(json) == "-")
-        _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
-    else:
-        notes = [note for variant in compared.variants.values() for note in variant.notes]
-        print_notes((*notes, *compared.warnings), to_stderr=True)
-    if json is not None:
-        write_json(json, measured_to_json(compared))
-    if failure:
-        raise failure
-
-
-def _drops(
-    result: Path,
-    given: Sequence[str],
-    case: Path | None,
-    own: "OwnComponents",
-    folder: Path,
-    report: bool,
-    json: Path | None,
-    quiet: bool,
-) -> None:
-    from klack.workflow.measured_shots import compare_shots
-    from klack.workflow.measured_shots_summary import measured_shots_to_json
-    from klack.workflow.measured_store import save_measured_shots
-    from klack.workflow.shots_store import load_shots
-
-    study = load_shots(result)
+    if isinstance(study, StrokeStudy):
+        files = _files(given, study.reference.name)
+        with show_progress(ending.quiet) as progress:
+            strokes = compare_strokes(study, files, section, case_text=text, progress=progress)
+        return ending.end(MEASURED_STROKES, strokes)
     paths = [path for paths in _files(given, "dry").values() for path in paths]
-    section, text = _section(study.case_text, result, case, own)
-    with show_progress(quiet) as progress:
-        compared = compare_shots(study, paths, section, case_text=text, progress=progress)
-        failure = write_result(
-            compared, folder, save_measured_shots, report=report, progress=progress
-        )
-    if not quiet:
-        _print_drops(compared, to_stderr=str(json) == "-")
-        _print_folder(folder, report and failure is None, to_stderr=str(json) == "-")
-    else:
-        print_notes((*compared.notes, *compared.warnings), to_stderr=True)
-    if json is not None:
-        write_json(json, measured_shots_to_json(compared))
-    if failure:
-        raise failure
+    with show_progress(ending.quiet) as progress:
+        drops = compare_shots(study, paths, section, case_text=text, progress=progress)
+    return ending.end(MEASURED_SHOTS, drops)
 
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
@@ -242,75 +177,25 @@ def _section(
     return other.measurement, other.source
 
 
-def _print_strokes(study: "MeasuredStrokeStudy", *, to_stderr: bool) -> None:
-    from klack.workflow.measured_summary import (
-        CURVE_COLUMNS,
-        HIGHEST_COLUMNS,
-        IMPACT_COLUMNS,
-        curve_rows,
-        highest_rows,
-        impact_rows,
-        rule,
-        verdict,
-    )
-
-    stream = sys.stderr if to_stderr else sys.stdout
-    for variant in study.variants.values():
-        aside = f", {len(variant.rejected)} put aside" if variant.rejected else ""
-        title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
-        print_table(title, CURVE_COLUMNS, curve_rows(variant), to_stderr=to_stderr)
-        rows = impact_rows(variant)
-        print_table("Impacts", IMPACT_COLUMNS, rows, left=2, to_stderr=to_stderr)
-        if variant.highest:
-            highest = highest_rows(variant)
-            print_table("Measured", HIGHEST_COLUMNS, highest, left=2, to_stderr=to_stderr)
-        for item in variant.rejected:
-            print(f"Put aside: {item.name}: {item.reason}", file=stream)
-        print_notes(variant.notes, to_stderr=to_stderr)
-    for variant in study.variants.values():
-        print(verdict(study, variant), file=stream)
-    print(rule(study), file=stream)
-    print_notes(study.warnings, to_stderr=to_stderr)
-
-
-def _print_drops(study: "MeasuredShotsStudy", *, to_stderr: bool) -> None:
-    from klack.workflow.measured_shots_summary import (
-        DROP_COLUMNS,
-        bias_sentence,
-        drop_rows,
-        drop_rule,
-        drop_verdict,
-    )
-
-    stream = sys.stderr if to_stderr else sys.stdout
-    title = f"{study.title}: beside {len(study.names)} measured drops"
-    print_table(title, DROP_COLUMNS, drop_rows(study), left=2, to_stderr=to_stderr)
-    for item in study.rejected:
-        print(f"Put aside: {item.name}: {item.reason}", file=stream)
-    for line in (drop_verdict(study), bias_sentence(study), drop_rule(study)):
-        print(line, file=stream)
-    print_notes((*study.notes, *study.warnings), to_stderr=to_stderr)
-
-
-def _print_folder(folder: Path, report: bool, *, to_stderr: bool) -> None:
-    made = ["result.zarr", *(REPORTS if report else ())]
-    print(f"Results in {folder}: {', '.join(made)}", file=sys.stderr if to_stderr else sys.stdout)
-
-
 # --------------------------------------------------------------------------- CalculiX
 
 
 def _with_calculix(
     result: Path, calculix: Path, level: str, folder: Path, json: Path | None, quiet: bool
 ) -> None:
+    from klack.analyses.comparison.calculix import (
+        compare_with,
+        comparison_to_json,
+        level_of,
+        with_other,
+    )
+    from klack.analyses.impact.analysis import IMPACT
+    from klack.analyses.impact.figures import force_chart
+    from klack.analyses.incomplete import missing_in
     from klack.exchange.calculix_result import other_run, read_calculix
-    from klack.report.figures import force_chart
     from klack.report.printed import svg_chart
-    from klack.workflow.compare import compare_with, comparison_to_json, level_of, with_other
-    from klack.workflow.incomplete import missing_in
-    from klack.workflow.store import load_study
 
-    study = load_study(result)
+    study = IMPACT.load(result)
     require_folder(folder)
     print_notes(missing_in(study), to_stderr=True)
     history = level_of(study, level).history
@@ -325,7 +210,7 @@ def _with_calculix(
 
 
 def _print(comparison: "Comparison", title: str, picture: Path, *, to_stderr: bool) -> None:
-    from klack.workflow.compare import COMPARISON_COLUMNS, comparison_rows
+    from klack.analyses.comparison.calculix import COMPARISON_COLUMNS, comparison_rows
 
     print_table(title, COMPARISON_COLUMNS, comparison_rows(comparison), to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout

@@ -14,7 +14,7 @@ from klack.cli.stored import is_result
 from klack.errors import InputError
 
 if TYPE_CHECKING:
-    from klack.workflow.json_results import ExportJson
+    from klack.analyses.json_results import ExportJson
 
 __all__ = ["export"]
 
@@ -222,13 +222,13 @@ def _export_stored(source: Path, to: str, out: Path | None) -> tuple[str, Writte
             expected=f"--to {', '.join(_RESULTS)} for a result",
             hint="models, decks and fields come from the case: give the case file or its name.",
         )
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.incomplete import missing_in
     from klack.cli.export_results import export_result
-    from klack.cli.stored import load_stored
-    from klack.workflow.incomplete import missing_in
 
     folder = out if out is not None else source
     require_folder(folder)
-    study = load_stored(source)
+    study = load_result(source)
     print_notes(missing_in(study), to_stderr=True)
     return study.case, export_result(study, to, folder)
 

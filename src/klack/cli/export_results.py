@@ -16,9 +16,9 @@ __all__ = ["export_fields", "export_result", "run_and_export"]
 
 def export_result(study: Any, to: str, folder: Path) -> Written:
     """Write the histories of a stored study."""
+    from klack.analyses.impact.record import ImpactStudy
+    from klack.analyses.stroke.record import StrokeStudy
     from klack.exchange.results.study_table import result_table
-    from klack.workflow.stroke_study import StrokeStudy
-    from klack.workflow.study import ImpactStudy
 
     if not isinstance(study, ImpactStudy | StrokeStudy):
         raise InputError(
@@ -53,11 +53,11 @@ def run_and_export(
     case: "Case | ValveCase", to: str, folder: Path, *, threads: int | None, quiet: bool
 ) -> tuple[Written, Exception | None]:
     """Run a case as it asks for, write what came out, and hand on why a run ended early."""
+    from klack.analyses.impact.run import run_impact
+    from klack.analyses.incomplete import IncompleteImpactError
+    from klack.analyses.stroke.record import IncompleteStrokeError
+    from klack.analyses.stroke.run import run_stroke
     from klack.case.schema import Case
-    from klack.workflow.impact import run_impact
-    from klack.workflow.incomplete import IncompleteImpactError
-    from klack.workflow.stroke import run_stroke
-    from klack.workflow.stroke_study import IncompleteStrokeError
 
     study: Any
     incomplete: Exception | None = None

@@ -1,20 +1,14 @@
 """``klack impact``: one dry impact at one or several levels."""
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
+from klack.cli.ending import Ending
 from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_folder, require_json_target, write_json
+from klack.cli.output import require_json_target
 from klack.cli.progress import show_progress
-from klack.cli.reports import REPORTS, write_result
-from klack.cli.tables import print_table
-
-if TYPE_CHECKING:
-    from klack.workflow.study import ImpactStudy
 
 __all__ = ["impact", "run_case"]
 
@@ -73,53 +67,20 @@ def run_case(
         checked = load_case(find_case(case))
         levels = checked.require_levels(level if level else checked.run.levels)
         folder = out if out is not None else Path("klack-results") / checked.name
-        require_folder(folder)
+        ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+        ending.require_possible()
 
-        from klack.workflow.impact import run_impact
-        from klack.workflow.incomplete import IncompleteImpactError
-        from klack.workflow.store import save_study
-        from klack.workflow.summary import study_to_json
+        from klack.analyses.impact.analysis import IMPACT
+        from klack.analyses.impact.run import run_impact
+        from klack.analyses.incomplete import IncompleteImpactError
 
+    incomplete: Exception | None = None
     with show_progress(quiet) as progress:
-        incomplete: Exception | None = None
         try:
             study = run_impact(
                 checked, levels=levels, certify=certify, progress=progress, threads=threads
             )
         except IncompleteImpactError as error:
             study, incomplete = error.study, error
-        failure = write_result(study, folder, save_study, report=report, progress=progress)
-    if not quiet:
-        made = report and failure is None
-        _print_study(study, folder, made, to_stderr=str(json) == "-")
-    else:
-        print_notes(study.warnings, to_stderr=True)
-    if json is not None:
-        write_json(json, study_to_json(study))
-    if incomplete:
-        raise incomplete
-    if failure:
-        raise failure
+    ending.end(IMPACT, study, incomplete=incomplete)
     return folder
-
-
-def _print_study(study: "ImpactStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.stages import stages_with_cached
-    from klack.workflow.summary import (
-        SUMMARY_COLUMNS,
-        answer_line,
-        contact_doubt,
-        estimate_lines,
-        summary_rows,
-    )
-
-    print_table(study.title, SUMMARY_COLUMNS, summary_rows(study), to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    for line in (answer_line(study), contact_doubt(study.contact), *estimate_lines(study)):
-        if line:
-            print(line, file=stream)
-    print_notes(study.warnings, to_stderr=to_stderr)
-    if cached := stages_with_cached(study.stage_times):
-        print(f"With cached results (klack cache): {', '.join(cached)}", file=stream)
-    made = ["result.zarr", *(REPORTS if report else ())]
-    print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -11,8 +11,8 @@ from klack.cli.output import require_json_target, write_json
 from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from klack.workflow.inspection import Row
-    from klack.workflow.json_results import InspectionJson
+    from klack.analyses.inspection import Row
+    from klack.analyses.json_results import InspectionJson
 
 __all__ = ["inspect"]
 
@@ -45,10 +45,10 @@ def inspect(
 
     Of a case: the bodies that come from other programs, checked as a run checks them.
     """
+    from klack.analyses.inspection import STEP_ENDINGS, inspect_case, inspect_file
     from klack.case.shipped import find_case, shipped_cases
     from klack.errors import InputError
     from klack.units import LENGTH, parse_quantity
-    from klack.workflow.inspection import STEP_ENDINGS, inspect_case, inspect_file
 
     require_json_target(json)
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()

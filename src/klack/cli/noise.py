@@ -1,13 +1,12 @@
 """``klack noise``: from the force of the impacts to what is heard, for one or two designs."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
+from klack.cli.ending import Ending
 from klack.cli.options import (
     Components,
     Json,
@@ -17,16 +16,13 @@ from klack.cli.options import (
     imported,
     require_threads,
 )
-from klack.cli.output import require_folder, require_json_target, write_json
+from klack.cli.output import require_json_target
 from klack.cli.progress import Progress, show_progress
-from klack.cli.reports import REPORTS, write_result
 from klack.cli.stored import is_result
-from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
+    from klack.analyses.noise.source import NoiseSource
     from klack.case.valve_reader import OwnComponents
-    from klack.workflow.noise_source import NoiseSource
-    from klack.workflow.noise_study import NoiseStudy
 
 __all__ = ["noise"]
 
@@ -74,34 +70,20 @@ def noise(
     _require_known(paths)
     own = imported(component)
     folder = out if out is not None else Path("klack-results") / _folder_name(paths)
-    require_folder(folder)
+    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+    ending.require_possible()
 
     with show_progress(quiet):
-        from klack.workflow.noise import run_noise
-        from klack.workflow.noise_sounds import write_sounds
-        from klack.workflow.noise_store import save_noise
-        from klack.workflow.noise_summary import noise_to_json
-
-    def save(study: "NoiseStudy", stage: Path) -> None:
-        save_noise(study, stage)
-        write_sounds(study, stage)
+        from klack.analyses.noise.analysis import NOISE
+        from klack.analyses.noise.run import run_noise
+        from klack.analyses.noise.sounds import write_sounds
 
     with show_progress(quiet) as progress:
         sources = [
             source for path in paths for source in _sources(path, names, own, progress, threads)
         ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
-        failure = write_result(study, folder, save, report=report, progress=progress)
-    if not quiet:
-        made = report and failure is None
-        _print_study(study, folder, made, to_stderr=str(json) == "-")
-    else:
-        print_notes(study.warnings, to_stderr=True)
-    if json is not None:
-        write_json(json, noise_to_json(study))
-    if failure:
-        raise failure
-    return 0
+    return ending.end(NOISE, study, beside=lambda folder: write_sounds(study, folder))
 
 
 def _require_known(paths: Sequence[Path]) -> None:
@@ -131,7 +113,7 @@ def _sources(
     threads: int | None,
 ) -> tuple["NoiseSource", ...]:
     """Forces and bodies of a stored result, or of a case that is run now."""
-    from klack.workflow.noise_source import load_sources, run_sources
+    from klack.analyses.noise.source import load_sources, run_sources
 
     if is_result(path):
         progress("result", 0.0)
@@ -158,14 +140,3 @@ def _names(paths: Sequence[Path], sources: Sequence["NoiseSource"]) -> tuple[str
         if len(set(found)) == len(found):
             return tuple(found)
     return tuple(f"{source.case} {source.run} {i + 1}" for i, source in enumerate(sources))
-
-
-def _print_study(study: "NoiseStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.noise_sounds import sound_names
-    from klack.workflow.noise_summary import NOISE_COLUMNS, noise_rows
-
-    print_table(study.title, NOISE_COLUMNS, noise_rows(study), to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    print_notes(study.warnings, to_stderr=to_stderr)
-    made = ["result.zarr", *sound_names(study), *(REPORTS if report else ())]
-    print(f"Results in {folder}: {', '.join(made)}", file=stream)

@@ -30,7 +30,7 @@ def reduce(
     require_folder(folder)
 
     with show_progress(quiet):
-        from klack.workflow.reduce import run_reduce
+        from klack.analyses.reduction.run import run_reduce
 
     with show_progress(quiet) as progress:
         study = run_reduce(checked, progress=progress, threads=threads)

@@ -11,7 +11,7 @@ from klack.cli.options import Json, Quiet
 from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
 
 if TYPE_CHECKING:
-    from klack.workflow.json_results import ReportJson
+    from klack.analyses.json_results import ReportJson
 
 __all__ = ["report"]
 
@@ -30,25 +30,26 @@ def report(
     quiet: Quiet = False,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
+    from klack.analyses.catalogue import analysis_in
+    from klack.analyses.incomplete import missing_in
     from klack.cli.reports import REPORTS, beside_result, write_reports
-    from klack.cli.stored import load_stored
-    from klack.workflow.incomplete import missing_in
 
     require_json_target(json)
     folder = out if out is not None else result
     beside = beside_result(folder) if folder.absolute() == result.absolute() else {}
-    study = load_stored(result)
+    analysis = analysis_in(result)
+    record = analysis.load(result)
     require_folder(folder)
     with staged_folder(folder, beside) as stage:
-        write_reports(study, stage)
-    print_notes(missing_in(study), to_stderr=True)
+        write_reports(analysis.content(record), stage)
+    print_notes(missing_in(record), to_stderr=True)
     if not quiet:
         stream = sys.stderr if str(json) == "-" else sys.stdout
         print(f"Report in {folder}: {', '.join(REPORTS)}", file=stream)
     if json is not None:
         made: ReportJson = {
             "schema": "klack-report/1",
-            "case": study.case,
+            "case": record.case,
             "result": str(result),
             "folder": str(folder),
             "files": list(REPORTS),

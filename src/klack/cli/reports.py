@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from klack.cli.output import staged_folder
 from klack.errors import InputError
@@ -11,34 +11,31 @@ from klack.uninterrupted import uninterrupted
 from klack.whole_file import mark_of, outdated
 
 if TYPE_CHECKING:
-    from klack.report.study_content import Study
-    from klack.workflow.progress import Progress
-    from klack.workflow.unfinished import LogForm
+    from klack.analyses.unfinished import LogForm
+    from klack.progress import Progress
+    from klack.report.page import Content
 
 __all__ = ["REPORTS", "beside_result", "write_reports", "write_result"]
-
-_Study = TypeVar("_Study", bound="Study")
 
 REPORTS = ("report.html", "report.pdf")
 _RESULT = "result.zarr"
 
 
-def write_reports(study: "Study", folder: Path) -> None:
-    """Write the report of a study as HTML and as PDF."""
+def write_reports(content: "Content", folder: Path) -> None:
+    """Write a report as HTML and as PDF."""
     from klack.report.html import write_report
     from klack.report.pdf import write_pdf
 
     page, print_ = (folder / name for name in REPORTS)
-    write_report(study, page)
-    write_pdf(study, print_)
+    write_report(content, page)
+    write_pdf(content, print_)
 
 
 def write_result(
-    study: _Study,
     folder: Path,
-    save: Callable[[_Study, Path], object],
+    save: Callable[[Path], None],
     *,
-    report: bool,
+    page: "Callable[[], Content] | None",
     progress: "Progress",
     unfinished: "LogForm[Any, Any] | None" = None,
 ) -> Exception | None:
@@ -50,11 +47,11 @@ def write_result(
 
     Parameters
     ----------
-    study : Study
     folder : Path
     save : callable
-        Writes the study into a folder.
-    report : bool
+        Writes the result into a folder.
+    page : callable, optional
+        Makes its report.
     progress : callable
     unfinished : LogForm, optional
         Finished parts that are not needed any more once the result stands.
@@ -63,17 +60,17 @@ def write_result(
     try:
         with uninterrupted():
             with staged_folder(folder) as stage:
-                save(study, stage)
+                save(stage)
                 outdated(stage, REPORTS)
                 mark = mark_of(stage / _RESULT)
             if unfinished is not None:
                 unfinished.remove(folder)
-        if not report:
+        if page is None:
             return None
         progress("report", 0.0)
-        return _report(study, folder, mark)
+        return _report(page, folder, mark)
     except KeyboardInterrupt as stop:
-        again = f"; klack report {folder} writes its report" if report else ""
+        again = f"; klack report {folder} writes its report" if page else ""
         stop.add_note(f"the result is in {folder}{again}.")
         raise
 
@@ -84,11 +81,11 @@ def beside_result(folder: Path) -> dict[str, Mark]:
     return {} if mark is None else {_RESULT: mark}
 
 
-def _report(study: "Study", folder: Path, mark: Mark | None) -> Exception | None:
+def _report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
     """Write the report, if it is still this result that stands in the folder at the end."""
     try:
         with staged_folder(folder, {} if mark is None else {_RESULT: mark}) as stage:
-            write_reports(study, stage)
+            write_reports(page(), stage)
     except InputError as error:
         cause = error.__cause__
         return _no_report(folder, cause) if isinstance(cause, OSError) else error

@@ -44,7 +44,7 @@ def _schema_of(kind: str) -> dict[str, Any]:
         return valve_case_schema()
 
     if kind == "result":
-        from klack.workflow.json_results import result_schema
+        from klack.analyses.json_results import result_schema
 
         return result_schema()
 

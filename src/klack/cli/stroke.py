@@ -1,12 +1,11 @@
 """``klack stroke``: one actuation of a whole valve, in one or several variants."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
+from klack.cli.ending import Ending
 from klack.cli.options import (
     CaseArgument,
     Components,
@@ -17,19 +16,14 @@ from klack.cli.options import (
     imported,
     require_threads,
 )
-from klack.cli.output import require_folder, require_json_target, write_json
+from klack.cli.output import require_json_target
 from klack.cli.progress import show_progress
-from klack.cli.reports import REPORTS, write_result
-from klack.cli.tables import print_table
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase
     from klack.network.component import Component
-    from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
 
 __all__ = ["stroke"]
-
-_MOST = 20  # impacts of a variant on the terminal
 
 _Text = str | None
 _Variants = Annotated[
@@ -83,36 +77,24 @@ def stroke(
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
     folder = out if out is not None else Path("klack-results") / checked.name
-    require_folder(folder)
+    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+    ending.require_possible()
 
     with show_progress(quiet):
-        from klack.workflow.stroke import run_stroke
-        from klack.workflow.stroke_store import load_stroke, save_stroke
-        from klack.workflow.stroke_study import IncompleteStrokeError
-        from klack.workflow.stroke_summary import stroke_to_json
+        from klack.analyses.stroke.analysis import STROKE
+        from klack.analyses.stroke.record import IncompleteStrokeError
+        from klack.analyses.stroke.run import run_stroke
 
-        after = load_stroke(continued) if continued is not None else None
+        after = STROKE.load(continued) if continued is not None else None
+    incomplete: Exception | None = None
     with show_progress(quiet) as progress:
-        incomplete: Exception | None = None
         try:
             study = run_stroke(
                 checked, variants=wanted, after=after, progress=progress, threads=threads
             )
         except IncompleteStrokeError as error:
             study, incomplete = error.study, error
-        failure = write_result(study, folder, save_stroke, report=report, progress=progress)
-    if not quiet:
-        made = report and failure is None
-        _print_study(study, folder, made, to_stderr=str(json) == "-")
-    else:
-        print_notes(study.warnings, to_stderr=True)
-    if json is not None:
-        write_json(json, stroke_to_json(study))
-    if incomplete:
-        raise incomplete
-    if failure:
-        raise failure
-    return 0
+    return ending.end(STROKE, study, incomplete=incomplete)
 
 
 def _checked_case(
@@ -158,44 +140,3 @@ def _time(option: str, text: str) -> float:
     value = parse_quantity(text, TIME, option)
     require_positive(option, value, "s")
     return value
-
-
-def _print_study(study: "StrokeStudy", folder: Path, report: bool, *, to_stderr: bool) -> None:
-    from klack.workflow.stroke_summary import (
-        TIME_COLUMNS,
-        VARIANT_COLUMNS,
-        time_rows,
-        variant_rows,
-    )
-    from klack.workflow.summary import contact_doubt
-
-    print_table(study.title, VARIANT_COLUMNS, variant_rows(study), to_stderr=to_stderr)
-    times = time_rows(study)
-    if times:
-        title = "times at shares of the lift"
-        print_table(title, TIME_COLUMNS, times, left=3, to_stderr=to_stderr)
-    for variant in study.variants.values():
-        _print_impacts(variant, to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    for stop in study.stops:
-        if doubt := contact_doubt(stop):
-            print(f"Impacts on '{stop.name}': {doubt}", file=stream)
-    print_notes(study.warnings, to_stderr=to_stderr)
-    made = ["result.zarr", *(REPORTS if report else ())]
-    print(f"Results in {folder}: {', '.join(made)}", file=stream)
-
-
-def _print_impacts(variant: "StrokeVariant", *, to_stderr: bool) -> None:
-    from klack.workflow.stroke_summary import IMPACT_COLUMNS, impact_rows, start_text
-
-    stream = sys.stderr if to_stderr else sys.stdout
-    if begun := start_text(variant):
-        print(f"{variant.name}: {begun}", file=stream)
-    total = len(variant.result.events)
-    title = f"{variant.name}: {variant.label}"
-    if not total:
-        print(f"{title}\n  no impacts", file=stream)
-        return
-    if total > _MOST:
-        title += f" (the first {_MOST} of {total} impacts; all of them with --json)"
-    print_table(title, IMPACT_COLUMNS, impact_rows(variant, _MOST), to_stderr=to_stderr)

@@ -12,8 +12,8 @@ from klack.cli.verify_text import print_checks, print_groups
 from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:
+    from klack.analyses.json_results import CheckJson, VerificationJson
     from klack.verification import Check
-    from klack.workflow.json_results import CheckJson, VerificationJson
 
 __all__ = ["verify"]
 

@@ -2,11 +2,11 @@
 
 import warnings
 
+from klack.assembling.bodies import build_bodies
 from klack.case.schema import Case
 from klack.errors import AccuracyWarning, InputError
 from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
-from klack.workflow.bodies import build_bodies
-from klack.workflow.progress import Progress
+from klack.progress import Progress
 
 __all__ = ["calculix_impact", "calculix_settings"]
 

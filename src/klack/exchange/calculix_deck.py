@@ -22,6 +22,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.assembling.placement import first_touch_of_meshes
 from klack.contact.pairing import axial_distance, face_thickness
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, require_positive
@@ -29,7 +30,6 @@ from klack.materials import Material
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import Mesh, Surface
-from klack.workflow.placement import first_touch_of_meshes
 
 __all__ = [
     "LOWER",

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.comparison.calculix import OtherRun
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import InputError
 from klack.exchange.calculix_deck import LOWER, UPPER
 from klack.input.existing_file import instead_of_file
-from klack.workflow.compare import OtherRun
 
 __all__ = ["CalculixResult", "other_run", "read_calculix"]
 

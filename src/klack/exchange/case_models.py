@@ -5,6 +5,11 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from klack import __version__
+from klack.assembling.given_pair import build_given_pair
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
+from klack.assembling.valve import build_valve
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_meetings, find_roles
@@ -13,13 +18,9 @@ from klack.exchange.modal_model import ModalModel, Provenance, body_model, choos
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mesh.mesh import Mesh
 from klack.network.rows import FilmRow
+from klack.progress import Progress, silent
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.workflow.given_pair import build_given_pair
-from klack.workflow.levels import first_stiffness, impact_system, mode_pools, own_pair
-from klack.workflow.problem import build_problem
-from klack.workflow.progress import Progress, silent
-from klack.workflow.valve import build_valve
 
 __all__ = ["CaseModels", "case_models"]
 

@@ -15,18 +15,17 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from klack.report.chart import BarChart, Chart
-from klack.report.content import Content
 from klack.report.interactive import plotly_bars, plotly_chart
-from klack.report.study_content import Study, study_content
+from klack.report.page import Content
 from klack.whole_file import whole_file
 
 __all__ = ["render_html", "write_report"]
 
 
-def write_report(study: Study, path: Path) -> None:
-    """Write the report of a study as one HTML file that opens in any browser, also offline."""
+def write_report(content: Content, path: Path) -> None:
+    """Write the report as one HTML file that opens in any browser, also offline."""
     with whole_file(path) as new:
-        new.write_bytes(render_html(study_content(study)).encode())
+        new.write_bytes(render_html(content).encode())
 
 
 def render_html(content: Content) -> str:

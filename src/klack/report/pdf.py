@@ -14,18 +14,17 @@ import matplotlib
 import typst
 
 from klack.report.chart import BarChart, Chart
-from klack.report.content import Content, Section
+from klack.report.page import Content, Section
 from klack.report.printed import svg_bars, svg_chart
-from klack.report.study_content import Study, study_content
 from klack.whole_file import whole_file
 
 __all__ = ["render_pdf", "write_pdf"]
 
 
-def write_pdf(study: Study, path: Path) -> None:
-    """Write the report of a study as a PDF file (A4)."""
+def write_pdf(content: Content, path: Path) -> None:
+    """Write the report as a PDF file (A4)."""
     with whole_file(path) as new:
-        new.write_bytes(render_pdf(study_content(study)))
+        new.write_bytes(render_pdf(content))
 
 
 def render_pdf(content: Content) -> bytes:

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from klack.workflow.stroke_study import StrokeStudy
-from klack.workflow.study import ImpactStudy
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.stroke.record import StrokeStudy
 
 __all__ = ["about_study"]
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from klack.analyses.impact.measures import LEVEL_MEASURES
+from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.contact.history import ImpactHistory
-from klack.contact.restitution import ImpactMeasures
 from klack.exchange.results.about import about_study
+from klack.exchange.results.scalars import measure_scalar
 from klack.exchange.results.table import (
     ResultAxis,
     ResultChannel,
@@ -13,7 +15,6 @@ from klack.exchange.results.table import (
     ResultTable,
 )
 from klack.reduction.transfer import TransferComparison
-from klack.workflow.study import ImpactStudy, LevelResult
 
 __all__ = ["impact_table"]
 
@@ -92,7 +93,7 @@ def _level(level: LevelResult) -> ResultRun:
         solver=history.solver,
         axes=tuple(axes),
         channels=tuple(channels),
-        scalars=_scalars(level, level.measures),
+        scalars=_scalars(level),
     )
 
 
@@ -123,31 +124,13 @@ def _history(history: ImpactHistory) -> list[ResultChannel]:
     ]
 
 
-def _scalars(level: LevelResult, measures: ImpactMeasures) -> tuple[ResultScalar, ...]:
-    numbers = [
-        ("peak force", "N", measures.peak_force, "largest force of any step"),
-        ("peak time", "s", measures.peak_time, "counted from first touch"),
-        ("first touch", "s", measures.first_touch, "on the time axis"),
-        ("contact time", "s", measures.contact_time, "of the first contact"),
-        ("total contact time", "s", measures.total_contact_time, "first touch to last separation"),
-        ("sub contacts", "1", measures.sub_contacts, "contacts of the first impact"),
-        ("impulse", "N s", measures.impulse, "of the first impact"),
-        ("approach speed", "m/s", measures.approach_speed, "of the centres of mass"),
-        ("rebound speed", "m/s", measures.rebound_speed, "of the centres of mass"),
-        ("restitution", "1", measures.restitution, "rebound over approach speed"),
-        ("dissipated share", "1", measures.dissipated_share, "of the energy of approach"),
-        ("vibration share", "1", measures.vibration_share, "of the energy of approach"),
-        ("energy residual", "1", level.energy_residual, "of the energy ledger"),
-        ("degrees of freedom", "1", level.degrees_of_freedom, "of the model"),
-        ("steps", "1", level.steps, "of the time integration"),
-        ("step", "s", level.step, "of the time integration"),
-        ("wall time", "s", level.wall_time, "of the time integration"),
-        ("setup time", "s", level.setup_time, "of everything before it"),
-    ]
-    numbers += [(f"energy {key}", "J", value, "ledger") for key, value in level.energies.items()]
-    return tuple(
-        ResultScalar(name=name, unit=unit, value=float(value), meaning=meaning)
-        for name, unit, value, meaning in numbers
+def _scalars(level: LevelResult) -> tuple[ResultScalar, ...]:
+    return (
+        *(measure_scalar(measure, level) for measure in LEVEL_MEASURES),
+        *(
+            ResultScalar(name=f"energy {key}", unit="J", value=float(value), meaning="ledger")
+            for key, value in level.energies.items()
+        ),
     )
 
 

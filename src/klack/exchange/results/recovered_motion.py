@@ -13,23 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import mode_pools, selection_of
+from klack.assembling.problem import ContactProblem
+from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
+from klack.progress import Progress
 from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
 from klack.simulation.impact import simulate
 from klack.transient.result import MotionOfBody
-from klack.workflow.levels import (
-    damping_of,
-    first_stiffness,
-    impact_system,
-    mode_pools,
-    own_pair,
-    selection_of,
-)
-from klack.workflow.problem import ContactProblem
-from klack.workflow.progress import Progress
 
 __all__ = ["recovered_motion"]
 

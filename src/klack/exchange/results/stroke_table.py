@@ -1,8 +1,13 @@
 """A stroke study as a table: every variant with its channels, end stops, impacts and books."""
 
+from math import isfinite
+
 import numpy as np
 
+from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.exchange.results.about import about_study
+from klack.exchange.results.scalars import measure_scalar
 from klack.exchange.results.table import (
     ResultAxis,
     ResultChannel,
@@ -10,22 +15,9 @@ from klack.exchange.results.table import (
     ResultScalar,
     ResultTable,
 )
-from klack.simulation.network_result import ImpactEvent, InterfaceRecord, NetworkResult
-from klack.workflow.stroke_study import StrokeStudy, StrokeVariant
-from klack.workflow.stroke_times import LiftTimes
+from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 
 __all__ = ["stroke_table"]
-
-_EVENT = (
-    ("approach speed", "m/s", "approach_speed", "of the centres of mass"),
-    ("peak force", "N", "peak_force", "contact and film together"),
-    ("peak time", "s", "peak_time", "on the time axis"),
-    ("contact time", "s", "contact_time", "closed, all contacts of the impact"),
-    ("separation time", "s", "separation_time", "on the time axis; missing if it stays closed"),
-    ("impulse", "N s", "impulse", "contact and film together"),
-    ("restitution", "1", "restitution", "missing without separation"),
-    ("energy loss", "J", "energy_loss", "kinetic, of the centre of mass"),
-)
 
 
 def stroke_table(study: StrokeStudy) -> ResultTable:
@@ -87,7 +79,7 @@ def _variant(variant: StrokeVariant, step: float) -> ResultRun:
         solver=f"fine step {step:g} s, {variant.modes} modal degrees of freedom",
         axes=tuple(axes),
         channels=tuple(channels),
-        scalars=_scalars(variant, result, step),
+        scalars=_scalars(variant),
     )
 
 
@@ -124,58 +116,33 @@ def _events(stop: str, events: list[ImpactEvent]) -> tuple[ResultAxis, list[Resu
     )
     return axis, [
         ResultChannel(
-            name=f"{stop} impact {name}",
+            name=f"{stop} impact {measure.name}",
             axis=axis.name,
-            unit=unit,
-            values=np.array([getattr(event, field) for event in events], dtype=float),
-            meaning=meaning,
+            unit=measure.unit,
+            values=np.array([measure.read(event) for event in events], dtype=float),
+            meaning=measure.definition,
         )
-        for name, unit, field, meaning in _EVENT
+        for measure in EVENT_MEASURES
+        if measure.key != "time"  # the axis
     ]
 
 
-def _times(times: LiftTimes) -> list[tuple[str, str, float, str]]:
-    """Moments of the needle that the run reaches."""
-    ways = (("opening", times.opening, "the opening stop"), ("closing", times.closing, "the seat"))
-    found = [
-        entry
-        for way, passage, stop in ways
-        for entry in (
-            (f"{way} time", passage.touch, f"first touch of {passage.stop or stop}"),
-            (f"{way} time at 10 percent", passage.at_10, "of the lift"),
-            (f"{way} time at 50 percent", passage.at_50, "of the lift"),
-            (f"{way} time at 90 percent", passage.at_90, "of the lift"),
-        )
-    ]
-    return [(name, "s", time, meaning) for name, time, meaning in found if time is not None]
-
-
-def _scalars(
-    variant: StrokeVariant, result: NetworkResult, step: float
-) -> tuple[ResultScalar, ...]:
-    books = result.books
-    numbers = [
-        *_times(variant.needle_times),
-        ("complete", "1", not result.failure, "1 if the run came to its end"),
-        ("impacts", "1", len(result.events), "on all stops"),
-        ("energy residual", "1", books.relative_residual, "share of the throughput"),
-        ("energy throughput", "J", books.throughput, "scale of the residual"),
-        ("degrees of freedom", "1", variant.modes, "of all bodies"),
-        ("fine steps", "1", result.fine_steps, "of the time integration"),
-        ("coarse steps", "1", result.coarse_steps, "of the time integration"),
-        ("step", "s", step, "fine step"),
-        ("wall time", "s", result.wall_time, "of the time loop"),
-        ("setup time", "s", variant.setup_time, "of everything before it"),
-    ]
+def _scalars(variant: StrokeVariant) -> tuple[ResultScalar, ...]:
+    books = variant.result.books
     kinds = {
         "supplied": books.supplies,
         "lost": books.losses,
         "stored before": books.stores_before,
         "stored after": books.stores_after,
     }
-    for kind, entries in kinds.items():
-        numbers += [(f"energy {kind} {key}", "J", value, "books") for key, value in entries.items()]
-    return tuple(
-        ResultScalar(name=name, unit=unit, value=float(value), meaning=meaning)
-        for name, unit, value, meaning in numbers
+    measured = (measure_scalar(measure, variant) for measure in VARIANT_MEASURES)
+    return (
+        *(scalar for scalar in measured if isfinite(scalar.value)),
+        *(
+            ResultScalar(
+                name=f"energy {kind} {key}", unit="J", value=float(value), meaning="energy balance"
+            )
+            for kind, entries in kinds.items()
+            for key, value in entries.items()
+        ),
     )

@@ -1,10 +1,10 @@
 """From a study, computed or loaded, to its table."""
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.stroke.record import StrokeStudy
 from klack.exchange.results.impact_table import impact_table
 from klack.exchange.results.stroke_table import stroke_table
 from klack.exchange.results.table import ResultTable
-from klack.workflow.stroke_study import StrokeStudy
-from klack.workflow.study import ImpactStudy
 
 __all__ = ["result_table"]
 
@@ -15,8 +15,7 @@ def result_table(study: ImpactStudy | StrokeStudy) -> ResultTable:
     Parameters
     ----------
     study : ImpactStudy or StrokeStudy
-        Computed, or read by :func:`klack.workflow.store.load_study` or
-        :func:`klack.workflow.stroke_store.load_stroke`.
+        Computed, or read by :func:`klack.analyses.catalogue.load_result`.
     """
     if isinstance(study, ImpactStudy):
         return impact_table(study)

@@ -12,6 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.impact.full_level import simulate_in_full
+from klack.assembling.damping_choice import is_damped
+from klack.assembling.modes import kept_modes, mode_pools
+from klack.assembling.problem import ContactProblem, build_problem
 from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
@@ -19,11 +23,9 @@ from klack.errors import InputError
 from klack.exchange.results.naming import file_stems
 from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
+from klack.progress import Progress, silent
 from klack.transient.result import MotionOfBody, Snapshots
 from klack.whole_file import whole_files
-from klack.workflow.levels import is_damped, kept_modes, mode_pools, simulate_in_full
-from klack.workflow.problem import ContactProblem, build_problem
-from klack.workflow.progress import Progress, silent
 
 __all__ = ["write_impact_series"]
 

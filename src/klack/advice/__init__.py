@@ -1,1 +1,0 @@
-"""Mesh, modes and step for a target, each from a measured convergence."""

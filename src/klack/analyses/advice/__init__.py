@@ -1,0 +1,1 @@
+"""Meshes, modes and steps that a wanted accuracy needs."""

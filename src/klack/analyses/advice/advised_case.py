@@ -1,0 +1,91 @@
+"""The advice as YAML: lines to paste, and the whole case with them."""
+
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from klack.analyses.advice.advice import Advice
+from klack.case.case_tree import CaseTree
+from klack.case.inserting import merged, plain_data, with_values
+from klack.case.key_path import written_at
+from klack.case.rewriting import moved_files
+from klack.case.valve_reader import read_any_case
+from klack.errors import InputError
+from klack.input.problem import Key
+from klack.units import FREQUENCY, LENGTH, TIME, format_si, parse_quantity
+
+__all__ = ["advice_yaml", "advised_text", "changed_values"]
+
+_WIDTH = 96
+_KINDS = (LENGTH, TIME, FREQUENCY)
+
+
+def changed_values(tree: CaseTree, advice: Advice) -> dict[Key, str]:
+    """What the advice writes at each key, in the unit that stands there now."""
+    units = {item.key: item.unit for c in advice.counsels for item in c.measured.setting.values}
+    return {
+        key: _written(written_at(tree.data, key), value, units[key])
+        for key, value in advice.changes.items()
+    }
+
+
+def _written(now: object, value: float, unit: str) -> str:
+    if not unit:
+        return f"{value:g}"
+    if isinstance(now, str):
+        rest = now.strip().lstrip("+-0123456789.eE").strip()
+        if rest:
+            kind = next(kind for kind in _KINDS if kind.unit == unit)
+            return f"{value / parse_quantity(f'1 {rest}', kind):.6g} {rest}"
+    return format_si(value, unit, 3)
+
+
+def advice_yaml(tree: CaseTree, advice: Advice) -> str:
+    """Sections of the case with the advice in them: whole meshes and modes, single other keys.
+
+    Laid over the case, key by key, they give the advised case.  Empty if nothing changes.
+    """
+    safe = YAML(typ="safe")
+    data: Any = {}
+    for key, text in changed_values(tree, advice).items():
+        whole = key[:3] if key[0] == "bodies" and key[2] == "mesh" else None
+        if whole and written_at(data, whole) is None:
+            data = merged(data, whole, plain_data(written_at(tree.data, whole)))
+        data = merged(data, key, safe.load(text))
+    if not data:
+        return ""
+    out = YAML()
+    out.width = _WIDTH
+    out.default_flow_style = None  # innermost mappings in one line
+    stream = StringIO()
+    out.dump(data, stream)
+    return stream.getvalue()
+
+
+def advised_text(tree: CaseTree, advice: Advice, path: Path, version: str) -> str:
+    """Text of the case with the advice, for a file at ``path``; comments and order stay.
+
+    Raises
+    ------
+    InputError
+        If the new text is no case, or a value cannot be exchanged alone.
+    """
+    values = changed_values(tree, advice)
+    header = (
+        f"Advised by klack {version} (klack advise), from {tree.path.name}; "
+        f"{len(values)} values were changed."
+    )
+    moved = moved_files(tree, path.absolute().parent)
+    text = with_values(tree, {**moved, **values}, header)
+    try:
+        read_any_case(text, path, tree.components.values())
+    except InputError as error:
+        raise InputError(
+            f"--write {path}",
+            got=f"no case with the advice in it ({error.where}: {error.got})",
+            expected=error.expected,
+            hint=error.hint,
+        ) from None
+    return text

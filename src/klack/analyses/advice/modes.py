@@ -1,0 +1,196 @@
+"""Kept modes of each body as settings: by number, by frequency, or by participation."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from math import ceil
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.third_octave import band_edges
+from klack.analyses.advice.ladder import Ladder
+from klack.analyses.advice.settings import Setting, SettingValue
+from klack.analyses.advice.target import HISTORY, impact_errors
+from klack.analyses.impact.interface_level import build_interface, simulate_case
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import ContactProblem
+from klack.case.bodies import ModeChoice
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.contact.history import ImpactHistory
+from klack.elasticity.eigen import Modes
+from klack.progress import Progress
+from klack.reduction.ports import Port
+
+__all__ = [
+    "counted",
+    "expected_count",
+    "explicit_modes",
+    "history_ladder",
+    "interface_history",
+    "mode_ladder",
+    "mode_setting",
+    "modes_in_band",
+    "richer_pools",
+]
+
+AnyCase = TypeVar("AnyCase", Case, ValveCase)
+
+_ORDER = 2.0
+_MEASURED = (4.0, 2.0, 1.0, 0.5)
+_FEWEST = 2
+
+
+def explicit_modes(case: AnyCase) -> AnyCase:
+    """Return the case with the choice of modes written out for every body."""
+    choices = {name: case.reduction.choice(name) for name in case.bodies}
+    return _with_choices(case, choices)
+
+
+def _with_choices(case: AnyCase, choices: Mapping[str, ModeChoice]) -> AnyCase:
+    modes = {**case.reduction.modes, **choices}
+    reduction = case.reduction.model_copy(update={"modes": modes})
+    return case.model_copy(update={"reduction": reduction})
+
+
+def counted(choice: ModeChoice, pool: Modes) -> int:
+    """Elastic modes that a choice keeps of a pool."""
+    if choice.frequency is not None:
+        return int(np.sum(pool.omega <= 2.0 * np.pi * choice.frequency))
+    return min(choice.count or choice.participation or 1, len(pool.omega))
+
+
+def expected_count(choice: ModeChoice, pool: Modes) -> int:
+    """Modes that a choice would keep of a larger pool, their frequencies evenly spaced above."""
+    asked = choice.count or choice.participation
+    if asked is not None:
+        return asked
+    share = (choice.frequency or 0.0) / float(pool.frequency[-1])
+    return ceil(share * len(pool.omega)) if share > 1.0 else counted(choice, pool)
+
+
+def _choice(choice: ModeChoice, count: int) -> ModeChoice:
+    if choice.participation is not None:
+        return ModeChoice(participation=count, pool=max(choice.pool or count, count))
+    return ModeChoice(count=count)
+
+
+def richer_pools(
+    problem: ContactProblem, counts: Mapping[str, int], progress: Progress
+) -> Mapping[str, Modes]:
+    """Modes of each body, as many as are counted."""
+    choices = {
+        name: _choice(problem.case.reduction.choice(name), count) for name, count in counts.items()
+    }
+    richer = replace(problem, case=_with_choices(problem.case, choices))
+    return mode_pools(richer, at_least=1, progress=progress)
+
+
+def interface_history(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port],
+    counts: Mapping[str, int],
+    *,
+    step: float,
+) -> ImpactHistory:
+    """Impact at the interface level with so many modes of each body, as far as its pool goes."""
+    choices = {
+        name: _choice(problem.case.reduction.choice(name), min(count, len(pools[name].omega)))
+        for name, count in counts.items()
+    }
+    case = _with_choices(problem.case, choices)
+    model = build_interface(replace(problem, case=case), pools, ports=ports)
+    return simulate_case(case, model, step=step).history
+
+
+def mode_setting(
+    body: str, choice: ModeChoice, count: int, frequencies: NDArray[np.float64]
+) -> Setting:
+    """Modes of a body as the case chooses them.
+
+    Parameters
+    ----------
+    body : str
+    choice : ModeChoice
+    count : int
+        That it keeps.
+    frequencies : array, shape (k,) [Hz]
+        Of the elastic modes known, ascending; the case keeps some of them.
+    """
+    key = ("reduction", "modes", body)
+    kind = "participation" if choice.participation is not None else "count"
+    value = SettingValue(key=(*key, kind), value=float(count), kind="count", least=1.0)
+    if choice.frequency is not None:
+        value = SettingValue(
+            key=(*key, "frequency"),
+            value=choice.frequency,
+            unit="Hz",
+            kind="frequency",
+            table=tuple(frequencies.tolist()),
+        )
+    return Setting(name=f"modes of {body}", group="modes", values=(value,))
+
+
+def mode_ladder(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port],
+    counts: Mapping[str, int],
+    body: str,
+    *,
+    reference: ImpactHistory,
+    step: float,
+    up_to: float,
+) -> Ladder | None:
+    """A quarter, half, all and twice the modes of one body, the other bodies with twice theirs.
+
+    At the interface level, where leaving out modes is the only thing that changes: the compliance
+    that they carry goes to the contact points.  None where the pool holds no more modes.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of str to Modes
+        Twice as many as kept.
+    ports : pair of Port
+    counts : mapping of str to int
+        Kept.
+    body : str
+    reference : ImpactHistory
+        With twice the modes of every body.
+    step : float [s]
+    up_to : float [Hz]
+    """
+    most = {name: 2 * count for name, count in counts.items()}
+    if len(pools[body].omega) < most[body]:
+        return None
+    factors = [f for f in _MEASURED if f <= 1.0 or counts[body] >= _FEWEST * f]
+    runs = [
+        interface_history(problem, pools, ports, {**most, body: round(counts[body] / f)}, step=step)
+        for f in factors[:-1]
+    ]
+    return history_ladder(factors, [*runs, reference], up_to, _ORDER)
+
+
+def history_ladder(
+    factors: list[float], runs: list[ImpactHistory], up_to: float, order: float
+) -> Ladder:
+    """Compare histories with the finest, and neighbours with each other."""
+    return Ladder(
+        factors=tuple(factors),
+        differences=np.array([impact_errors(runs[-1], run, up_to) for run in runs[:-1]]),
+        steps=np.array(
+            [impact_errors(finer, run, up_to)[HISTORY] for run, finer in pairwise(runs)]
+        ),
+        assumed_order=order,
+    )
+
+
+def modes_in_band(pool: Modes, up_to: float) -> int:
+    """Modes of a pool below the upper edge of the highest band that begins below ``up_to``."""
+    number = np.floor(10.0 * np.log10(up_to / 1000.0) + 0.5).astype(np.int64)
+    edge = float(band_edges(np.array([number]))[1][0])
+    return int(np.sum(pool.omega <= 2.0 * np.pi * edge))

@@ -1,0 +1,96 @@
+"""What every analysis has: how its record is stored, told, and put on a page."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from klack.analyses.measures import Measure
+from klack.analyses.store import RecordFormat, load_record, save_record
+from klack.report.page import Content
+
+__all__ = ["Analysis", "Measured", "Notes", "TextTable"]
+
+Kept = TypeVar("Kept")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextTable:
+    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """Notes on what stands above them."""
+
+    notes: Sequence[str]
+
+
+Measured = tuple[str, Any, Sequence[Measure[Any]]]
+"""Name of a part of a record, the part, and its measures."""
+
+
+def _nothing(record: Any) -> tuple[Measured, ...]:
+    return ()
+
+
+def _unchanged(record: Any) -> Any:
+    return record
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis(Generic[Kept]):
+    """One kind of question with one answer, the record.
+
+    Parameters
+    ----------
+    form : RecordFormat
+        How the record is stored.
+    content : callable
+        The report of a record.
+    to_json : callable
+        Its numbers, SI, the unit in the key.
+    told : callable
+        What a terminal shows of it: tables, lines and notes, in their order.
+    measured : callable
+        What its measures are of: levels, variants, impacts, shots, by name.
+    renewed : callable
+        Brings what an earlier version has stored to what this one stores.
+    """
+
+    form: RecordFormat
+    content: Callable[[Kept], Content]
+    to_json: Callable[[Kept], Mapping[str, Any]]
+    told: Callable[[Kept], Iterable[TextTable | Notes | str]]
+    measured: Callable[[Kept], Iterable[Measured]] = _nothing
+    renewed: Callable[[Kept], Kept] = _unchanged
+
+    def save(self, record: Kept, folder: Path) -> Path:
+        """Write ``folder/result.zarr``; an earlier result stays whole until this one is complete.
+
+        Returns
+        -------
+        Path
+            Of the store.
+        """
+        return save_record(record, folder, self.form)
+
+    def load(self, folder: Path) -> Kept:
+        """Read what :meth:`save` wrote.
+
+        Parameters
+        ----------
+        folder : Path
+            The folder given to :meth:`save`, or the store itself.
+
+        Raises
+        ------
+        InputError
+            If there is no result, it comes from something else, or a part of it is missing.
+        """
+        return self.renewed(load_record(folder, self.form))

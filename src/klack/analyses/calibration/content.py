@@ -1,0 +1,253 @@
+"""What a calibration report says, before it is laid out: the same words for screen and paper."""
+
+from math import isfinite
+
+from klack.analyses.calibration.correlation_figure import correlation_figure
+from klack.analyses.calibration.figures import profile_chart, stroke_chart, window_chart
+from klack.analyses.calibration.record import (
+    CalibratedParameter,
+    CalibrationStudy,
+    FittedImpact,
+)
+from klack.analyses.page import page_of
+from klack.report.page import Content, Section, Table
+from klack.report.wording import count, listed, quantity
+
+__all__ = ["calibration_content"]
+
+_STOPS = {"opening": "opening stop", "seat": "seat"}
+
+
+def calibration_content(study: CalibrationStudy) -> Content:
+    """Put a calibration into words, tables and figures."""
+    sections = [
+        Section(title="The strokes", charts=tuple(stroke_chart(study, c) for c in study.channels)),
+        Section(
+            title="First impacts and flights",
+            charts=tuple(
+                window_chart(study, channel, window)
+                for channel in study.channels[:1]
+                for window in study.windows
+            ),
+            tables=(_impact_table(study),) if study.impacts else (),
+        ),
+        _correlations(study),
+        _profiles(study),
+        Section(title="What was fitted to what", tables=(_key_table(study), _fact_table(study))),
+    ]
+    return page_of(
+        study,
+        "Calibration to measured strokes",
+        answer=_answer(study),
+        numbers=_parameter_table(study),
+        sections=sections,
+        definitions=_DEFINITIONS,
+        limits=_LIMITS,
+    )
+
+
+def _answer(study: CalibrationStudy) -> str:
+    names = listed([_found(item) for item in study.parameters])
+    text = (
+        f"{len(study.strokes)} {study.variant} strokes of {study.source} give {names} "
+        "(value ± standard error). "
+    )
+    text += (
+        f"Inside the fitted windows the computed lift is {quantity(study.residual_rms, 'm', 3)} "
+        f"from the mean stroke (root mean square; {quantity(study.residual_rms_before, 'm', 3)} "
+        "with the values of the case)"
+    )
+    judged = "no more than" if study.misfit <= 1.5 else f"{study.misfit:.1f} times"
+    text += f", {judged} what the scatter of the strokes and their noise allow."
+    if study.warnings:
+        text += " Read the notes below before you use the numbers."
+    return text
+
+
+def _found(item: CalibratedParameter) -> str:
+    if not isfinite(item.standard_error):
+        return f"{item.name} (not determined)"
+    error = _value(item, item.standard_error, 2)
+    return f"{item.name} {_value(item, item.value, item.digits)} ± {error}"
+
+
+def _value(item: CalibratedParameter, value: float, digits: int = 4) -> str:
+    if item.unit or not isfinite(value):
+        return quantity(value, item.unit, digits)
+    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+
+
+# --------------------------------------------------------------------------- tables
+
+
+def _parameter_table(study: CalibrationStudy) -> Table:
+    profiles = {profile.name: profile for profile in study.profiles}
+    rows = []
+    for item in study.parameters:
+        known = isfinite(item.standard_error)
+        cells = [
+            item.name,
+            _value(item, item.value, item.digits),
+            _value(item, item.standard_error, 2) if known else "–",
+            _range(item, item.lower_95, item.upper_95, item.digits) if known else "not determined",
+        ]
+        if profiles:
+            profile = profiles.get(item.name)
+            cells.append(
+                "–" if profile is None else _range(item, profile.lower, profile.upper, item.digits)
+            )
+        cells += [
+            _value(item, item.scatter, 2),
+            _value(item, item.start),
+            _range(item, item.lower, item.upper, 3),
+        ]
+        rows.append(tuple(cells))
+    columns = ["parameter", "value", "standard error", "95 % interval"]
+    columns += ["95 % by profile"] if profiles else []
+    columns += ["scatter of strokes", "start", "bounds"]
+    return Table(columns=tuple(columns), rows=tuple(rows))
+
+
+def _range(item: CalibratedParameter, low: float, high: float, digits: int) -> str:
+    ends = [_value(item, end, digits) if isfinite(end) else "bound" for end in (low, high)]
+    return f"{ends[0]} to {ends[1]}"
+
+
+def _key_table(study: CalibrationStudy) -> Table:
+    rows = tuple((item.name, ", ".join(item.keys)) for item in study.parameters)
+    return Table(columns=("parameter", "key of the case"), rows=rows)
+
+
+def _impact_table(study: CalibrationStudy) -> Table:
+    def row(impact: FittedImpact) -> tuple[str, ...]:
+        return (
+            _STOPS.get(impact.stop, impact.stop),
+            quantity(impact.measured, "s", 5),
+            quantity(impact.scatter, "s", 2),
+            quantity(impact.before, "s", 5),
+            quantity(impact.after, "s", 5),
+        )
+
+    return Table(
+        columns=("first impact on", "measured", "scatter", "before", "calibrated"),
+        rows=tuple(row(impact) for impact in study.impacts),
+    )
+
+
+def _fact_table(study: CalibrationStudy) -> Table:
+    window = "; ".join(
+        f"{w.what}: {quantity(w.first, 's')} to {quantity(w.last, 's')}" for w in study.windows
+    )
+    rows = [
+        ("measured", study.source),
+        ("strokes", count(len(study.strokes))),
+        ("put aside", "; ".join(study.rejected) or "none"),
+        ("variant", study.variant),
+        ("channels", ", ".join(c.role for c in study.channels if c.weight.any())),
+        ("windows", window),
+        ("degrees of freedom of Student's t", count(study.degrees)),
+        ("misfit", f"{study.misfit:.2f}"),
+        ("iterations", f"{study.iterations}" + ("" if study.converged else ", not settled")),
+        (
+            "computed strokes",
+            count(study.evaluations)
+            + (f", {count(study.resumed)} of them from an earlier run" if study.resumed else ""),
+        ),
+        ("processes", count(study.workers)),
+        (
+            "singular values of the sensitivities",
+            ", ".join(f"{value:.3g}" for value in study.singular_values),
+        ),
+    ]
+    return Table(columns=("calibration", ""), rows=tuple(rows))
+
+
+# --------------------------------------------------------------------------- sections
+
+
+def _correlations(study: CalibrationStudy) -> Section:
+    title = "Which parameters the data tell apart"
+    if len(study.parameters) < 2:
+        return Section(title=title)
+    figure = correlation_figure(
+        [item.name for item in study.parameters],
+        (
+            ("of the estimates, from the scatter of the strokes", study.correlation),
+            ("of the sensitivities alone", study.design_correlation),
+        ),
+        "Near +1 or −1 two parameters do the same to the data. Left: of the values found, as the "
+        "strokes scatter. Right: what the measured windows can tell apart in principle, if all "
+        "samples scattered independently.",
+    )
+    return Section(title=title, picture=figure)
+
+
+def _profiles(study: CalibrationStudy) -> Section:
+    by_name = {item.name: item for item in study.parameters}
+    return Section(
+        title="Profile likelihood",
+        charts=tuple(profile_chart(p, by_name[p.name]) for p in study.profiles),
+    )
+
+
+# --------------------------------------------------------------------------- words
+
+
+_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    (
+        "value",
+        "Where the weighted sum of squares between the mean measured stroke and the computed one "
+        "is smallest, inside the bounds. The computed stroke went through the same sensor, trigger "
+        "and zero.",
+    ),
+    (
+        "standard error",
+        "Of the mean of all strokes. Every stroke alone asks for its own value (one Gauss-Newton "
+        "step); the standard error is the standard deviation of these over the root of their "
+        "number. Residuals of one stroke move together, so samples are not counted as independent.",
+    ),
+    (
+        "95 % interval",
+        "Value plus and minus the standard error times Student's quantile for one degree of "
+        "freedom less than strokes. 'Profile' is the interval of the profile likelihood, which "
+        "does not take the model for linear.",
+    ),
+    (
+        "scatter of strokes",
+        "Standard deviation of what the single strokes ask for. It holds the true scatter of the "
+        "valve and the noise of one record.",
+    ),
+    (
+        "misfit",
+        "Weighted root mean square residual of the mean stroke in standard errors of the mean: "
+        "about 1 or less if only scatter is left; far above, something in the model is wrong.",
+    ),
+    (
+        "first impact",
+        "Where the fitted approach meets the level of the stop, read off the mean measured stroke "
+        "and the computed ones in the same way.",
+    ),
+    (
+        "windows",
+        "Free flights and first impacts, up to the impact after the last one that is fitted. "
+        "Samples count with the inverse variance between strokes.",
+    ),
+)
+
+_LIMITS: tuple[tuple[str, str], ...] = (
+    (
+        "model",
+        "The errors are those of the strokes. What the model leaves out moves the parameters that "
+        "are fitted, and no interval tells: look at the residual over time.",
+    ),
+    (
+        "sensor",
+        "A wrong calibration or bandwidth of the sensor is taken for the valve, unless its numbers "
+        "are among the parameters.",
+    ),
+    (
+        "trigger",
+        "Jitter of the trigger counts as scatter of the strokes; a constant delay of the recorder "
+        "between channels does not show and moves the result.",
+    ),
+)

@@ -1,0 +1,179 @@
+"""The figures of a calibration report, each built from a study by one function."""
+
+from math import floor, isfinite, log10
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from klack.analyses.calibration.record import (
+    CalibratedParameter,
+    CalibrationStudy,
+    FittedChannel,
+    ProfileCurve,
+)
+from klack.measurement.fit_window import FitWindow
+from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
+from klack.report.thinning import thinned
+
+__all__ = ["profile_chart", "stroke_chart", "window_chart"]
+
+Floats = NDArray[np.float64]
+
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+_MARGIN = 0.05
+_HEADROOM = 1.25
+"""Range of the residual over its largest value, for the legend of nothing but the curve."""
+
+
+def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
+    """The whole stroke of one channel, measured and computed, and what is left."""
+    return _overlay(
+        study,
+        channel,
+        name=f"stroke-{channel.role}",
+        title=f"{channel.role.capitalize()}, measured and computed",
+        span=(float(study.time[0]), float(study.time[-1])),
+        note=(
+            "Shaded: what was fitted. Outside, bounces magnify the differences between strokes. "
+            "Below: mean of the measured strokes less computed."
+        ),
+    )
+
+
+def window_chart(study: CalibrationStudy, channel: FittedChannel, window: FitWindow) -> Chart:
+    """One fitted window from near, from where the channel begins to move."""
+    inside = (study.time >= window.first) & (study.time <= window.last)
+    moved = np.abs(channel.mean - channel.mean[inside][0]) > 0.04 * np.ptp(channel.mean[inside])
+    times = study.time[inside & moved]
+    first = float(times[0]) if times.size else window.first
+    length = window.last - first
+    return _overlay(
+        study,
+        channel,
+        name=f"window-{channel.role}-{window.what.split(',')[0]}",
+        title=f"{channel.role.capitalize()}, {window.what.split(',')[0]}",
+        span=(max(first - 0.15 * length, window.first), window.last + 0.03 * length),
+        note="The same from near.",
+    )
+
+
+def _overlay(
+    study: CalibrationStudy,
+    channel: FittedChannel,
+    *,
+    name: str,
+    title: str,
+    span: tuple[float, float],
+    note: str,
+) -> Chart:
+    unit, factor = printed_unit(channel.mean, channel.unit)
+    seen = (study.time >= span[0]) & (study.time <= span[1])
+    time = 1e3 * study.time[seen]
+
+    def curve(values: Floats, **look: object) -> Curve:
+        x, y = thinned(time, factor * values[seen])
+        return Curve(x=x, y=y, **look)  # type: ignore[arg-type]
+
+    band = "90 % of the measured strokes"
+    curves = (
+        curve(channel.low, label=band, colour="sky", width=1.0),
+        curve(channel.high, colour="sky", width=1.0),
+        curve(channel.mean, label="mean of the measured strokes", colour="black", width=2.4),
+        curve(channel.before, label="before", colour="orange", style="dotted", width=2.0),
+        curve(channel.after, label="calibrated", colour="red", style="dashed", width=2.0),
+    )
+    left = factor * (channel.mean - channel.after)
+    fitted = seen & (channel.weight > 0.0)
+    largest = float(np.max(np.abs(left[fitted]))) if fitted.any() else 1.0
+    small, shrink = printed_unit(np.array([largest / factor]), channel.unit)
+    residual = _HEADROOM * largest * shrink / factor
+    windows = tuple(
+        Band(low=1e3 * w.first, high=1e3 * w.last, label=w.what.split(",")[0])
+        for w in study.windows
+    )
+    return Chart(
+        name=name,
+        title=title,
+        x=AxisSpec(label="time since the trigger", unit="ms", range=(1e3 * span[0], 1e3 * span[1])),
+        panels=(
+            Panel(y=AxisSpec(label=channel.role, unit=unit), curves=curves, bands=windows),
+            Panel(
+                y=AxisSpec(label="residual", unit=small, range=(-residual, residual)),
+                curves=(
+                    curve(
+                        (channel.mean - channel.after) * shrink / factor,
+                        label="measured less calibrated",
+                        colour="blue",
+                        width=1.2,
+                    ),
+                ),
+                bands=tuple(Band(low=w.low, high=w.high, label="") for w in windows),
+                marks=(Mark(value=0.0, axis="y"),),
+                share=0.55,
+            ),
+        ),
+        note=note,
+    )
+
+
+def profile_chart(profile: ProfileCurve, parameter: CalibratedParameter) -> Chart:
+    """How much worse the fit becomes when one parameter is held aside."""
+    unit, factor = printed_unit(profile.values, parameter.unit)
+    x = factor * profile.values
+    line = np.linspace(x[0], x[-1], 121)
+    parabola = ((line - factor * parameter.value) / (factor * parameter.standard_error)) ** 2
+    # the signed root of a profile is nearly a straight line
+    root = np.sqrt(profile.excess) * np.sign(x - factor * parameter.value)
+    smooth = PchipInterpolator(x, root)(line) ** 2
+    top = 1.8 * profile.threshold
+    ends = [
+        Mark(value=factor * end, label=f"{factor * end:.5g}")
+        for end in (profile.lower, profile.upper)
+        if isfinite(end)
+    ]
+    return Chart(
+        name=f"profile-{profile.name}",
+        title=f"Profile likelihood of '{profile.name}'",
+        x=AxisSpec(label=profile.name, unit=unit),
+        panels=(
+            Panel(
+                y=AxisSpec(label="excess Λ", range=(-0.03 * top, top)),
+                curves=(
+                    Curve(
+                        x=line,
+                        y=parabola,
+                        label="standard error alone",
+                        colour="grey",
+                        style="dashed",
+                    ),
+                    Curve(x=line, y=smooth, label="profile", colour="blue", width=2.2),
+                    Curve(x=x, y=profile.excess, colour="blue", width=2.0, drawn="points"),
+                ),
+                marks=(
+                    *ends,
+                    Mark(value=profile.threshold, axis="y", label="95 %"),
+                ),
+            ),
+        ),
+        note=(
+            "All other parameters are fitted again at each point. The interval is where the curve "
+            "stays below the horizontal line; where it leaves the dashed parabola, the standard "
+            "error alone would mislead."
+        ),
+    )
+
+
+def printed_unit(values: Floats, unit: str) -> tuple[str, float]:
+    """Unit with the prefix that keeps the largest value between 1 and 1000, and its factor.
+
+    >>> printed_unit(np.array([2e-5, -8e-5]), "m")
+    ('µm', 1000000.0)
+    """
+    if not unit:
+        return "", 1.0
+    largest = float(np.max(np.abs(values), initial=0.0))
+    if not largest > 0.0 or unit.startswith("kg") or "^" in unit.split("/")[0]:
+        return unit, 1.0
+    power = min(max(3 * floor(log10(largest) / 3 + 1e-12), min(_PREFIXES)), max(_PREFIXES))
+    return _PREFIXES[power] + unit, float(f"1e{-power}")

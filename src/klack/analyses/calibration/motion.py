@@ -1,0 +1,169 @@
+"""One stroke with other values of its parameters: what a calibration computes many times.
+
+Meshes, modes and contact laws do not depend on what can be calibrated; they are made once.  A trial
+checks the changed case as a whole, joins its network anew and runs it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.valve import filled_network
+from klack.case.case_tree import CaseTree
+from klack.case.free_parameters import FreeParameter
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import ValveRoles
+from klack.contact.local_law import LocalLaw
+from klack.errors import InputError
+from klack.input.problem import Key, one_of
+from klack.network.network import Network
+from klack.network.port import Role
+from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.network_run import simulate_network
+
+__all__ = ["Motion", "MotionModel", "channel_names"]
+
+_FINER, _MOST_COARSE = 2, 256
+"""The instant of a touch falls between two fine steps; as parameters move, that makes the lift
+jump by some nm.  Half the step makes it a third, and the derivatives that much better."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """What one trial leaves behind.
+
+    Parameters
+    ----------
+    step : float [s]
+        Of the channels, which begin at time zero.
+    channels : mapping of str to float32 array, shape (n,)
+        By role, SI.
+    impacts : mapping of "opening" and "seat" to times [s]
+    """
+
+    step: float
+    channels: Mapping[str, NDArray[np.float32]]
+    impacts: Mapping[str, tuple[float, ...]]
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Of the channels, shape (n,) [s]."""
+        count = next(iter(self.channels.values())).size
+        return self.step * np.arange(count, dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionModel:
+    """A valve of which some numbers of the case are still open.
+
+    Parameters
+    ----------
+    tree : CaseTree
+    parameters : tuple of FreeParameter
+        Those that the motion depends on.
+    variant : "wet" or "dry"
+    roles : ValveRoles
+    channels : mapping of str to str
+        Recorded channel of each role.
+    reduced : mapping of str to ReducedBody
+    laws : mapping of str to LocalLaw
+    record : float [s]
+        Spacing of the records.
+    """
+
+    tree: CaseTree
+    parameters: tuple[FreeParameter, ...]
+    variant: str
+    roles: ValveRoles
+    channels: Mapping[str, str]
+    reduced: Mapping[str, ReducedBody]
+    laws: Mapping[str, LocalLaw]
+    record: float
+
+    def changes(self, values: Sequence[float]) -> dict[Key, str | float]:
+        """What stands in the case instead, for parameter values [SI]."""
+        return {
+            place.key: place.written(value)
+            for parameter, value in zip(self.parameters, values, strict=True)
+            for place in parameter.places
+        }
+
+    def run(self, values: Sequence[float], duration: float) -> Motion:
+        """Compute one stroke with these values [SI] of the parameters.
+
+        Raises
+        ------
+        InputError
+            For values that the case refuses.
+        ConvergenceError
+            When a step of the solver fails.
+        """
+        case = self.tree.case(self.changes(values))
+        network = filled_network(case, self._damped(case), self.laws)
+        if self.variant == "dry":
+            network = network.dry()
+        run = case.run
+        result = simulate_network(
+            network.rows(),
+            duration=duration,
+            step=run.step / _FINER,
+            coarse=min(run.coarse * _FINER, _MOST_COARSE),
+            record=min(self.record, run.record),
+        )
+        names = {"opening": self.roles.opening_stop, "seat": self.roles.seat}
+        return Motion(
+            step=float(result.time[1] - result.time[0]),
+            # single precision keeps 6 pm of 100 um, far below any noise
+            channels={
+                role: result.channels[name].values.astype(np.float32)
+                for role, name in self.channels.items()
+            },
+            impacts={
+                stop: tuple(event.time for event in result.events if event.stop == name)
+                for stop, name in names.items()
+                if name
+            },
+        )
+
+    def _damped(self, case: ValveCase) -> dict[str, ReducedBody]:
+        """Bodies with the damping of the case; everything else of them is as it was."""
+        return {
+            name: replace(body, damping=damping_of(case.bodies[name].damping).ratios(body.omega))
+            for name, body in self.reduced.items()
+        }
+
+
+def channel_names(
+    network: Network, roles: ValveRoles, wanted: Sequence[str], where: str
+) -> dict[str, str]:
+    """Recorded channel of each role that a calibration needs.
+
+    Raises
+    ------
+    InputError
+        For a role that the computed stroke does not have, or several times.
+    """
+    point = f"{roles.needle}.{roles.point}"
+    coils = [
+        name
+        for name, part in network.components.items()
+        if any(port.role is Role.COIL for port in part.port_kinds().values())
+    ]
+    known = {"lift": [f"{point} displacement"], "velocity": [f"{point} velocity"]}
+    known |= {role: [f"{coil} {role}" for coil in coils] for role in ("current", "voltage")}
+    result = {}
+    for role in wanted:
+        names = known.get(role, [])
+        if len(names) != 1:
+            raise InputError(
+                where,
+                got=f"the channel '{role}', of which this valve has {len(names)}"
+                + (f" ({one_of(names)})" if names else ""),
+                expected=f"one of: {one_of(r for r, n in known.items() if len(n) == 1)}",
+                hint="trigger and fit channels that the computed stroke has exactly once.",
+            )
+        result[role] = names[0]
+    return result

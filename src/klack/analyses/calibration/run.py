@@ -1,0 +1,566 @@
+"""``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.calibration.fit import StrokeModel
+from klack.analyses.calibration.log import calibration_mark, trial_log
+from klack.analyses.calibration.motion import Motion, MotionModel, channel_names
+from klack.analyses.calibration.pool import TrialPool
+from klack.analyses.calibration.record import (
+    CalibratedParameter,
+    CalibrationStudy,
+    FittedChannel,
+    FittedImpact,
+    ProfileCurve,
+)
+from klack.analyses.record import case_fields, run_fields
+from klack.assembling.valve import build_valve
+from klack.case.calibration import CaseCalibration
+from klack.case.case_tree import CaseTree
+from klack.case.free_parameters import FreeParameter, free_parameters
+from klack.case.key_path import written_at
+from klack.case.measurement import CaseMeasurement
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import find_roles
+from klack.cores import available_cores
+from klack.errors import InputError
+from klack.input.problem import one_of
+from klack.measurement.computed_stroke import trigger_instant
+from klack.measurement.fit_window import (
+    FitWindow,
+    fit_windows,
+    sample_weights,
+    touch_shifts,
+    window_taper,
+)
+from klack.measurement.fitting import Fit, fit_within_bounds
+from klack.measurement.identifiability import identifiability, identifiability_warnings
+from klack.measurement.impacts import measure_stroke
+from klack.measurement.lift_sensor import sense
+from klack.measurement.profile_likelihood import Profile, follow_profiles
+from klack.measurement.roles import ROLES
+from klack.measurement.sensor import LiftSensor
+from klack.measurement.shot_covariance import ShotCovariance, noise_covariance, shot_covariance
+from klack.measurement.stroke_set import StrokeSet
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+
+__all__ = ["calibration_of", "run_calibration"]
+
+Vector = NDArray[np.float64]
+Impacts = Mapping[str, Sequence[float]]
+
+_POOR = 3.0
+"""Misfit above which the model does not explain the strokes."""
+_HOPELESS = 10.0
+"""Misfit above which the search begins once more, from the middle of the bounds."""
+_LATER = 0.3e-3  # [s] that a computed stroke may trigger later than at the start
+_FINER, _FINEST = 8.0, 0.1e-6  # records per sample, and their least spacing [s]
+_REST = 0.3e-3  # [s] of rest on the opening stop after which a closing is repeatable
+_FEW = 5  # strokes below which the errors are rough
+_USUAL_ITERATIONS = 8
+_STOPS = {"opening": "opening stop", "seat": "seat"}
+
+
+def calibration_of(case: ValveCase) -> CaseCalibration:
+    """Section ``calibration`` of a case.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if case.calibration is None:
+        raise InputError(
+            f"{case.path or 'case'}: calibration",
+            got="no section 'calibration'",
+            expected="the parameters to fit, with their bounds",
+            hint="add e.g. 'calibration: {parameters: {preload: {key: "
+            "network.components.spring.preload, lower: 8 N, upper: 16 N}}}'.",
+        )
+    return case.calibration
+
+
+def run_calibration(
+    tree: CaseTree,
+    strokes: StrokeSet,
+    *,
+    folder: Path | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> CalibrationStudy:
+    """Fit the parameters of the section ``calibration`` to measured strokes.
+
+    Parameters
+    ----------
+    tree : CaseTree
+        Case of the whole valve, as it was written.
+    strokes : StrokeSet
+    folder : Path, optional
+        Keeps computed trials there until it is finished; the same call goes on from them.
+    workers : int, optional
+        Processes; all cores by default.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Returns
+    -------
+    CalibrationStudy
+
+    Raises
+    ------
+    InputError
+        For a case without what is needed, or strokes without the fitted channels.
+    ConvergenceError
+        A trial that cannot be computed.
+    """
+    begin = perf_counter()
+    case = tree.case()
+    section = calibration_of(case)
+    parameters = free_parameters(case)
+    _require_written(tree, parameters)
+    _require_channels(strokes, section)
+    measurement = case.measurement or CaseMeasurement()
+    clock = StageClock(progress)
+    workers = available_cores() if workers is None else workers
+    mark = calibration_mark(case, strokes)
+    with trial_log(folder, mark) as log, collected_warnings() as notes:
+        resumed = len(log.done)
+        model = _motion_model(case, tree, parameters, strokes, measurement, clock, threads)
+        with TrialPool(model, workers, log) as pool:
+            clock("first strokes", 0.0)
+            shown = StrokeModel(
+                parameters=parameters,
+                pool=pool,
+                sensor=measurement.sensor,
+                trigger=measurement.trigger,
+                zeroed=measurement.zero == "start",
+                time=strokes.time,
+                channels=section.channels,
+                counted=np.ones(strokes.time.size, dtype=bool),
+                duration=case.run.duration,
+            )
+            result = _calibrate(case, section, strokes, shown, clock)
+            evaluations = len(pool.used)
+            resumed = sum(key in pool.used for key in list(log.done)[:resumed])
+    found = result.covariance
+    return CalibrationStudy(
+        **case_fields(case),
+        **run_fields(begin, clock),
+        profile_time=clock.spent(("profiles",)),
+        source=strokes.source,
+        strokes=tuple(stroke.name for stroke in strokes.strokes),
+        rejected=tuple(f"{item.name}: {item.reason}" for item in strokes.rejected),
+        variant=section.variant,
+        parameters=_parameters(parameters, result.fit, found),
+        correlation=found.correlation,
+        design_correlation=result.design_correlation,
+        singular_values=result.singular_values,
+        time=strokes.time,
+        channels=result.channels,
+        windows=result.windows,
+        impacts=result.impacts,
+        profiles=result.profiles,
+        residual_rms=result.residual_rms,
+        residual_rms_before=result.residual_rms_before,
+        misfit=result.misfit,
+        degrees=found.degrees,
+        iterations=result.fit.iterations,
+        evaluations=evaluations,
+        resumed=resumed,
+        workers=workers,
+        converged=result.fit.converged,
+        warnings=(*strokes.notes, *notes, *result.warnings),
+    )
+
+
+def _require_written(tree: CaseTree, parameters: Sequence[FreeParameter]) -> None:
+    """Only what stands in the file can get its calibrated value there."""
+    for parameter in parameters:
+        for place in parameter.places:
+            if written_at(tree.data, place.key) is None:
+                line = tree.lines.find(place.key, on_key=True)
+                value = place.written(place.value)
+                raise InputError(
+                    f"{tree.path}:{line}: {place}",
+                    got="nothing in the file (the default holds)",
+                    expected=f"the start value of the parameter '{parameter.name}'",
+                    hint=f"write '{place.key[-1]}: {value}' there.",
+                )
+
+
+def _require_channels(strokes: StrokeSet, section: CaseCalibration) -> None:
+    for role in section.channels:
+        if role not in strokes.roles:
+            raise InputError(
+                strokes.source,
+                got=f"strokes without the channel '{role}'",
+                expected=f"the channels of calibration.channels ({one_of(section.channels)}); "
+                f"found: {one_of(strokes.roles)}",
+                hint="name it in measurement.channels, or fit only the lift.",
+            )
+    if "lift" not in strokes.roles:
+        raise InputError(
+            strokes.source,
+            got="strokes without lift",
+            expected="the lift: impacts and windows are found in it",
+            hint="name its channel in measurement.channels.",
+        )
+
+
+def _motion_model(
+    case: ValveCase,
+    tree: CaseTree,
+    parameters: tuple[FreeParameter, ...],
+    strokes: StrokeSet,
+    measurement: CaseMeasurement,
+    clock: StageClock,
+    threads: int | None,
+) -> MotionModel:
+    section = calibration_of(case)
+    roles = find_roles(case)
+    valve = build_valve(case, clock, threads=threads)
+    trigger = measurement.trigger
+    wanted = dict.fromkeys(["lift", *section.channels, *([trigger.channel] if trigger else [])])
+    return MotionModel(
+        tree=tree,
+        parameters=tuple(p for p in parameters if not p.of_sensor),
+        variant=section.variant,
+        roles=roles,
+        channels=channel_names(valve.network, roles, tuple(wanted), f"{case.path or 'case'}"),
+        reduced={name: replace(body, recovery=None) for name, body in valve.reduced.items()},
+        laws=valve.laws,
+        record=max(strokes.step / _FINER, _FINEST),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Result:
+    fit: Fit
+    covariance: ShotCovariance
+    design_correlation: NDArray[np.float64]
+    singular_values: Vector
+    channels: tuple[FittedChannel, ...]
+    windows: tuple[FitWindow, ...]
+    impacts: tuple[FittedImpact, ...]
+    profiles: tuple[ProfileCurve, ...]
+    residual_rms: float
+    residual_rms_before: float
+    misfit: float
+    warnings: tuple[str, ...]
+
+
+def _calibrate(
+    case: ValveCase,
+    section: CaseCalibration,
+    strokes: StrokeSet,
+    whole: StrokeModel,
+    clock: StageClock,
+) -> _Result:
+    """Fit, judge and follow the parameters; ``whole`` computes all samples of a stroke."""
+    parameters = whole.parameters
+    start = np.array([p.start for p in parameters])
+    at_start = whole.motion(start, whole.duration)
+    before = whole.recorded(at_start, start)
+    mean = strokes.matrix("lift").mean(axis=0)
+    measured = _impacts_of(strokes.time, mean, whole.sensor)
+    if not any(measured.values()):  # nothing to be seen: take the model's
+        measured = _computed_impacts(whole, at_start, start)
+    time, lift = strokes.time, mean
+    windows = fit_windows(time, strokes.matrix("lift"), measured, section.impacts)
+    windows, restless = _repeatable(windows, measured, _computed_impacts(whole, at_start, start))
+    taper = window_taper(time, windows)
+    counted = taper > 0.0
+    ends = max(window.last for window in windows) + _begin(whole, at_start, start) + _LATER
+    model = replace(
+        whole,
+        counted=counted,
+        duration=float(min(case.run.duration, np.ceil(ends / 1e-5) * 1e-5)),
+    )
+    matrices = {role: strokes.matrix(role) for role in section.channels}
+    weight = {role: taper * sample_weights(x, strokes.step) for role, x in matrices.items()}
+    data = np.concatenate([x.mean(axis=0)[counted] for x in matrices.values()])
+    weights = np.concatenate([w[counted] for w in weight.values()])
+    fit = _search(model, data, weights, model.scaled(start), strokes.count, taper, clock)
+
+    residuals = np.concatenate([x[:, counted] for x in matrices.values()], axis=1) - fit.model
+    covariance = (
+        shot_covariance(fit.jacobian, weights, residuals)
+        if strokes.count > 1
+        else noise_covariance(fit.jacobian, weights, residuals[0])
+    )
+    seen = identifiability(fit.jacobian, weights)
+    profiles = _profiles(model, data, weights, fit, covariance, section, clock)
+    clock("last strokes", 0.0)
+    values = model.unscaled(fit.z)
+    at_end = whole.motion(values, whole.duration)
+    after = whole.recorded(at_end, values)
+    misfit = _misfit(fit.cost, strokes.count, taper, len(section.channels))
+    impacts = _impacts(
+        strokes,
+        measured,
+        _impacts_of(time, before["lift"], whole.sensor_of(start)),
+        _impacts_of(time, after["lift"], whole.sensor_of(values)),
+    )
+    names = [p.name for p in parameters]
+    return _Result(
+        fit=fit,
+        covariance=covariance,
+        design_correlation=seen.correlation,
+        singular_values=seen.singular_values,
+        channels=tuple(
+            _channel(role, strokes.matrix(role), before[role], after[role], weight.get(role, taper))
+            for role in dict.fromkeys(("lift", *section.channels))
+        ),
+        windows=windows,
+        impacts=impacts,
+        profiles=profiles,
+        residual_rms=_rms(lift - after["lift"], counted),
+        residual_rms_before=_rms(lift - before["lift"], counted),
+        misfit=misfit,
+        warnings=(
+            *restless,
+            *_doubts(fit, misfit, strokes.count, len(names), impacts, windows),
+            *identifiability_warnings(names, fit.z, seen, covariance),
+        ),
+    )
+
+
+def _repeatable(
+    windows: tuple[FitWindow, ...], measured: Impacts, computed: Impacts
+) -> tuple[tuple[FitWindow, ...], tuple[str, ...]]:
+    """Leave the closing out if the needle still bounces on the opening stop when it begins.
+
+    The last bounces, too low to be measured, then decide when it closes; the sum of squares gets
+    many minima, and a search ends in any of them.
+    """
+    if len(windows) < 2:
+        return windows, ()
+    opening, closing = windows
+    ends = [impacts.get("seat", ()) for impacts in (measured, computed)]
+    bounces = [
+        instant
+        for impacts, seat in zip((measured, computed), ends, strict=True)
+        for instant in impacts.get("opening", ())
+        if not any(opening.last < t < instant for t in seat)
+    ]
+    last = max(bounces, default=-np.inf)
+    if last < closing.first - _REST:
+        return windows, ()
+    return (opening,), (
+        f"The needle still bounces on the opening stop {1e3 * last:.3g} ms after the trigger, "
+        f"shortly before it closes: bounces too low to be measured decide when that is, so only "
+        "the opening was fitted. Try: a longer stroke, or the wet valve.",
+    )
+
+
+def _search(
+    model: StrokeModel,
+    data: Vector,
+    weights: Vector,
+    start: Vector,
+    count: int,
+    taper: Vector,
+    clock: StageClock,
+) -> Fit:
+    """Search from the values of the case; from the middle of the bounds if that leads nowhere."""
+
+    def told(iteration: int) -> None:
+        clock("fit", min(iteration / _USUAL_ITERATIONS, 0.95))
+
+    clock("fit", 0.0)
+    fit = fit_within_bounds(model, data, weights, start, progress=told)
+    if _misfit(fit.cost, count, taper, len(model.channels)) > _HOPELESS:
+        other = fit_within_bounds(model, data, weights, np.full(start.size, 0.5), progress=told)
+        fit = other if other.cost < fit.cost else fit
+    return fit
+
+
+def _misfit(cost: float, count: int, taper: Vector, channels: int) -> float:
+    return float(np.sqrt(count * cost / max(channels * taper.sum(), 1e-12)))
+
+
+def _profiles(
+    model: StrokeModel,
+    data: Vector,
+    weights: Vector,
+    fit: Fit,
+    covariance: ShotCovariance,
+    section: CaseCalibration,
+    clock: StageClock,
+) -> tuple[ProfileCurve, ...]:
+    names = [p.name for p in model.parameters]
+    error = covariance.standard_error
+    wanted = [
+        i for i in map(names.index, dict.fromkeys(section.profile)) if 0.0 < error[i] < np.inf
+    ]
+    if not wanted:
+        return ()
+    clock("profiles", 0.0)
+    found = follow_profiles(model, data, weights, fit, covariance, wanted)
+    return tuple(_curve(model.parameters[profile.index], profile) for profile in found)
+
+
+def _curve(parameter: FreeParameter, profile: Profile) -> ProfileCurve:
+    span = parameter.upper - parameter.lower
+    return ProfileCurve(
+        name=parameter.name,
+        values=parameter.lower + span * profile.z,
+        excess=profile.excess,
+        threshold=profile.threshold,
+        lower=parameter.lower + span * profile.lower if profile.lower > 0.0 else -np.inf,
+        upper=parameter.lower + span * profile.upper if profile.upper < 1.0 else np.inf,
+    )
+
+
+# --------------------------------------------------------------------------- impacts
+
+
+def _impacts_of(time: Vector, lift: Vector, sensor: LiftSensor) -> Impacts:
+    """Impact times on both stops [s], as they are read off a lift, measured or computed."""
+    found = measure_stroke(time, lift, sensor=sensor).impacts
+    return {stop: [i.time for i in found if i.stop == stop] for stop in _STOPS}
+
+
+def _computed_impacts(model: StrokeModel, motion: Motion, values: Vector) -> Impacts:
+    """Impact times as the solver knows them, from the trigger [s]."""
+    begin = _begin(model, motion, values)
+    return {stop: [t - begin for t in times] for stop, times in motion.impacts.items()}
+
+
+def _begin(model: StrokeModel, motion: Motion, values: Vector) -> float:
+    """When a computed stroke triggers [s]."""
+    if model.trigger is None:
+        return 0.0
+    channel = motion.channels[model.trigger.channel].astype(np.float64)
+    if model.trigger.channel == "lift":
+        channel = sense(motion.time, channel, model.sensor_of(values))
+    step = float(model.time[1] - model.time[0])
+    return trigger_instant(motion.time, channel, model.trigger, step)
+
+
+def _impacts(
+    strokes: StrokeSet, measured: Impacts, before: Impacts, after: Impacts
+) -> tuple[FittedImpact, ...]:
+    """First impact on both stops, measured and computed, all read in the same way."""
+    runs = [measured, before, after]
+    lifts = strokes.matrix("lift")
+    openings = [_first(run, "opening", -np.inf) for run in runs]
+    result = []
+    for stop in _STOPS:
+        since = [-np.inf if stop == "opening" or np.isnan(t) else t for t in openings]
+        times = [_first(run, stop, t) for run, t in zip(runs, since, strict=True)]
+        if not np.isfinite(times).any():
+            continue
+        scatter = np.nan
+        if np.isfinite(times[0]) and strokes.count > 1:
+            scatter = float(np.std(touch_shifts(strokes.time, lifts, times[0]), ddof=1))
+        result.append(
+            FittedImpact(
+                stop=stop, measured=times[0], scatter=scatter, before=times[1], after=times[2]
+            )
+        )
+    return tuple(result)
+
+
+def _first(impacts: Impacts, stop: str, since: float) -> float:
+    """First impact on a stop after a time; nan if there is none."""
+    return float(next((t for t in impacts.get(stop, ()) if t > since), np.nan))
+
+
+# --------------------------------------------------------------------------- numbers and words
+
+
+def _parameters(
+    parameters: Sequence[FreeParameter], fit: Fit, covariance: ShotCovariance
+) -> tuple[CalibratedParameter, ...]:
+    error, quantile = covariance.standard_error, covariance.quantile
+    result = []
+    for j, p in enumerate(parameters):
+        span = p.upper - p.lower
+        value, se = p.lower + span * float(fit.z[j]), span * float(error[j])
+        result.append(
+            CalibratedParameter(
+                name=p.name,
+                keys=tuple(str(place) for place in p.places),
+                unit=p.unit,
+                value=value,
+                standard_error=se,
+                lower_95=value - quantile * se,
+                upper_95=value + quantile * se,
+                start=p.start,
+                lower=p.lower,
+                upper=p.upper,
+                strokes=value + span * covariance.estimates[:, j],
+            )
+        )
+    return tuple(result)
+
+
+def _channel(
+    role: str, strokes: NDArray[np.float64], before: Vector, after: Vector, weight: Vector
+) -> FittedChannel:
+    low, high = np.quantile(strokes, (0.05, 0.95), axis=0)
+    return FittedChannel(
+        role=role,
+        unit=next(kind.unit for name, kind in ROLES.items() if name == role),
+        mean=strokes.mean(axis=0),
+        low=low,
+        high=high,
+        before=before,
+        after=after,
+        weight=weight,
+    )
+
+
+def _rms(values: Vector, counted: NDArray[np.bool_]) -> float:
+    return float(np.sqrt(np.mean(values[counted] ** 2)))
+
+
+def _doubts(
+    fit: Fit,
+    misfit: float,
+    count: int,
+    parameters: int,
+    impacts: Sequence[FittedImpact],
+    windows: Sequence[FitWindow],
+) -> list[str]:
+    notes = []
+    if not fit.converged:
+        notes.append(
+            f"The search stopped after {fit.iterations} iterations before it had settled. "
+            "Try: closer bounds, or fewer parameters."
+        )
+    if misfit > _POOR:
+        notes.append(
+            f"The model does not explain the strokes: what is left is {misfit:.1f} times what "
+            "their scatter allows, so the intervals are too narrow. Look at the residual over "
+            "time; something that is not among the parameters is wrong."
+        )
+    if count == 1:
+        notes.append(
+            "A single stroke shows its noise but no scatter from stroke to stroke: the true "
+            "uncertainty is larger than the intervals. Measure ten strokes or more."
+        )
+    elif count < _FEW or count < parameters + 2:
+        notes.append(
+            f"{count} strokes tell the scatter of {parameters} parameters roughly: the single "
+            "errors hold (with Student's t), the correlations do not. Measure ten strokes or more."
+        )
+    for impact in impacts:
+        inside = [w for w in windows if w.first <= impact.measured <= w.last]
+        if inside and not any(w.first <= impact.after <= w.last for w in inside):
+            notes.append(
+                f"The computed first impact on the {_STOPS[impact.stop]} lies outside the fitted "
+                "window: the search did not find the measured stroke. Try: other start values."
+            )
+    return notes

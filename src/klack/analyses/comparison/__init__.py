@@ -1,0 +1,1 @@
+"""Results beside measurements and beside CalculiX."""

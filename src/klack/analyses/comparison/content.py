@@ -1,0 +1,274 @@
+"""What a report beside a measurement says, before it is laid out."""
+
+from collections.abc import Mapping
+
+from klack.analyses.comparison.figures import (
+    drops_chart,
+    first_touch_chart,
+    lift_chart,
+    measured_distribution_chart,
+    side_by_side_chart,
+)
+from klack.analyses.comparison.shots_record import MeasuredShotsStudy
+from klack.analyses.comparison.shots_summary import (
+    DROP_COLUMNS,
+    bias_sentence,
+    drop_rows,
+    drop_rule,
+    drop_verdict,
+)
+from klack.analyses.comparison.strokes_record import ComparedVariant, MeasuredStrokeStudy
+from klack.analyses.comparison.strokes_summary import (
+    CURVE_COLUMNS,
+    HIGHEST_COLUMNS,
+    IMPACT_COLUMNS,
+    curve_rows,
+    highest_rows,
+    impact_rows,
+    rule,
+    verdict,
+)
+from klack.analyses.page import page_of
+from klack.report.page import Content, Section, Table
+from klack.report.wording import count, quantity
+
+__all__ = ["measured_shots_content", "measured_strokes_content"]
+
+_HIGHEST = (
+    "The stroke that rebounds highest is usually taken for the centred one. The highest of many "
+    "readings is too high by their errors, and the highest of many strokes lies above the median "
+    "by chance alone; both are estimated here from the scatter."
+)
+_MOST_IMPACTS = 6
+
+
+def measured_strokes_content(study: MeasuredStrokeStudy) -> Content:
+    """Put strokes beside their measurement into words, tables and figures."""
+    variants = tuple(study.variants.values())
+    sections = []
+    if len(variants) > 1:
+        sections.append(Section(title="Side by side", charts=(side_by_side_chart(variants),)))
+    for variant in variants:
+        sections += _variant_sections(variant)
+    sections.append(_measured(study))
+    sections.append(_rejected(study))
+    return page_of(
+        study,
+        "Beside a measurement",
+        answer=" ".join(verdict(study, variant) for variant in variants) + f" {rule(study)}",
+        numbers=_number_table(variants),
+        sections=sections,
+        definitions=_DEFINITIONS,
+        limits=_LIMITS,
+    )
+
+
+def measured_shots_content(study: MeasuredShotsStudy) -> Content:
+    """Put shots beside measured drops into words, tables and figures."""
+    facts = [
+        ("files", study.source),
+        ("drops", f"{len(study.names)} used, {len(study.rejected)} put aside"),
+        ("sensor", study.sensor),
+        (
+            "approach speed",
+            f"{quantity(study.approach_speed.measured, 'm/s', 3)} measured (standard deviation "
+            f"{quantity(study.approach_speed.scatter, 'm/s', 2)}), "
+            f"{quantity(study.approach_speed.computed, 'm/s', 3)} computed",
+        ),
+        *(("note", note) for note in study.notes),
+    ]
+    aside = tuple((item.name, item.reason) for item in study.rejected)
+    tables = [Table(columns=("measured", ""), rows=tuple(facts))]
+    if aside:
+        tables.append(Table(columns=("put aside", "why"), rows=aside))
+    return page_of(
+        study,
+        "Shots beside measured drops",
+        answer=f"{drop_verdict(study)} {bias_sentence(study)} {drop_rule(study)}",
+        numbers=Table(columns=DROP_COLUMNS, rows=drop_rows(study)),
+        sections=(
+            Section(
+                title="Both distributions",
+                charts=tuple(measured_distribution_chart(d) for d in study.distributions),
+            ),
+            Section(title="Height over time", charts=(drops_chart(study),)),
+            Section(title="What was measured", tables=tuple(tables)),
+        ),
+        definitions=_DROP_DEFINITIONS,
+        limits=_DROP_LIMITS,
+    )
+
+
+def _versions(version: str, libraries: Mapping[str, str]) -> str:
+    return ", ".join([f"klack {version}", *(f"{k} {v}" for k, v in libraries.items())])
+
+
+# --------------------------------------------------------------------------- sections
+
+
+def _number_table(variants: tuple[ComparedVariant, ...]) -> Table:
+    """First impacts and whole curves, one block per variant."""
+    rows: list[tuple[str, ...]] = []
+    for variant in variants:
+        head = f"{variant.variant}: " if len(variants) > 1 else ""
+        for name, rms, scatter, over in curve_rows(variant):
+            title = f"{head}{name}, root mean square"
+            rows.append((title, "", "", scatter, "", str(variant.count), rms, over))
+        rows += [(f"{head}{first}", *cells) for first, *cells in _one_column(variant, most=1)]
+    return Table(
+        columns=("", *IMPACT_COLUMNS[2:]), rows=tuple(tuple(map(_typeset, row)) for row in rows)
+    )
+
+
+def _variant_sections(variant: ComparedVariant) -> list[Section]:
+    touches = (first_touch_chart(variant, stop) for stop in ("opening", "seat"))
+    rows = tuple(tuple(map(_typeset, row)) for row in _one_column(variant, most=_MOST_IMPACTS))
+    curves = tuple(tuple(map(_typeset, row)) for row in curve_rows(variant))
+    highest = tuple(tuple(map(_typeset, row)) for row in highest_rows(variant))
+    columns = tuple(map(_typeset, HIGHEST_COLUMNS))
+    return [
+        Section(
+            title=f"The whole stroke: {variant.variant}",
+            charts=(lift_chart(variant),),
+            tables=(Table(columns=CURVE_COLUMNS, rows=curves),),
+        ),
+        Section(
+            title=f"First impacts: {variant.variant}",
+            charts=tuple(chart for chart in touches if chart is not None),
+        ),
+        Section(
+            title=f"Impacts in numbers: {variant.variant}",
+            paragraphs=(f"The first {_MOST_IMPACTS} impacts on each stop.",),
+            tables=(Table(columns=("impact", *IMPACT_COLUMNS[2:]), rows=rows),),
+        ),
+        Section(
+            title=f"The highest measured rebound: {variant.variant}",
+            paragraphs=(_HIGHEST,),
+            tables=(Table(columns=columns, rows=highest),),
+        ),
+    ]
+
+
+def _one_column(variant: ComparedVariant, *, most: int) -> list[tuple[str, ...]]:
+    """Rows of impacts with number and stop in one cell."""
+    return [(f"{kind}\n{stop}", *cells) for stop, kind, *cells in impact_rows(variant, most)]
+
+
+def _typeset(text: str) -> str:
+    """A terminal writes um and -; a page has better signs."""
+    text = text.replace("[us]", "[µs]").replace("[um]", "[µm]")
+    return text.replace("-", "\N{MINUS SIGN}") if text[:1] == "-" else text
+
+
+def _measured(study: MeasuredStrokeStudy) -> Section:
+    facts = [
+        ("lift", f"displacement of {study.point}"),
+        ("trigger", study.trigger),
+        ("sensor", study.sensor),
+        (
+            "zero",
+            "lift before the trigger is zero" if study.zero == "start" else "lift as measured",
+        ),
+    ]
+    for variant in study.variants.values():
+        facts.append(
+            (
+                f"{variant.variant}",
+                f"{variant.source}: {count(variant.count)} strokes used, "
+                f"{count(len(variant.rejected))} put aside",
+            )
+        )
+        facts += [(f"{variant.variant}, note", note) for note in variant.notes]
+    return Section(
+        title="What was measured", tables=(Table(columns=("measured", ""), rows=tuple(facts)),)
+    )
+
+
+def _rejected(study: MeasuredStrokeStudy) -> Section:
+    rows = tuple(
+        (f"{variant.variant}: {item.name}", item.reason)
+        for variant in study.variants.values()
+        for item in variant.rejected
+    )
+    tables = (Table(columns=("stroke", "why"), rows=rows),) if rows else ()
+    return Section(title="Strokes put aside", tables=tables)
+
+
+# --------------------------------------------------------------------------- words
+
+_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    (
+        "computed lift",
+        "Displacement of the measured point in the model, through the low pass, sensitivity and "
+        "offset of the sensor, counted from the crossing of the same channel through the same "
+        "level as the measured strokes.",
+    ),
+    (
+        "scatter",
+        "Of a number: standard deviation from stroke to stroke. Of a curve: root mean square of "
+        "the single strokes about their median, over all times; the noise of the sensor is in it. "
+        "Of a single stroke: the reading error.",
+    ),
+    (
+        "reading error",
+        "Standard error with which a number is read off one stroke, median of the strokes; of "
+        "times, with the spacing of the samples that find the trigger. Where few strokes happen to "
+        "scatter less than that, differences count in reading errors.",
+    ),
+    (
+        "time, approach speed, restitution",
+        "From smooth flights fitted to the lift before and after an impact, carried on to the "
+        "level at which the needle rests on the stop; read off the computed lift in the same way, "
+        "with as much noise on it as the measured one has (median of some readings). "
+        "They are not those of the centre of mass that a table of klack stroke gives: vibration of "
+        "the needle, squeeze films and the level of rest make a difference.",
+    ),
+    (
+        "rebound height",
+        "Largest distance from the level of the stop in the flight after the impact.",
+    ),
+)
+
+_LIMITS: tuple[tuple[str, str], ...] = (
+    (
+        "Scatter",
+        "A good bench has little scatter, and then a small difference counts much. A difference "
+        "over the scatter says whether a single stroke could be told from the model, not whether "
+        "the model is good enough for a purpose.",
+    ),
+    (
+        "Late bounces",
+        "Small differences of early impacts shift all later ones in time: the root mean square "
+        "over the whole record grows with them, and impacts are compared by their number on each "
+        "stop.",
+    ),
+)
+
+_DROP_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    (
+        "highest rebound",
+        "Rebounds of dry drops scatter, and the highest of many is usually taken for that of a "
+        "centred impact. The highest of more drops is higher: 'mean highest' is what the highest "
+        "of as many computed shots as were measured has on average, and its bias is that minus "
+        "the centred shot.",
+    ),
+    (
+        "restitution, rebound height",
+        "From smooth flights fitted to the height before and after the first impact, computed and "
+        "measured alike. The restitution of klack shots is another number: it holds at the end of "
+        "the impact, before friction in the guide takes its share of the rebound.",
+    ),
+    (
+        "reading error",
+        "Standard error with which a number is read off one drop, median of the drops: it widens "
+        "the measured distribution.",
+    ),
+)
+
+_DROP_LIMITS: tuple[tuple[str, str], ...] = (
+    (
+        "Distributions",
+        "The test finds differences, not reasons: other eccentricity, friction or preload than "
+        "assumed can give the same distribution.",
+    ),
+)

@@ -1,0 +1,152 @@
+"""The few numbers of shots beside measured drops that a script or a terminal wants."""
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from klack.analyses.analysis import Notes, TextTable
+from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
+from klack.analyses.json_results import DropsJson
+from klack.units import format_si
+
+__all__ = [
+    "DROP_COLUMNS",
+    "bias_sentence",
+    "drop_rows",
+    "drop_rule",
+    "drop_verdict",
+    "measured_shots_to_json",
+    "measured_shots_told",
+]
+
+DROP_COLUMNS = ("measure", "", "median", "5 %", "95 %", "highest rebound", "shots")
+
+_KEYS = {"restitution": "restitution", "rebound height": "rebound_height_m"}
+
+
+def measured_shots_told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
+    """What a terminal shows: both distributions, and what follows from them."""
+    title = f"{study.title}: beside {len(study.names)} measured drops"
+    yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
+    for item in study.rejected:
+        yield f"Put aside: {item.name}: {item.reason}"
+    yield from (drop_verdict(study), bias_sentence(study), drop_rule(study))
+    yield Notes(study.notes)
+
+
+def drop_verdict(study: MeasuredShotsStudy) -> str:
+    """Say whether both distributions are alike."""
+    apart = [d for d in study.distributions if d.significance < study.likely]
+    both = f"{len(study.names)} measured drops"
+    if not apart:
+        return f"The distributions of the computed shots and of {both} agree."
+    words = " and ".join(
+        f"the {d.name} (by {100 * d.statistic:.0f} % of the shots where they are farthest apart)"
+        for d in apart
+    )
+    return f"The distributions of the computed shots and of {both} differ in {words}."
+
+
+def drop_rule(study: MeasuredShotsStudy) -> str:
+    """How the verdict is found."""
+    return (
+        "Rule: two distributions agree if shots of one and the same valve would differ more in "
+        f"at least {100 * study.likely:g} of 100 repetitions (test of Kolmogorov and Smirnov)."
+    )
+
+
+def bias_sentence(study: MeasuredShotsStudy) -> str:
+    """Say what taking the highest rebound for the centred impact gets wrong."""
+    count = len(study.names)
+    found = []
+    for d in study.distributions:
+        text = _value(d.highest_bias, d.unit, sign=True)
+        found.append(f"{text} in the {d.name} (highest measured: {_value(d.measured_highest, d)})")
+    return (
+        f"Taking the highest rebound of {count} shots for the centred impact is off, on average "
+        f"over the computed shots, by {' and by '.join(found)}."
+    )
+
+
+def drop_rows(study: MeasuredShotsStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`DROP_COLUMNS`: each measure computed, measured, and centred."""
+    rows: list[tuple[str, ...]] = []
+    for d in study.distributions:
+        for name, values, highest in (
+            ("computed", d.computed, d.computed_highest),
+            ("measured", d.measured, d.measured_highest),
+        ):
+            known = values[np.isfinite(values)]
+            middle = (_value(float(np.quantile(known, share)), d) for share in (0.5, 0.05, 0.95))
+            rows.append((d.name, name, *middle, _value(highest, d), str(known.size)))
+        rows.append((d.name, "centred, computed", _value(d.centred, d), "", "", "", ""))
+        rows.append((d.name, "reading error", _value(d.error, d), "", "", "", ""))
+    return tuple(rows)
+
+
+def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        ``case``; per measure: quantiles, mean and standard deviation computed and measured,
+        ``highest``, ``centred``, the expected highest of as many shots and its ``bias``, the
+        statistic and significance of the test; ``verdict``.  Numbers that do not exist (nan) are
+        None.
+    """
+    return {
+        "schema": "klack-compare-shots/1",
+        "case": study.case,
+        "klack": study.version,
+        "drops": len(study.names),
+        "rejected": [{"name": item.name, "reason": item.reason} for item in study.rejected],
+        "approach_speed_m_s": _number(study.approach_speed.computed),
+        "approach_speed_measured_m_s": _number(study.approach_speed.measured),
+        "approach_speed_scatter_m_s": _number(study.approach_speed.scatter),
+        "distribution": {_KEYS.get(d.name, d.name): _distribution(d) for d in study.distributions},
+        "verdict": drop_verdict(study),
+        "bias": bias_sentence(study),
+        "rule": drop_rule(study),
+    }
+
+
+def _distribution(d: MeasuredDistribution) -> dict[str, Any]:
+    return {
+        "computed": _moments(d.computed) | {"highest": _number(d.computed_highest)},
+        "measured": _moments(d.measured) | {"highest": _number(d.measured_highest)},
+        "reading_error": _number(d.error),
+        "centred": _number(d.centred),
+        "expected_highest": _number(d.expected_highest),
+        "highest_bias": _number(d.highest_bias),
+        "statistic": _number(d.statistic),
+        "significance": _number(d.significance),
+    }
+
+
+def _moments(values: np.ndarray) -> dict[str, float | None]:
+    known = values[np.isfinite(values)]
+    quantiles = {
+        f"quantile_{q:g}": _number(float(np.quantile(known, q))) for q in (0.05, 0.5, 0.95)
+    }
+    return {
+        "count": int(known.size),
+        "mean": _number(float(np.mean(known))),
+        "standard_deviation": _number(float(np.std(known))),
+        **quantiles,
+    }
+
+
+def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) -> str:
+    unit = of if isinstance(of, str) else of.unit
+    if not isfinite(value):
+        return "–"
+    plus = "+" if sign and value > 0.0 else ""
+    return plus + (format_si(value, unit, 3) if unit else f"{value:.4f}")
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if isfinite(value) else None

@@ -1,0 +1,407 @@
+r"""Computed strokes beside measured ones: the same trigger, the same sensor, the same readings.
+
+The computed lift is shown as the sensor would show it, counted from the same crossing of the same
+channel as the measured strokes, and put on their grid.  Velocity and impacts are read off both in
+the same way, so that what a differentiator or a fit takes away is taken from both.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite, sqrt
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.comparison.strokes_record import (
+    IMPACT_MEASURES,
+    Compared,
+    ComparedImpact,
+    ComparedVariant,
+    HighestShot,
+    MeasuredStrokeStudy,
+)
+from klack.analyses.record import case_fields, run_fields
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.case.measurement import CaseMeasurement
+from klack.errors import InputError
+from klack.measurement.computed_stroke import recorded_stroke, trigger_instant
+from klack.measurement.differentiation import velocity_of
+from klack.measurement.impacts import measure_stroke
+from klack.measurement.loading import load_stroke_set
+from klack.measurement.roles import LIFT_ALONE
+from klack.measurement.sensor import LiftSensor
+from klack.measurement.set_measures import first_impact_column, highest_rebound
+from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
+from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.trigger import Trigger
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+from klack.units import format_si
+
+__all__ = ["EXCELLENT", "FAIR", "compare_numbers", "compare_strokes", "sensor_words"]
+
+Floats = NDArray[np.float64]
+
+EXCELLENT, FAIR = 2.0, 5.0
+"""Differences over the scatter up to which an agreement is called so."""
+_NOTICED = 0.05
+"""Share of the fastest approach of a stroke below which an impact does not count."""
+_REACHED = 0.1
+"""Share of the way that may be missing where the needle has met the opening stop."""
+_BY_DRAWING = (
+    "The needle never rests on the opening stop in some strokes; there its level is that of the "
+    "seat plus the lift of the drawing."
+)
+_REPLICAS, _SEED = 5, 1
+"""Readings of the computed lift, each with noise of its own."""
+_FEWEST_SHOTS = 3
+_STOPS: tuple[Stop, ...] = ("opening", "seat")
+
+
+def compare_strokes(
+    study: StrokeStudy,
+    measurements: Mapping[str, Sequence[Path]],
+    section: CaseMeasurement | None,
+    *,
+    case_text: str | None = None,
+    progress: Progress = silent,
+) -> MeasuredStrokeStudy:
+    """Lay the variants of a stroke study beside their measured sets.
+
+    Parameters
+    ----------
+    study : StrokeStudy
+    measurements : mapping of variant to files
+        Of one set each.
+    section : CaseMeasurement or None
+        Channels, trigger and sensor; with None, channels are found by their names, each recording
+        is one stroke, and the sensor is perfect.
+    case_text : str, optional
+        The case that ``section`` stands in, if it is not that of the study.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        For a variant that the study does not hold, and for recordings that cannot be used.
+    """
+    begin = perf_counter()
+    used = CaseMeasurement() if section is None else section
+    clock = StageClock(progress)
+    variants = {}
+    with collected_warnings() as notes:
+        for name, paths in measurements.items():
+            variant = _variant(study, name)
+            clock(f"read {name}", 0.0)
+            strokes = load_stroke_set(paths, used, roles=LIFT_ALONE)
+            clock(f"compare {name}", 0.0)
+            variants[name] = _compare(study, variant, strokes, used)
+    return MeasuredStrokeStudy(
+        **case_fields(study, case_text),
+        **run_fields(begin, clock),
+        trigger=_trigger_words(used.trigger),
+        sensor=sensor_words(used.sensor),
+        zero=used.zero,
+        point=study.channels.lift.removesuffix(" displacement"),
+        variants=variants,
+        excellent=EXCELLENT,
+        fair=FAIR,
+        warnings=tuple(notes),
+    )
+
+
+def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
+    if name not in study.variants:
+        raise InputError(
+            f"--measurement {name}=...",
+            got=f"a result without the variant '{name}'",
+            expected=f"one of: {', '.join(study.variants)}",
+            hint=f"run `klack stroke {study.case} --variant {name}` first, or name another.",
+        )
+    return study.variants[name]
+
+
+# --------------------------------------------------------------------------- one variant
+
+
+def _compare(
+    study: StrokeStudy, variant: StrokeVariant, strokes: StrokeSet, section: CaseMeasurement
+) -> ComparedVariant:
+    time, computed = _computed_lift(study, variant, strokes.time, section)
+    lift = strokes.matrix("lift")[:, : time.size]
+    estimate = velocity_of(time, lift, bandwidth=section.velocity_bandwidth)
+    speed = velocity_of(time, computed, bandwidth=estimate.bandwidth)
+    low, median, high = _band(lift)
+    slow, middle, fast = _band(estimate.velocity)
+    sensor = section.sensor
+    if section.zero == "start":
+        sensor = sensor.model_copy(update={"offset": 0.0})
+    model = [
+        _read(time, row, sensor, study.lift)
+        for row in _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
+    ]
+    readings = [_read(time, row, sensor, study.lift) for row in lift]
+    notes = strokes.notes
+    if any(reading.by_drawing for reading in (*model, *readings)):
+        notes = (*notes, _BY_DRAWING)
+    return ComparedVariant(
+        variant=variant.name,
+        label=variant.label,
+        source=strokes.source,
+        count=strokes.count,
+        rejected=strokes.rejected,
+        notes=notes,
+        time=time,
+        lift=lift.astype(np.float32),
+        velocity=estimate.velocity.astype(np.float32),
+        lift_median=median,
+        lift_low=low,
+        lift_high=high,
+        velocity_median=middle,
+        velocity_low=slow,
+        velocity_high=fast,
+        computed_lift=computed,
+        computed_velocity=speed.velocity,
+        velocity_bandwidth=estimate.bandwidth,
+        velocity_noise=estimate.noise,
+        lift_rms=_rms(computed - median),
+        velocity_rms=_rms(speed.velocity - middle),
+        lift_scatter=_scatter(lift, median),
+        velocity_scatter=_scatter(estimate.velocity, middle),
+        way=compare_numbers(
+            [item.measures.lift for item in model],
+            [item.measures.lift for item in readings],
+            [item.measures.level_se for item in readings],
+        ),
+        impacts=_impacts(model, readings, strokes.step),
+        highest=_highest([stroke.name for stroke in strokes.strokes], readings),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Reading:
+    """Numbers of one stroke; ``by_drawing`` if the opening stop was put where the drawing says."""
+
+    measures: StrokeMeasures
+    moves: float
+    by_drawing: bool
+
+    def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
+        """Impacts on a stop once the needle has moved, without trembling at rest."""
+        hits = [hit for hit in self.measures.on(stop) if hit.time > self.moves]
+        known = (hit.approach_speed for hit in self.measures.impacts)
+        fastest = max((speed for speed in known if isfinite(speed)), default=0.0)
+        real = [i for i, hit in enumerate(hits) if hit.approach_speed > _NOTICED * fastest]
+        return tuple(hits[real[0] : real[-1] + 1]) if real else ()
+
+
+def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float | None) -> _Reading:
+    measures = measure_stroke(time, lift, sensor=sensor)
+    seat, by_drawing = measures.seat_level, False
+    unread = isfinite(seat) and not isfinite(measures.opening_level)
+    highest = float(np.max(lift)) - sensor.offset
+    if unread and way is not None and highest > (1.0 - _REACHED) * way:
+        measures = measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way)
+        by_drawing = True
+    half = 0.5 * (float(np.min(lift)) + float(np.max(lift)))
+    moves = float(time[int(np.argmax(lift > half))])
+    return _Reading(measures=measures, moves=moves, by_drawing=by_drawing)
+
+
+def _as_noisy(lift: Floats, noise: float, count: int) -> Floats:
+    """Computed lift with the noise of the measured one, several times.
+
+    A reading adapts to noise: longer stretches are fitted where there is more of it, and what
+    these bend changes the result.  Both sides must have the same.
+    """
+    random = np.random.default_rng(_SEED)
+    return lift + noise * random.standard_normal((count, lift.size))
+
+
+def _computed_lift(
+    study: StrokeStudy, variant: StrokeVariant, time: Floats, section: CaseMeasurement
+) -> tuple[Floats, Floats]:
+    """Grid up to the end of the computation, and the computed lift on it, as the sensor shows it.
+
+    Before the start of the computation the valve rests.
+    """
+    result, trigger = variant.result, section.trigger
+    lift = result.channels[study.channels.lift].values
+    channels = {"lift": lift - lift[0]}
+    begin = 0.0
+    if trigger is not None:
+        triggering = channels.setdefault(trigger.channel, _of_role(study, variant, trigger.channel))
+        step = float(time[1] - time[0])
+        begin = trigger_instant(result.time, triggering, trigger, step)
+    grid = time[time <= result.time[-1] - begin]
+    shown = recorded_stroke(
+        result.time,
+        channels,
+        grid,
+        sensor=section.sensor,
+        trigger=trigger,
+        zeroed=section.zero == "start",
+    )
+    return grid, shown["lift"]
+
+
+def _of_role(study: StrokeStudy, variant: StrokeVariant, role: str) -> Floats:
+    """Computed channel that a measured one stands for, SI."""
+    names = {
+        "lift": (study.channels.lift,),
+        "velocity": (study.channels.lift_velocity,),
+        "current": study.channels.current,
+        "voltage": study.channels.voltage,
+        "force": study.channels.magnetic_force,
+        "pressure": study.channels.pressures,
+    }.get(role, ())
+    for name in names:
+        data = variant.channel(name)
+        if data is not None:
+            return data.values
+    raise InputError(
+        "measurement.trigger.channel",
+        got=f"'{role}', which the variant '{variant.name}' does not compute",
+        expected="a channel of the model: lift, velocity, current, voltage, pressure",
+        hint="trigger on lift: channel: lift, share: 20 %.",
+    )
+
+
+def _band(records: Floats) -> tuple[Floats, Floats, Floats]:
+    """5 %, median and 95 % of the strokes at every time."""
+    low, median, high = np.quantile(records, (0.05, 0.5, 0.95), axis=0)
+    return low, median, high
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _scatter(records: Floats, median: Floats) -> float:
+    return _rms(records - median) if len(records) > 1 else float("nan")
+
+
+# --------------------------------------------------------------------------- impacts
+
+
+def _impacts(
+    model: Sequence[_Reading], readings: Sequence[_Reading], step: float
+) -> tuple[ComparedImpact, ...]:
+    """Impacts of the model beside those of the same number on the same stop."""
+    found = []
+    for stop in _STOPS:
+        computed, measured = ([item.on(stop) for item in side] for side in (model, readings))
+        for i in range(max(map(len, computed))):
+            ours, theirs = ([h[i] for h in side if len(h) > i] for side in (computed, measured))
+            if 2 * len(ours) < len(model) or 2 * len(theirs) < len(readings) or not theirs:
+                break
+            found.append(_impact(stop, i + 1, ours, theirs, step))
+    return tuple(sorted(found, key=lambda item: item.time.computed))
+
+
+def _highest(names: Sequence[str], readings: Sequence[_Reading]) -> tuple[HighestShot, ...]:
+    """Measured stroke with the highest first rebound from each stop; of three strokes or more."""
+    found = []
+    for stop in _STOPS:
+        hits = [reading.on(stop) for reading in readings]
+        firsts = [hit[0] if hit else None for hit in hits]
+        column = first_impact_column(stop, "rebound_height", firsts)
+        if column.known.size < _FEWEST_SHOTS:
+            continue
+        best = highest_rebound(column)
+        bounces = [sum(hit.rebound_height > 0.0 for hit in of_stroke) for of_stroke in hits]
+        shot = firsts[best.index]
+        assert shot is not None  # its rebound is the highest
+        found.append(
+            HighestShot(
+                stop=stop,
+                stroke=names[best.index],
+                count=best.count,
+                rebound_height=best.value,
+                rebound_height_error=best.error,
+                restitution=shot.restitution,
+                restitution_error=shot.restitution_se,
+                by_reading=best.normal_excess,
+                above_median=best.above_median,
+                bounces=float(np.median(bounces)),
+            )
+        )
+    return tuple(found)
+
+
+def _impact(
+    stop: Stop,
+    number: int,
+    ours: Sequence[MeasuredImpact],
+    theirs: Sequence[MeasuredImpact],
+    step: float,
+) -> ComparedImpact:
+    """Numbers of one impact; times are not better known than the sampled trigger."""
+    sampled = {"time": step / sqrt(12.0)}
+    numbers = {
+        kind.field: compare_numbers(
+            [getattr(hit, kind.field) for hit in ours],
+            [getattr(hit, kind.field) for hit in theirs],
+            [
+                hypot(getattr(hit, _ERRORS[kind.field]), sampled.get(kind.field, 0.0))
+                for hit in theirs
+            ],
+        )
+        for kind in IMPACT_MEASURES
+    }
+    return ComparedImpact(stop=stop, number=number, **numbers)
+
+
+_ERRORS = {
+    "time": "time_se",
+    "approach_speed": "approach_se",
+    "restitution": "restitution_se",
+    "rebound_height": "rebound_height_se",
+}
+
+
+def compare_numbers(
+    readings: Sequence[float], values: Iterable[float], errors: Iterable[float]
+) -> Compared:
+    """Readings of one computed number beside those of several strokes; nan are left out."""
+    ours = [value for value in readings if isfinite(value)]
+    computed = float(np.median(ours)) if ours else float("nan")
+    both = np.array([(v, e) for v, e in zip(values, errors, strict=True) if isfinite(v)])
+    if not both.size:
+        nan = float("nan")
+        return Compared(computed=computed, measured=nan, scatter=nan, error=nan, count=0)
+    known, error = both[:, 0], float(np.median(both[:, 1]))
+    return Compared(
+        computed=computed,
+        measured=float(np.median(known)),
+        scatter=float(np.std(known, ddof=1)) if known.size > 1 else float("nan"),
+        error=error,
+        count=int(known.size),
+    )
+
+
+# --------------------------------------------------------------------------- words
+
+
+def _trigger_words(trigger: Trigger | None) -> str:
+    if trigger is None:
+        return "none: each recording is one stroke from its first sample"
+    at = trigger.level or f"{100 * trigger.share_of_way:g} % of its way"
+    return f"{trigger.channel} {trigger.slope} through {at}"
+
+
+def sensor_words(sensor: LiftSensor) -> str:
+    """A lift sensor in one line."""
+    if sensor.bandwidth is None:
+        words = ["unlimited bandwidth"]
+    else:
+        words = [f"bandwidth {format_si(sensor.bandwidth, 'Hz')} (order {sensor.order})"]
+    if sensor.sensitivity != 1.0:
+        words.append(f"sensitivity {sensor.sensitivity:g}")
+    if sensor.offset != 0.0:
+        words.append(f"offset {format_si(sensor.offset, 'm')}")
+    if sensor.resolution > 0.0:
+        words.append(f"resolution {format_si(sensor.resolution, 'm')}")
+    return ", ".join(words)

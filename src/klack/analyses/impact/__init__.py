@@ -1,0 +1,1 @@
+"""One dry impact, at one or several levels."""

@@ -1,0 +1,422 @@
+"""Whether the meshes and the named surfaces hold the contact, and what to change where they do not.
+
+The numbers of one mesh cannot tell: a contact on one row of elements is as wide as that row, all
+levels agree on it, and the energy is kept.  So the shape of the two surfaces is asked: how wide
+the contact should be (:mod:`klack.contact.hertz`), whether it lies on a sharp corner, and whether
+it runs over the end of a named surface (:mod:`klack.contact.surface_edges`).
+"""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import floor, inf, isfinite, log10, nan, pi, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from klack.analyses.impact.record import LevelResult
+from klack.assembling.bodies import BodyPair
+from klack.case.bodies import CaseFile
+from klack.contact.hertz import line_half_width, point_radius
+from klack.contact.mortar import ContactSpace
+from klack.contact.pairing import face_geometry, project_to_surface
+from klack.contact.statics import (
+    COARSE,
+    StaticContact,
+    points_across,
+    ring_radius,
+    size_over_half_width,
+)
+from klack.contact.surface_edges import SurfaceEdges, surface_edges
+from klack.contact.touch_shape import relative_curvatures
+from klack.elasticity.body import ElasticBody
+from klack.errors import AccuracyWarning
+from klack.mesh.mesh import FaceBlock, Mesh, Surface
+from klack.stages import warnings_of
+from klack.units import format_si
+
+__all__ = ["FEWEST_POINTS", "ContactCheck", "check_contact", "ends_reached", "expected_half_width"]
+
+FEWEST_POINTS = 5
+"""Contact points across a contact below which no error of a model is judged."""
+
+_SIZE = 0.5
+"""Advised element size over the expected half width: nine contact points across.
+
+A mesh that is far too coarse is too stiff, and so overrates the force by up to 2.5 and the width by
+up to 1.4."""
+
+_EXTENT = 3.0
+"""Half widths around the first touch that are worth small elements."""
+
+_MARGIN = 0.3
+"""Distance from an edge, over the element size, within which a contact point lies at it."""
+
+_CARRIES = 1e-6
+"""Share of the largest contact force above which a point carries."""
+
+_SHALLOW = sin(0.5 * pi / 180.0)
+"""Slope on both sides of a corner above which it is the corner that touches, not a face."""
+
+_SECTORS = 6
+_OVER_THE_END = "it runs over the end of a named surface"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactCheck:
+    """What was found.
+
+    Parameters
+    ----------
+    half_width : float [m]
+        On this mesh.
+    size_ratio : float [-]
+        Element size across the contact over the half width.
+    points_across : int
+        Contact points across the whole width.
+    expected : float [m]
+        Half width of smooth bodies of this shape (Hertz); nan where no law fits.
+    doubts : tuple of str
+        Why no error of this contact can be judged on this mesh, each in a few words.
+    """
+
+    half_width: float
+    size_ratio: float
+    points_across: int
+    expected: float
+    doubts: tuple[str, ...] = ()
+
+
+def check_contact(
+    case: CaseFile, pair: BodyPair, static: StaticContact, force: float, surfaces: str
+) -> ContactCheck:
+    """Judge a static contact at an axial force, and warn of what makes it doubtful.
+
+    Parameters
+    ----------
+    case : CaseFile
+        For the materials.
+    pair : BodyPair
+        Placed as they touch.
+    static : StaticContact
+    force : float [N]
+        Peak force of the impact.
+    surfaces : str
+        The two surfaces, for the messages.
+
+    Warns
+    -----
+    AccuracyWarning
+        About a sharp edge, elements too coarse for the contact, and a contact at the end of a
+        named surface.
+    """
+    space, lam = static.space, static.pattern_at(force)
+    ratio = size_over_half_width(static, force)
+    edges = _edges(pair)
+    across = points_across(static, force)
+    expected = expected_half_width(case, pair, static, force)
+    doubts = []
+    corner = _corner(pair, edges, space, lam)
+    if corner is not None:
+        doubts.append("it lies on a sharp edge")
+        _warn(corner)
+    elif ratio > COARSE:
+        doubts.append("its elements are too coarse")
+        _warn(_coarse(case, pair, static, force, ratio, expected))
+    if across < FEWEST_POINTS:
+        doubts.append(f"{across} contact points across are too few")
+    if _tell_ends(edges, space.points, space.size, lam, surfaces):
+        doubts.append(_OVER_THE_END)
+    return ContactCheck(
+        half_width=static.half_width_at(force),
+        size_ratio=ratio,
+        points_across=across,
+        expected=nan if corner is not None else expected,
+        doubts=tuple(doubts),
+    )
+
+
+def ends_reached(
+    check: ContactCheck,
+    pair: BodyPair,
+    space: ContactSpace,
+    levels: Mapping[str, LevelResult],
+    surfaces: str,
+) -> ContactCheck:
+    """Look at the contact points of levels that have them, too: one may lean or hit harder.
+
+    Parameters
+    ----------
+    check : ContactCheck
+        Of the static contact.
+    pair : BodyPair
+    space : ContactSpace
+    levels : mapping of level to LevelResult
+    surfaces : str
+
+    Returns
+    -------
+    ContactCheck
+        With one doubt more where a contact ran over the end of a named surface.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where that is so.
+    """
+    if _OVER_THE_END in check.doubts:
+        return check
+    for name, result in levels.items():
+        if result.pressure is None:
+            continue
+        record = result.pressure
+        _, nearest = cKDTree(space.points).query(record.points)
+        force = np.max(record.point_force, axis=0)
+        with warnings_of(f"level '{name}'"):
+            if _tell_ends(_edges(pair), record.points, space.size[nearest], force, surfaces):
+                return replace(check, doubts=(*check.doubts, _OVER_THE_END))
+    return check
+
+
+def expected_half_width(
+    case: CaseFile, pair: BodyPair, static: StaticContact, force: float
+) -> float:
+    """Half width of the contact by Hertz's laws [m]; nan where they do not fit.
+
+    A ring is a line contact under its highest load per length, anything else a point contact; of an
+    ellipse the short half axis counts.
+
+    Parameters
+    ----------
+    case : CaseFile
+    pair : BodyPair
+    static : StaticContact
+    force : float [N]
+    """
+    space, lam = static.space, static.pattern_at(force) * force
+    modulus = _modulus(case, pair)
+    sides = ((pair.upper.mesh, pair.upper_surface), (pair.lower.mesh, pair.lower_surface))
+    curvature = relative_curvatures(space, lam, sides)
+    if not (isfinite(modulus) and curvature[0] > 0.0):
+        return nan
+    radius = ring_radius(space, lam)
+    if radius is not None:
+        load = _highest_load(space, lam) / (2.0 * pi * radius)
+        return _within(pair, line_half_width(load, float(curvature[0]), modulus))
+    if not curvature[-1] > 0.0:
+        return nan
+    mean = sqrt(float(curvature[0] * curvature[-1]))
+    circle = point_radius(float(lam.sum()), mean, modulus)
+    # Johnson 1985, eq. 4.28: b / a is about (B / A)^(-2/3)
+    return _within(pair, circle * float((curvature[-1] / curvature[0]) ** (1.0 / 3.0)))
+
+
+def _within(pair: BodyPair, width: float) -> float:
+    """Nothing that is as wide as the surfaces themselves: they fit each other closely."""
+    room = min(
+        float(np.max(np.ptp(mesh.points[surface.nodes], axis=0)))
+        for mesh, surface in (
+            (pair.upper.mesh, pair.upper_surface),
+            (pair.lower.mesh, pair.lower_surface),
+        )
+    )
+    return width if width < 0.5 * room else nan
+
+
+def _highest_load(space: ContactSpace, lam: NDArray[np.float64]) -> float:
+    """Force of the whole ring if every sector carried as much as the most loaded one [N]."""
+    if space.dimension == 2:
+        return float(lam.sum())
+    centre = np.average(space.points[:, :2], axis=0, weights=lam)
+    if np.linalg.norm(centre) < 0.5 * float(np.ptp(space.points[:, 0])):
+        centre = np.zeros(2)
+    angle = np.arctan2(space.points[:, 1] - centre[1], space.points[:, 0] - centre[0])
+    sector = np.floor((angle / (2.0 * pi) + 0.5) * _SECTORS).astype(int) % _SECTORS
+    return _SECTORS * float(np.bincount(sector, weights=lam, minlength=_SECTORS).max())
+
+
+def _modulus(case: CaseFile, pair: BodyPair) -> float:
+    """E* of the two materials that touch [Pa]; nan where a body has none of its own."""
+    inverse = 0.0
+    for body, surface in ((pair.upper, pair.upper_surface), (pair.lower, pair.lower_surface)):
+        if case.bodies[body.name].material is None:
+            return nan
+        materials = case.materials_of(body.name, body.mesh.solids)
+        solid = _solid_at(body.mesh, surface)
+        inverse += 1.0 / materials[solid].plane_strain_modulus
+    return 1.0 / inverse
+
+
+def _solid_at(mesh: Mesh, surface: Surface) -> str:
+    """Solid that most nodes of a surface belong to."""
+    nodes = surface.nodes
+    counts = [np.isin(nodes, block.connectivity).sum() for block in mesh.blocks]
+    return mesh.blocks[int(np.argmax(counts))].solid
+
+
+# --------------------------------------------------------------------------- edges
+
+
+_Side = tuple[ElasticBody, Surface, SurfaceEdges]
+
+
+def _edges(pair: BodyPair) -> tuple[_Side, _Side]:
+    return (
+        (
+            pair.upper,
+            pair.upper_surface,
+            surface_edges(pair.upper.mesh, pair.upper_surface),
+        ),
+        (
+            pair.lower,
+            pair.lower_surface,
+            surface_edges(pair.lower.mesh, pair.lower_surface),
+        ),
+    )
+
+
+def _corner(
+    pair: BodyPair, sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.float64]
+) -> str | None:
+    """Words for a corner that carries more than half of the force on one row of elements."""
+    others = (
+        (pair.lower.mesh, pair.lower_surface),
+        (pair.upper.mesh, pair.upper_surface),
+    )
+    for (body, surface, edges), other in zip(sides, others, strict=True):
+        sharp = np.flatnonzero(edges.corners & _touching(edges, other))
+        if not len(sharp):
+            continue
+        near = (edges.distance(space.points)[sharp] <= space.size).any(axis=0)
+        if lam[near].sum() < 0.5 * lam.sum():
+            continue
+        loaded = space.points[[np.argmax(lam)]]
+        nearest = sharp[np.argmin(edges.distance(loaded)[sharp, 0])]
+        angle = 180.0 - np.degrees(float(edges.angle[nearest]))
+        return (
+            f"contact: more than half of the force acts on a sharp edge of '{body.name}' "
+            f"({body.name}.{surface.name}, at {_at(edges, nearest)}, {angle:.0f} deg). Such a "
+            "contact is as narrow as its elements: its width, its pressure and in part its force "
+            "follow the mesh, and no element size settles them. Try: give the edge the radius "
+            "that it really has (an arc or fillet; 10 to 100 um for most turned or ground "
+            "parts), with five elements along it."
+        )
+    return None
+
+
+def _touching(edges: SurfaceEdges, other: tuple[Mesh, Surface]) -> NDArray[np.bool_]:
+    """Edges whose both faces lead away from the other surface, shape (m,)."""
+    if not len(edges.line):
+        return np.zeros(0, dtype=bool)
+    outward = -edges.along.sum(axis=1)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = outward / np.where(length > 0.0, length, 1.0)
+    middle = edges.line[:, 1]
+    met = project_to_surface(middle, outward, *other)
+    normal = -outward  # where nothing is met: of a surface that faces the corner
+    mesh, surface = other
+    for number, block in enumerate(surface.blocks):
+        for k in np.flatnonzero(met.block == number):
+            normal[k] = _normal_of(mesh, block, int(met.face[k]), met.xi[k])
+    slope = np.einsum("mkd,md->mk", edges.along, normal)
+    return (slope > _SHALLOW).all(axis=1)
+
+
+def _normal_of(
+    mesh: Mesh, block: FaceBlock, face: int, xi: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    one = FaceBlock(block.family, block.connectivity[face : face + 1])
+    return face_geometry(mesh.points, one, xi[None, :]).normal[0, 0]
+
+
+def _tell_ends(
+    sides: tuple[_Side, _Side],
+    points: NDArray[np.float64],
+    size: NDArray[np.float64],
+    lam: NDArray[np.floating],
+    surfaces: str,
+) -> bool:
+    """Warn of every end of a named surface at which contact points carry."""
+    carries = lam > _CARRIES * float(np.max(lam))
+    told = False
+    for body, surface, edges in sides:
+        if not np.any(edges.ends) or not np.any(carries):
+            continue
+        distance = edges.distance(points[carries])
+        reached = edges.ends & (distance <= _MARGIN * size[carries]).any(axis=1)
+        names = [edges.neighbour[k] or "" for k in np.flatnonzero(reached)]
+        for name in dict.fromkeys(names):
+            first = np.flatnonzero(reached)[names.index(name)]
+            _warn(_end(body, surface, name, _at(edges, first), surfaces))
+            told = True
+    return told
+
+
+def _end(body: ElasticBody, surface: Surface, name: str, at: str, surfaces: str) -> str:
+    where = f"in '{name}'" if name else "in a face without a name"
+    what = f"'{body.name}.{name}'" if name else "that face"
+    return (
+        f"contact {surfaces}: it reaches the end of '{body.name}.{surface.name}' at {at}, but the "
+        f"body goes on there {where}, which takes no part: the force comes out too low. Try: add "
+        f"{what} to '{surface.name}' (a profile: give both edges the same name; STEP: both faces "
+        "the same name in the CAD program; a mesh: one set that holds both)."
+    )
+
+
+def _at(edges: SurfaceEdges, number: int) -> str:
+    return f"({', '.join(f'{x * 1e3:.4g}' for x in edges.line[number, 1])}) mm"
+
+
+# --------------------------------------------------------------------------- words
+
+
+def _coarse(
+    case: CaseFile,
+    pair: BodyPair,
+    static: StaticContact,
+    force: float,
+    ratio: float,
+    expected: float,
+) -> str:
+    width = static.half_width_at(force)
+    size = ratio * width
+    text = (
+        f"contact: elements of {size * 1e6:.3g} um across a contact that is {width * 1e6:.3g} um "
+        f"in half width on this mesh, at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful "
+        f"above {COARSE:g})."
+    )
+    advised = _rounded_down(_SIZE * expected)
+    if not advised < size:
+        return text + " Try: 'klack advise', which measures what finer elements change."
+    return text + (
+        f" Its shape and load make {expected * 1e6:.2g} um: refine both contact surfaces to "
+        f"{format_si(advised, 'm', 2)}{_extent(case, pair, expected)}."
+    )
+
+
+def _extent(case: CaseFile, pair: BodyPair, expected: float) -> str:
+    """Words for how far small elements should go, where that is set and too little."""
+    extents = [
+        mesh.contact.extent
+        for name in (pair.upper.name, pair.lower.name)
+        if (mesh := case.bodies[name].mesh) is not None and mesh.contact is not None
+    ]
+    wanted = _EXTENT * expected
+    if not extents:
+        return ""
+    return f" within {format_si(max(wanted, min(extents)), 'm', 2)} of the first touch" * (
+        min(extents) < wanted
+    )
+
+
+def _rounded_down(value: float) -> float:
+    """Two digits."""
+    if not (isfinite(value) and value > 0.0):
+        return inf
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return floor(value / unit * (1.0 + 1e-12)) * unit
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, AccuracyWarning, stacklevel=3)

@@ -1,0 +1,361 @@
+"""What an impact report says, before it is laid out: the same words for screen and paper.
+
+Everything here is plain text; each renderer escapes it in its own way, because titles, names and
+the text of the case come from the user.
+"""
+
+from collections.abc import Callable, Sequence
+from math import isfinite
+
+import numpy as np
+
+from klack.analyses.impact.estimate_wording import (
+    ESTIMATE_COLUMNS,
+    estimate_rows,
+    estimate_sentence,
+)
+from klack.analyses.impact.figures import charts
+from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
+from klack.analyses.impact.pressure_figure import pressure_figure
+from klack.analyses.impact.pressure_view import study_views
+from klack.analyses.impact.pressure_wording import pressure_rows
+from klack.analyses.impact.record import ImpactStudy, LevelResult
+from klack.analyses.impact.section_figure import section_figure
+from klack.analyses.impact.summary import no_estimate
+from klack.analyses.impact.wording import answer
+from klack.analyses.measures import Measure, glossary
+from klack.analyses.page import page_of
+from klack.assembling.body_summary import BodySummary
+from klack.contact.restitution import Deviation
+from klack.report.chart import BarChart, Chart
+from klack.report.page import Content, Section, Table
+from klack.report.wording import (
+    count,
+    listed,
+    quantity,
+    sentence,
+    share,
+)
+
+__all__ = [
+    "body_table",
+    "report_content",
+    "size_verdict",
+]
+
+
+def report_content(study: ImpactStudy) -> Content:
+    """Put a study into words, tables and figures."""
+    found = charts(study)
+    by_name = {chart.name: chart for chart in found}
+    transfer = tuple(chart for chart in found if chart.name.startswith("transfer-"))
+
+    def named(*names: str) -> tuple[Chart | BarChart, ...]:
+        return tuple(by_name[name] for name in names if name in by_name)
+
+    sections = [_estimates(study), _computed(study)]
+    sections.append(_bodies_at_peak(study))
+    sections.append(Section(title="Force over time", charts=named("force")))
+    sections.append(_pressure(study))
+    sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
+    if transfer:
+        sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
+    sections.append(Section(title="Local contact law", charts=named("law", "approach")))
+    sections.append(
+        Section(title="Energy", charts=named("energy", "modes"), tables=(_energy_table(study),))
+    )
+    sections.append(Section(title="Motion", charts=named("motion")))
+    return page_of(
+        study,
+        "Dry impact",
+        answer=answer(study),
+        numbers=_number_table(study),
+        sections=sections,
+        definitions=_definitions(study),
+        limits=_limits(study),
+    )
+
+
+def _bodies_at_peak(study: ImpactStudy) -> Section:
+    """Picture of the full order; without it, why there is none."""
+    title = "The bodies at peak force"
+    if study.sections:
+        return Section(title=title, picture=section_figure(study))
+    text = "No picture: the displacement of the whole bodies is known at the level 'full' only, "
+    if "full" in study.failures:
+        text += "which failed; see the warnings."
+    else:
+        text += (
+            "which was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies "
+            "with a mesh."
+        )
+    return Section(title=title, paragraphs=(text,))
+
+
+# --------------------------------------------------------------------------- tables
+
+
+def _number_table(study: ImpactStudy) -> Table:
+    """Quantities down, levels across; the deviation from the reference stands below the value."""
+    results = study.ordered
+    names = [result.level for result in results]
+    rows = [
+        (measure.title or measure.name, *(_number(study, measure, result) for result in results))
+        for measure in LEVEL_MEASURES
+        if measure.page
+    ]
+    rows += [
+        (measure.title, *(_apart(study, measure, name) for name in names))
+        for measure in DEVIATION_MEASURES
+        if measure.page and study.deviations
+    ]
+    heads = [
+        result.label + _standing(study, name) for name, result in zip(names, results, strict=True)
+    ]
+    return Table(columns=("", *heads), rows=tuple(rows))
+
+
+def _standing(study: ImpactStudy, name: str) -> str:
+    """What a level is for the others, below its name."""
+    result = study.levels[name]
+    if result.measures.cut_off:
+        return "\n(cut off)"
+    if result.doubts:
+        return "\n(no reference, see warnings)"
+    return "\n(reference)" if name == study.reference and len(study.levels) > 1 else ""
+
+
+def _number(study: ImpactStudy, measure: Measure[LevelResult], result: LevelResult) -> str:
+    """Value of a level, and below it how far it is from the reference."""
+    cell = measure.on_page(result)
+    found = study.deviations.get(result.level)
+    apart = next((item for item in DEVIATION_MEASURES if item.key == measure.key), None)
+    return cell if found is None or apart is None else f"{cell}\n{apart.on_page(found)}"
+
+
+def _apart(study: ImpactStudy, measure: Measure[Deviation], name: str) -> str:
+    """What is no number of one level alone."""
+    found = study.deviations.get(name)
+    return "–" if found is None else measure.on_page(found)
+
+
+def _computed(study: ImpactStudy) -> Section:
+    contact, law = study.contact, study.law
+    facts = [
+        ("surfaces", contact.surfaces),
+        ("speed at the start", f"{study.speed:.4g} m/s"),
+        ("gap at the start", quantity(study.gap, "m", 3)),
+    ]
+    if contact.points:  # none where bodies meet at ports
+        facts += [
+            ("contact points", count(contact.points)),
+            ("half width at peak force", quantity(contact.half_width, "m", 3)),
+            (
+                "element size over half width",
+                f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
+            ),
+            ("contact points across", str(contact.points_across or "–")),
+            ("doubts about the contact", "\n".join(contact.doubts) or "–"),
+        ]
+    facts.append(("local law", law.kind))
+    return Section(
+        title="What was computed from what",
+        tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
+    )
+
+
+def _estimates(study: ImpactStudy) -> Section:
+    title = "How good is the reduced level?"
+    if reason := no_estimate(study):
+        return Section(title=title, paragraphs=(sentence(reason),))
+    if not study.estimates:
+        return Section(title=title)
+    return Section(
+        title=title,
+        paragraphs=(estimate_sentence(study),),
+        tables=(Table(columns=ESTIMATE_COLUMNS, rows=estimate_rows(study)),),
+    )
+
+
+def _pressure(study: ImpactStudy) -> Section:
+    title = "Pressure in the contact"
+    views = study_views(study)
+    if not views:
+        return Section(title=title)
+    columns = ("", *(view.title for view in views))
+    return Section(
+        title=title,
+        picture=pressure_figure(views),
+        tables=(Table(columns=columns, rows=pressure_rows(views)),),
+    )
+
+
+def body_table(bodies: Sequence[BodySummary]) -> Table:
+    """Model, material, mass, mesh and modes: one column per body."""
+    return Table(
+        columns=("", *(body.name for body in bodies)),
+        rows=tuple((title, *(text(body) for body in bodies)) for title, text in _BODY_ROWS),
+    )
+
+
+def size_verdict(ratio: float) -> str:
+    """Judge the element size across the contact over its half width."""
+    if not np.isfinite(ratio):
+        return "not known"
+    return "good" if ratio <= 1 else "coarse" if ratio <= 1.5 else "too coarse"
+
+
+def _mesh(body: BodySummary) -> str:
+    if body.elements:
+        return f"{count(body.elements)} elements, {count(body.nodes)} nodes"
+    return f"{count(body.nodes)} nodes" if body.nodes else "none"
+
+
+def _modes(body: BodySummary) -> str:
+    if not body.frequencies.size:
+        return "none"
+    low, high = (quantity(value, "Hz", 3) for value in body.frequencies[[0, -1]])
+    return f"{body.frequencies.size}\n{low} to {high}"
+
+
+_BODY_ROWS: tuple[tuple[str, Callable[[BodySummary], str]], ...] = (
+    ("model", lambda body: body.model),
+    ("geometry", lambda body: body.source),
+    ("support", lambda body: body.support),
+    ("material", lambda body: body.material),
+    ("mass", lambda body: quantity(1e3 * body.mass, "g")),
+    ("mesh", lambda body: f"{_mesh(body)}\n{count(body.dofs)} degrees of freedom"),
+    ("kept elastic modes", _modes),
+    ("contact compliance in these modes", lambda body: share(body.compliance_share)),
+)
+
+
+_ROUND_OFF = 1e-12
+"""Share of the initial energy below which an energy is zero."""
+
+
+def _energy_table(study: ImpactStudy) -> Table:
+    results = study.ordered
+    names = dict.fromkeys(name for result in results for name in result.energies)
+    rows = []
+    for name in names:
+        if not any(result.energies.get(name) for result in results):
+            continue  # zero everywhere says nothing
+        cells = []
+        for result in results:
+            initial = next(iter(result.energies.values()))
+            value = result.energies.get(name)
+            if value is not None and abs(value) < _ROUND_OFF * initial:
+                value = 0.0
+            text = "–" if value is None else quantity(value, "J")
+            if value is not None and initial > 0:
+                text += f"\n{share(value / initial, 2)}"
+            cells.append(text)
+        rows.append((name, *cells))
+    residual = [f"{result.energy_residual:.1e}".replace("-", "−") for result in results]
+    rows.append(("residual of the ledger", *residual))
+    return Table(columns=("", *(result.label for result in results)), rows=tuple(rows))
+
+
+# --------------------------------------------------------------------------- words
+
+
+def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    return (
+        *glossary(measure for measure in LEVEL_MEASURES if measure.page),
+        *glossary(measure for measure in DEVIATION_MEASURES if measure.page),
+        (
+            "spectrum",
+            "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "
+            "f t) dt| in N s, without a window (the force begins and ends at zero), as a level "
+            "relative to 1 µN s: 20 lg(|F|/1 µN s). A third-octave level is the integral of "
+            "2 |F|² over the band (IEC 61260-1, base ten) relative to 1 pN² s; all bands together "
+            "hold the integral of F² over time.",
+        ),
+        (
+            "local law",
+            "Force over indentation of the reduced contact. The consistent law is the static "
+            "approach of the complete bodies minus what the kept modes already yield.",
+        ),
+        *_definitions_point_by_point(study),
+    )
+
+
+def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    """Of words that only stand in reports with contact points of their own."""
+    found = []
+    if "interface" in study.levels or study.estimates:
+        found.append(
+            (
+                "interface level",
+                "Both bodies as modes, what the modes miss as a static compliance between all "
+                "contact points, and the contact decided point by point in every step: open, or "
+                "closed and never pulling. It covers eccentric, tilted and partial contact.",
+            )
+        )
+    if study.estimates:
+        found.append(
+            (
+                "estimated error",
+                "Deviation of a reduced level from one interface-level run at the same condition, "
+                "with more modes than the reduced level keeps. It holds the error of the local law "
+                "and of the modes left out, not that of the mesh.",
+            )
+        )
+    if any(result.pressure is not None for result in study.levels.values()):
+        found.append(
+            (
+                "pressure",
+                "Force of a contact point, normal to the surface, over its area. How well it is "
+                "resolved depends on the elements across the contact (see Resolution); sums such "
+                "as the line load are far more accurate than the pressure at one point.",
+            )
+        )
+    return tuple(found)
+
+
+def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
+    tops = [
+        f"{quantity(float(body.frequencies[-1]), 'Hz', 3)} ({body.name})"
+        for body in study.bodies
+        if body.frequencies.size
+    ]
+    limits = [
+        (
+            "Physics",
+            "Linear elastic, isotropic bodies with small deformations; frictionless contact of "
+            "smooth surfaces; no fluid, no roughness, no plastic flow.",
+        ),
+        (
+            "Reduced level",
+            "Motion and force along the axis, with one pressure pattern. Eccentric, tilted or "
+            "partial contact is outside its assumption, and no number of modes makes up for that: "
+            "the interface level is made for it.",
+        ),
+        (
+            "Resolution",
+            f"The elements across the contact are {study.contact.size_ratio:.2g} half widths long; "
+            "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: agreement "
+            "between them says nothing about the error of the meshes themselves."
+            if isfinite(study.contact.size_ratio)
+            else "The bodies meet at ports, without contact points: neither their models nor the "
+            "local law are checked against a mesh.",
+        ),
+    ]
+    if tops:
+        limits.append(
+            (
+                "Frequency",
+                f"The highest kept modes lie at {listed(tops)}. Above the lower of them the "
+                "reduced level follows the bodies only through their static compliance.",
+            )
+        )
+    limits.append(
+        (
+            "Damping",
+            "Losses in joints, fluid and material are contained only as far as the case gives "
+            "modal damping; the energy left in vibration therefore rings longer than in a real "
+            "valve.",
+        )
+    )
+    return tuple(limits)

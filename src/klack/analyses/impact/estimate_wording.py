@@ -1,0 +1,77 @@
+"""How good a reduced level is: its estimated error, beside the true one where that is known."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+from klack.analyses.impact.measures import DEVIATION_MEASURES
+from klack.analyses.impact.record import ImpactStudy
+from klack.contact.restitution import Deviation
+
+__all__ = ["ESTIMATE_COLUMNS", "estimate_rows", "estimate_sentence"]
+
+_SHOWN = DEVIATION_MEASURES[:5]
+ESTIMATE_COLUMNS = ("", *(measure.name for measure in _SHOWN))
+
+_GOOD, _FAIR = 0.01, 0.05
+"""The largest error up to which a level counts as good, and as fair."""
+
+
+def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
+    """One row per reduced level; the true deviation from the full order in small letters."""
+    rows = []
+    for name, estimate in study.estimates.items():
+        cells = _numbers(estimate)
+        true = _true(study, name)
+        if true is not None:
+            pairs = zip(cells, _numbers(true), strict=True)
+            cells = [f"{cell}\ntrue: {other}" for cell, other in pairs]
+        label = study.levels[name].label if name in study.levels else name
+        rows.append((label, *cells))
+    return tuple(rows)
+
+
+def estimate_sentence(study: ImpactStudy) -> str:
+    """Say in plain words whether the reduced level can be used here; empty without an estimate."""
+    if not study.estimates:
+        return ""
+    name = "reduced" if "reduced" in study.estimates else next(iter(study.estimates))
+    estimate, true = study.estimates[name], _true(study, name)
+    text = (
+        f"Compared with one run of the {study.estimate_basis}, at the same condition, the "
+        f"'{name}' level is off by {_off(estimate)}: {_verdict(estimate, study.contact.doubts)}."
+    )
+    if true is not None:
+        text += f" Compared with the full order, which was run too, it is off by {_off(true)}."
+    return text
+
+
+def _true(study: ImpactStudy, name: str) -> Deviation | None:
+    return study.deviations.get(name) if study.reference == "full" else None
+
+
+def _numbers(deviation: Deviation) -> list[str]:
+    return [measure.on_page(deviation) for measure in _SHOWN]
+
+
+def _off(deviation: Deviation) -> str:
+    peak, time, impulse, restitution, _ = _numbers(deviation)
+    return (
+        f"{peak} in peak force, {time} in contact time, {impulse} in impulse and {restitution} in "
+        "restitution"
+    )
+
+
+def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
+    """Judge the largest of the four errors, unless the contact itself is in doubt."""
+    if doubts:
+        return (
+            "both share the same contact, which cannot be relied on, because "
+            f"{' and '.join(doubts)}"
+        )
+    errors = [deviation.peak_force, deviation.contact_time, deviation.impulse]
+    worst = max(abs(value) for value in (*errors, deviation.restitution) if isfinite(value))
+    if worst <= _GOOD:
+        return "good enough to rely on"
+    if worst <= _FAIR:
+        return "good enough for comparisons, not for the last per cent"
+    return "too far off; use the interface level for this condition"

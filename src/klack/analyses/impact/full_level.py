@@ -1,0 +1,157 @@
+"""One impact with every degree of freedom."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from klack.analyses.impact.levels import level_result
+from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.record import LevelResult
+from klack.assembling.damping_choice import damping_of, is_damped
+from klack.assembling.problem import ContactProblem
+from klack.assembling.reduced_pair import starting_gap
+from klack.case.schema import (
+    Case,
+)
+from klack.contact.history import BodyEnergy
+from klack.contact.mortar import ContactSpace
+from klack.contact.statics import ReachError
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.progress import Progress
+from klack.transient.body_damping import BodyDamping, body_damping
+from klack.transient.full_order import simulate_full_order
+from klack.transient.result import FullOrderResult, Snapshots
+
+__all__ = ["run_full", "simulate_in_full"]
+
+
+def simulate_in_full(
+    problem: ContactProblem,
+    *,
+    kept: Mapping[str, Modes],
+    progress: Progress,
+    threads: int | None,
+    space: ContactSpace | None = None,
+    longest_period: float = 0.0,
+    snapshots: Snapshots | None = None,
+) -> FullOrderResult:
+    """Move the bodies of a case with every degree of freedom.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    kept : mapping of body name to Modes
+        Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
+        there.  Only damped bodies are looked up.
+    progress : callable
+    threads : int or None
+    space : ContactSpace, optional
+        Other contact points of the same surfaces than those of the static contact.
+    longest_period : float [s]
+    snapshots : Snapshots, optional
+        Both as in :func:`klack.transient.full_order.simulate_full_order`.
+
+    Raises
+    ------
+    ReachError
+        Where the motion reaches farther than the contact points.
+    """
+    case, pair = problem.case, problem.pair
+    spring = case.motion.spring
+    stiffness = 0.0 if spring is None else spring.stiffness
+    progress("full order", 0.0)
+    return simulate_full_order(
+        pair.upper,
+        pair.lower,
+        problem.space if space is None else space,
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.full_step,
+        # the preload is the force at first touch; a gap above it the spring pushes harder
+        axial_force=-(case.motion.closing_force + stiffness * starting_gap(case)),
+        spring_stiffness=stiffness,
+        damping=(_damping(case, pair.upper, kept), _damping(case, pair.lower, kept)),
+        longest_period=longest_period,
+        threads=threads or 2,
+        progress=lambda fraction: progress("full order", fraction),
+        snapshots=snapshots,
+    )
+
+
+def run_full(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    kept: Mapping[str, Modes],
+    progress: Progress,
+    threads: int | None,
+) -> tuple[LevelResult, FullOrderResult]:
+    """Impact with every degree of freedom, on as many contact points as the motion reaches.
+
+    ``kept`` as in :func:`simulate_in_full`.
+    """
+    case, pair, space = problem.case, problem.pair, problem.space
+    while True:
+        try:
+            result = simulate_in_full(
+                problem,
+                kept=kept,
+                space=space,
+                longest_period=_longest_period(pools[pair.upper.name]),
+                progress=progress,
+                threads=threads,
+            )
+        except ReachError as error:
+            space = problem.wider(space, error)
+        else:
+            break
+    history = replace(
+        result.history,
+        ledger=replace(
+            result.history.ledger,
+            bodies=tuple(
+                _with_modes(energy, body, pools[body.name], result)
+                for energy, body in zip(
+                    result.history.ledger.bodies, (pair.upper, pair.lower), strict=True
+                )
+            ),
+        ),
+    )
+    statistics = result.statistics
+    level = level_result(
+        history,
+        level="full",
+        label=f"full order, {statistics.degrees_of_freedom} degrees of freedom",
+        dofs=statistics.degrees_of_freedom,
+        step=case.run.full_step,
+        wall_time=statistics.loop_time,
+        setup_time=statistics.set_up_time,
+        pressure=pressure_record(history, result.point_force, space.points, space.area),
+    )
+    return level, result
+
+
+def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:
+    if not is_damped(case, body.name):
+        return None
+    return body_damping(damping_of(case.bodies[body.name].damping), kept[body.name])
+
+
+def _longest_period(pool: Modes) -> float:
+    return float(2.0 * np.pi / pool.omega[0]) if len(pool.omega) else 0.0
+
+
+def _with_modes(
+    energy: BodyEnergy, body: ElasticBody, pool: Modes, result: FullOrderResult
+) -> BodyEnergy:
+    """Add the energy of every mode of the pool, from the fields at the end of the run."""
+    fields = next(item for item in result.fields if item.name == body.name)
+    weighted = body.M @ pool.shapes
+    q, v = weighted.T @ fields.end_displacement, weighted.T @ fields.end_velocity
+    return replace(
+        energy,
+        frequency=pool.frequency,
+        modal=0.5 * (v**2 + (pool.omega * q) ** 2),
+    )

@@ -1,0 +1,356 @@
+"""The interface level of a case: both bodies as modes, the contact point by point."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.impact.levels import level_result
+from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.record import LevelResult
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import selection_of
+from klack.assembling.problem import ContactProblem
+from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.schema import Case
+from klack.contact.gap_update import RigidGaps
+from klack.contact.mortar import ContactSpace
+from klack.contact.statics import ReachError, extended_compliance
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.mesh.rigid import rotation_matrix
+from klack.reduction.ports import Port
+from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
+from klack.transient.guide import Guide, guide_of_shaft
+from klack.transient.interface_model import (
+    InterfaceBody,
+    InterfaceContact,
+    InterfaceModel,
+    interface_model,
+)
+from klack.transient.interface_result import InterfaceResult
+from klack.transient.interface_run import simulate_interface
+
+__all__ = [
+    "CONTACT",
+    "OPPOSITE",
+    "ExactGaps",
+    "build_guide",
+    "build_interface",
+    "certificate_modes",
+    "exact_gaps",
+    "run_interface",
+    "simulate_case",
+    "within_reach",
+]
+
+_Result = TypeVar("_Result")
+
+CONTACT, OPPOSITE = "contact", "opposite"
+"""Names of the contact of a case and of that with the stop above."""
+
+_FEWEST = 30
+_RICHER = 2.0
+_MOST_RECORDS = 30_000_000
+
+
+def certificate_modes(case: Case) -> int:
+    """Modes of each body that the estimate of the error takes: twice those kept, or their pool.
+
+    Thirty at least.
+    """
+    kept = [_FEWEST / _RICHER]
+    for body in case.bodies:
+        choice = selection_of(case.reduction.choice(body))
+        if isinstance(choice, ByCount):
+            kept.append(choice.count)
+        elif isinstance(choice, ByParticipation):
+            kept.append(choice.pool / _RICHER)
+    return round(_RICHER * max(kept))
+
+
+def build_interface(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+    space: ContactSpace | None = None,
+    compliance: NDArray[np.float64] | None = None,
+) -> InterfaceModel:
+    """Interface-level model of a case.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        With its factorisations still there.
+    pools : mapping of body name to Modes
+    ports : pair of Port, optional
+        Contact ports of both bodies: needed when modes are chosen by participation.
+    count : int, optional
+        Take so many modes of each body, as far as the pool goes, instead of those of the case.
+    space : ContactSpace, optional
+        Other contact points of the same surfaces than those of the static contact.
+    compliance : array, shape (nc, nc), optional [m/N]
+        Static compliance of both bodies at these.
+    """
+    bodies = [
+        InterfaceBody(
+            body=body,
+            flexibility=flexibility,
+            modes=(modes := _kept(problem, body, pools[body.name], ports, count)),
+            damping=damping_of(problem.case.bodies[body.name].damping).ratios(modes.omega),
+        )
+        for body, flexibility in _sides(problem)
+    ]
+    moving, above = problem.pair.upper.name, problem.opposite
+    contacts = [
+        InterfaceContact(
+            name=CONTACT,
+            upper=moving,
+            lower=problem.pair.lower.name,
+            space=problem.space if space is None else space,
+            compliance=problem.static.compliance if space is None else compliance,
+        )
+    ]
+    if above is not None:
+        contacts.append(
+            InterfaceContact(
+                name=OPPOSITE,
+                upper=above.body.name,
+                lower=moving,
+                space=above.space,
+                compliance=above.static.compliance,
+            )
+        )
+    return interface_model(bodies, contacts)
+
+
+def within_reach(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    run: Callable[[InterfaceModel], _Result],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+) -> _Result:
+    """Run an interface-level model on as many contact points as the motion reaches.
+
+    The static contact bounds the approach of one quasi-static impact; waves, or a body that comes
+    back while its stop still swings, may go further.
+
+    Parameters
+    ----------
+    problem, pools, ports, count
+        As given to :func:`build_interface`.
+    run : callable
+        Given the model; called again, with twice the reach, after a :class:`ReachError`.
+
+    Raises
+    ------
+    ReachError
+        Where the case gives the reach, or has a stop above.
+    """
+    space: ContactSpace | None = None
+    compliance: NDArray[np.float64] | None = None
+    while True:
+        model = build_interface(
+            problem, pools, ports=ports, count=count, space=space, compliance=compliance
+        )
+        try:
+            return run(model)
+        except ReachError as error:
+            space = problem.wider(problem.space if space is None else space, error)
+            compliance = extended_compliance(
+                space, problem.static, problem.flexibility_upper, problem.flexibility_lower
+            )
+
+
+def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:
+    sides = [
+        (problem.pair.upper, problem.flexibility_upper),
+        (problem.pair.lower, problem.flexibility_lower),
+    ]
+    if problem.opposite is not None:
+        sides.append((problem.opposite.body, problem.opposite.flexibility))
+    return sides
+
+
+def exact_gaps(problem: ContactProblem) -> "ExactGaps":
+    """Gaps of all contact points on the curved faces, at any rigid placement of the moving body.
+
+    Raises
+    ------
+    InputError
+        For axisymmetric bodies.
+    """
+    pair, above = problem.pair, problem.opposite
+    centre = pair.upper.centre_of_mass
+    here = (pair.upper.mesh, pair.upper_surface)
+    seat = RigidGaps.of(problem.space, *here, pair.lower.mesh, pair.lower_surface, centre=centre)
+    if above is None:
+        return ExactGaps(seat=seat)
+    there = (above.body.mesh, above.surface)
+    stop = RigidGaps.of(above.space, *there, pair.upper.mesh, above.moving_surface, centre=centre)
+    return ExactGaps(seat=seat, stop=stop)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExactGaps:
+    """Gaps at a rigid placement of the moving body; see :func:`exact_gaps`.
+
+    Parameters
+    ----------
+    seat : RigidGaps
+        The moving body is body a.
+    stop : RigidGaps or None
+        Stop above: the moving body is body b, so body a is moved the opposite way.
+    """
+
+    seat: RigidGaps
+    stop: RigidGaps | None = None
+
+    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps, shape (nc,) [m], at a placement, shape (6,) [m], [rad]."""
+        gaps = self.seat(placement)
+        if self.stop is None:
+            return gaps
+        shift, rotation = placement[:3], placement[3:]
+        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+        return np.concatenate([gaps, self.stop(back)])
+
+
+def _kept(
+    problem: ContactProblem,
+    body: ElasticBody,
+    pool: Modes,
+    ports: tuple[Port, Port] | None,
+    count: int | None,
+) -> Modes:
+    choice: ModeSelection = selection_of(problem.case.reduction.choice(body.name))
+    if count is not None:
+        choice = ByCount(min(count, len(pool.omega)))
+    load = _load(problem, body, ports)
+    chosen = select(choice, pool.omega, pool.shapes.T @ load)
+    return Modes(pool.omega[chosen], pool.shapes[:, chosen])
+
+
+def _load(
+    problem: ContactProblem, body: ElasticBody, ports: tuple[Port, Port] | None
+) -> NDArray[np.float64]:
+    """Load pattern of a contact port, shape (n_dof, 1)."""
+    if problem.opposite is not None and body.name == problem.opposite.body.name:
+        static = problem.opposite.static
+        return static.load_patterns(0.7 * static.max_force)[0][:, None]
+    side = 0 if body.name == problem.pair.upper.name else 1
+    if ports is not None:
+        return ports[side].pattern[:, None]
+    return problem.static.load_patterns(0.7 * problem.static.max_force)[side][:, None]
+
+
+def build_guide(
+    problem: ContactProblem,
+    model: InterfaceModel,
+    pools: Mapping[str, Modes],
+    *,
+    ports: tuple[Port, Port] | None = None,
+    count: int | None = None,
+) -> Guide | None:
+    """Guide of a case for its interface model, None without one.
+
+    Parameters
+    ----------
+    problem, pools, ports, count
+        As given to :func:`build_interface`.
+    model : InterfaceModel
+        What that returned.
+    """
+    asked: CaseGuide | None = problem.case.guide
+    if asked is None:
+        return None
+    body = problem.pair.upper
+    modes = _kept(problem, body, pools[body.name], ports, count)
+    law = asked.law
+    return guide_of_shaft(
+        model,
+        body,
+        np.hstack([body.rigid_modes, modes.shapes]),
+        problem.flexibility_upper,
+        surface=asked.surface,
+        heights=[height + problem.pair.shift for height in asked.heights],
+        clearance=asked.clearance,
+        stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
+        consistent=not isinstance(law, LinearGuideLaw),
+        friction=asked.friction,
+        viscous=asked.viscous,
+    )
+
+
+def simulate_case(
+    case: Case,
+    model: InterfaceModel,
+    guide: Guide | None = None,
+    *,
+    step: float | None = None,
+    duration: float | None = None,
+) -> InterfaceResult:
+    """Run the motion of a case once, without jumps."""
+    duration = case.run.duration if duration is None else duration
+    spring = case.motion.spring
+    gap = case.contact.gap or 0.0
+    step = case.run.interface_step if step is None else step
+    force = case.motion.force
+    if spring is not None:  # the preload is the force at first touch; a gap above it pushes harder
+        force += spring.preload + spring.stiffness * gap
+    return simulate_interface(
+        model,
+        speed=case.motion.speed,
+        duration=duration,
+        step=step,
+        force=force,
+        spring_stiffness=0.0 if spring is None else spring.stiffness,
+        guide=guide,
+        points=model.count * duration / step <= _MOST_RECORDS,
+    )
+
+
+def _compile(case: Case, model: InterfaceModel, guide: Guide | None) -> None:
+    """Take one step out of reach of the contact, so that the next run takes its own time only.
+
+    A run that ends within a contact leaves books that the next step would settle.
+    """
+    step, speed = case.run.interface_step, case.motion.speed
+    simulate_interface(
+        model, speed=speed, duration=step, step=step, guide=guide, height=10 * step * speed
+    )
+
+
+def run_interface(
+    problem: ContactProblem,
+    model: InterfaceModel,
+    guide: Guide | None,
+    *,
+    setup_time: float,
+) -> LevelResult:
+    """One impact at the interface level."""
+    case = problem.case
+    _compile(case, model, guide)
+    result = simulate_case(case, model, guide)
+    elastic = model.omega > 0
+    counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
+    guided = "" if guide is None else ", guided"
+    return level_result(
+        result.history,
+        level="interface",
+        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}",
+        dofs=model.mode_count,
+        step=case.run.interface_step,
+        wall_time=result.wall_time,
+        setup_time=setup_time,
+        pressure=pressure_record(
+            result.history, result.impacts[0].point_force, model.points, model.area
+        ),
+    )

@@ -1,0 +1,130 @@
+"""One impact at one level: lumped, or reduced in its variants."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from time import perf_counter
+
+from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.record import LevelResult, ModalEnergy, PressureRecord
+from klack.analyses.impact.trust import doubts_of
+from klack.assembling.problem import ContactProblem
+from klack.assembling.reduced_pair import PORT, ReducedPair, simulate_bodies
+from klack.case.schema import (
+    Case,
+)
+from klack.contact.history import ImpactHistory
+from klack.contact.laws import (
+    ContactLaw,
+    HuntCrossley,
+    LinearLaw,
+    gonthier_coefficient,
+)
+from klack.contact.restitution import Deviation, measure_impact
+from klack.errors import InputError
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+
+__all__ = ["deviations", "level_result", "lumped_level", "run_lumped", "run_reduced"]
+
+
+def run_reduced(
+    case: Case, pair: ReducedPair, *, level: str, label: str, setup_time: float
+) -> LevelResult:
+    """Impact of two reduced bodies."""
+    bodies = pair.upper, pair.lower, pair.law
+    simulate_bodies(case, *bodies)  # compiles, so that the time below is that of the run
+    begin = perf_counter()
+    history = simulate_bodies(case, *bodies)
+    wall_time = perf_counter() - begin
+    return level_result(
+        history,
+        level=level,
+        label=label,
+        dofs=pair.upper.mode_count + pair.lower.mode_count,
+        step=case.run.reduced_step,
+        wall_time=wall_time,
+        setup_time=setup_time,
+    )
+
+
+def run_lumped(problem: ContactProblem) -> LevelResult:
+    """Impact of rigid masses on one spring, with or without loss: the baseline."""
+    bodies = (problem.pair.upper, problem.pair.lower)
+    masses = {body.name: None if body.is_fixed else body.mass for body in bodies}
+    return lumped_level(problem.case, masses)
+
+
+def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
+    """Impact of rigid masses: upper body, then lower body; None for one that is held."""
+    if case.lumped is None:  # refused by require_levels already
+        raise InputError(
+            "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it to the case."
+        )
+    bodies = [
+        fixed_body(name, port=PORT) if mass is None else rigid_mass_body(name, mass, port=PORT)
+        for name, mass in masses.items()
+    ]
+    law: ContactLaw = LinearLaw(case.lumped.stiffness)
+    if case.lumped.restitution is not None:
+        alpha = gonthier_coefficient(case.lumped.restitution)
+        law = HuntCrossley(LinearLaw(case.lumped.stiffness), alpha / case.motion.speed)
+    begin = perf_counter()
+    history = simulate_bodies(case, bodies[0], bodies[1], law)
+    return level_result(
+        history,
+        level="lumped",
+        label=f"lumped: rigid masses, {case.lumped.stiffness / 1e6:.4g} N/um",
+        dofs=sum(body.mode_count for body in bodies),
+        step=case.run.reduced_step,
+        wall_time=perf_counter() - begin,
+        setup_time=0.0,
+    )
+
+
+def level_result(
+    history: ImpactHistory,
+    *,
+    level: str,
+    label: str,
+    dofs: int,
+    step: float,
+    wall_time: float,
+    setup_time: float,
+    pressure: PressureRecord | None = None,
+) -> LevelResult:
+    """Measures and energies of one computed impact."""
+    ledger = history.ledger
+    result = LevelResult(
+        level=level,
+        label=label,
+        history=history,
+        measures=measure_impact(history),
+        degrees_of_freedom=dofs,
+        steps=_steps(history, step),
+        step=step,
+        wall_time=wall_time,
+        setup_time=setup_time,
+        energies=ledger.parts(),
+        energy_residual=ledger.residual,
+        modal_energy=tuple(
+            ModalEnergy(body=body.name, frequency=body.frequency, energy=body.modal)
+            for body in ledger.bodies
+            if len(body.modal)
+        ),
+        pressure=pressure,
+    )
+    return replace(result, doubts=doubts_of(result))
+
+
+def _steps(history: ImpactHistory, step: float) -> int:
+    return round(len(history.force) * history.step / step)
+
+
+def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
+    """Compare every level with the reference: none where that has doubts, none that is cut off."""
+    if results[reference].doubts:
+        return {}
+    return {
+        name: compare_histories(results[reference].history, result.history)
+        for name, result in results.items()
+        if name != reference and not result.measures.cut_off
+    }

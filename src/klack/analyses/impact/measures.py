@@ -1,0 +1,356 @@
+"""Measures of one impact at one level, and of the difference of two levels."""
+
+from math import isfinite
+from operator import attrgetter
+
+from klack.analyses.impact.record import LevelResult
+from klack.analyses.measures import Column, Measure
+from klack.contact.restitution import Deviation
+from klack.report.wording import count, quantity
+
+__all__ = ["CONTACT_TIME", "DEVIATION_MEASURES", "LEVEL_MEASURES", "PEAK_FORCE", "RESTITUTION"]
+
+_THEORY = "theory/impact"
+
+
+def _whole(level: LevelResult) -> bool:
+    return not level.measures.cut_off
+
+
+def _cut(level: LevelResult) -> str:
+    return " (cut off)" if level.measures.cut_off else ""
+
+
+def _contact(level: LevelResult, number: int) -> str:
+    """Which contact of several a number belongs to."""
+    several = level.measures.sub_contacts
+    return f" (contact {number} of {several})" if several > 1 else ""
+
+
+PEAK_FORCE = Measure[LevelResult](
+    key="peak_force",
+    name="peak force",
+    symbol="F_max",
+    unit="N",
+    definition="Largest contact force of any time step of the first impact.",
+    page=True,
+    source=_THEORY,
+    read=lambda level: level.measures.peak_force,
+    column=Column("N", 1.0, ".2f"),
+    given=_whole,
+    remark=lambda level: _contact(level, level.measures.strongest) + _cut(level),
+    deviation="relative",
+)
+CONTACT_TIME = Measure[LevelResult](
+    key="contact_time",
+    name="contact time",
+    symbol="t_c",
+    unit="s",
+    definition="From first touch to the end of the first uninterrupted contact.",
+    note="Both instants are located inside the time steps.",
+    page=True,
+    source=_THEORY,
+    read=lambda level: level.measures.contact_time,
+    column=Column("us", 1e6, ".3f"),
+    given=_whole,
+    remark=lambda level: _contact(level, 1) + _cut(level),
+    deviation="relative",
+)
+RESTITUTION = Measure[LevelResult](
+    key="restitution",
+    name="restitution",
+    symbol="e",
+    unit="1",
+    definition="Velocity of the centre of mass after the impact over that before it (relative "
+    "velocity of both centres where both are free).",
+    note="It is a result of the waves that stay in the bodies, never an input, and not the "
+    "velocity of a point on the surface.",
+    page=True,
+    source=_THEORY,
+    read=lambda level: level.measures.restitution,
+    form="fixed",
+    column=Column("", 1.0, ".4f"),
+    deviation="difference",
+)
+
+LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
+    PEAK_FORCE,
+    CONTACT_TIME,
+    Measure(
+        key="impulse",
+        name="impulse",
+        symbol="J",
+        unit="N s",
+        definition="Integral of the contact force over the impact, with all contacts that follow "
+        "each other closely.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.measures.impulse,
+        column=Column("mN s", 1e3, ".4f"),
+        given=_whole,
+        remark=_cut,
+        deviation="relative",
+    ),
+    RESTITUTION,
+    Measure(
+        key="approach_speed",
+        name="approach speed",
+        title="speed at first touch",
+        symbol="v_0",
+        unit="m/s",
+        definition="Relative speed of the centres of mass at first touch.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.measures.approach_speed,
+    ),
+    Measure(
+        key="rebound_speed",
+        name="rebound speed",
+        symbol="v_1",
+        unit="m/s",
+        definition="Relative speed of the centres of mass after the last contact of the impact.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.measures.rebound_speed,
+    ),
+    Measure(
+        key="vibration_share",
+        name="vibration share",
+        title="vibration left behind",
+        symbol="E_v/E_0",
+        unit="1",
+        definition="Share of the energy of approach that is left in vibration.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.measures.vibration_share,
+        form="share",
+        digits=1,
+    ),
+    Measure(
+        key="sub_contacts",
+        name="sub contacts",
+        title="contacts in the impact",
+        symbol="n_c",
+        unit="1",
+        definition="Times that the bodies touch during the impact.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.measures.sub_contacts,
+        kind="whole",
+        form="count",
+    ),
+    Measure(
+        key="strongest_contact",
+        name="strongest contact",
+        symbol="k",
+        unit="1",
+        definition="Which contact of the impact has the peak force, counted from 1.",
+        source=_THEORY,
+        read=lambda level: level.measures.strongest,
+        kind="whole",
+        form="count",
+    ),
+    Measure(
+        key="total_contact_time",
+        name="total contact time",
+        symbol="t_tot",
+        unit="s",
+        definition="From first touch to the end of the last contact of the impact.",
+        source=_THEORY,
+        read=lambda level: level.measures.total_contact_time,
+        given=_whole,
+    ),
+    Measure(
+        key="peak_time",
+        name="peak time",
+        symbol="t_max",
+        unit="s",
+        definition="When the peak force acts, counted from first touch.",
+        source=_THEORY,
+        read=lambda level: level.measures.peak_time,
+        given=_whole,
+    ),
+    Measure(
+        key="first_touch",
+        name="first touch",
+        symbol="t_0",
+        unit="s",
+        definition="When the bodies first touch, from the start of the run.",
+        source=_THEORY,
+        read=lambda level: level.measures.first_touch,
+    ),
+    Measure(
+        key="dissipated_share",
+        name="dissipated share",
+        symbol="E_d/E_0",
+        unit="1",
+        definition="Losses in the contact and by damping over the energy of approach.",
+        source=_THEORY,
+        read=lambda level: level.measures.dissipated_share,
+        form="share",
+        digits=1,
+    ),
+    Measure(
+        key="cut_off",
+        name="cut off",
+        symbol="",
+        unit="1",
+        definition="Whether the run ends while the bodies touch.",
+        source=_THEORY,
+        read=lambda level: level.measures.cut_off,
+        kind="truth",
+        form="count",
+    ),
+    Measure(
+        key="highest_force",
+        name="highest force",
+        symbol="F",
+        unit="N",
+        definition="Highest force so far, also where the run is cut off.",
+        source=_THEORY,
+        read=lambda level: level.measures.peak_force,
+    ),
+    Measure(
+        key="energy_residual",
+        name="energy residual",
+        symbol="r_E",
+        unit="1",
+        definition="Energies at the end and losses, minus the energies at the start and the work "
+        "done, over the initial energy: round-off in a sound run.",
+        note="The time scheme of the full order loses a little energy by itself; that counts as "
+        "contact dissipation.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.energy_residual,
+        form="power",
+        column=Column("", 1.0, ".1e"),
+    ),
+    Measure(
+        key="degrees_of_freedom",
+        name="degrees of freedom",
+        symbol="n",
+        unit="1",
+        definition="Of the time integration: free displacements of the full order; modes and rigid "
+        "motions of the reduced and interface levels.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.degrees_of_freedom,
+        kind="whole",
+        form="count",
+        column=Column("", 1.0, "d"),
+    ),
+    Measure(
+        key="steps",
+        name="steps",
+        symbol="n_t",
+        unit="1",
+        definition="Time steps of the run.",
+        source=_THEORY,
+        read=lambda level: level.steps,
+        kind="whole",
+        form="count",
+    ),
+    Measure(
+        key="step",
+        name="step",
+        title="time step",
+        remark=lambda level: f"\n{count(level.steps)} steps",
+        symbol="dt",
+        unit="s",
+        definition="Length of a time step.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.step,
+        digits=3,
+    ),
+    Measure(
+        key="wall_time",
+        name="wall time",
+        title="computing time",
+        symbol="",
+        unit="s",
+        definition="Wall time of the time integration.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.wall_time,
+        digits=3,
+        column=Column("s", 1.0, ".3g"),
+    ),
+    Measure(
+        key="setup_time",
+        name="setup time",
+        title="preparation",
+        symbol="",
+        unit="s",
+        definition="Wall time of everything that the level needs before it can run.",
+        page=True,
+        source=_THEORY,
+        read=lambda level: level.setup_time if level.setup_time else None,
+        digits=3,
+    ),
+)
+"""In the order of JSON and of exported files."""
+
+
+def _of_level(measure: Measure[LevelResult]) -> Measure[Deviation]:
+    """How far two levels are apart in one of their measures."""
+    relative = measure.deviation == "relative"
+    return Measure(
+        key=measure.key,
+        name=measure.name,
+        symbol=measure.symbol,
+        unit="1",
+        definition="Relative: 0.01 is 1 %." if relative else "Difference.",
+        source=measure.source,
+        read=attrgetter(measure.key),
+        form="signed share" if relative else "signed",
+        digits=2 if relative else 4,
+    )
+
+
+DEVIATION_MEASURES: tuple[Measure[Deviation], ...] = (
+    *(_of_level(measure) for measure in LEVEL_MEASURES if measure.deviation),
+    Measure(
+        key="history_l2",
+        page=True,
+        name="force over time",
+        title="force over time, deviation",
+        symbol="",
+        unit="1",
+        definition="Root mean square difference from the reference during the contact, first touch "
+        "aligned, over the peak force of the reference.",
+        source=_THEORY,
+        read=lambda deviation: deviation.history_l2,
+        form="share",
+        digits=2,
+    ),
+    Measure(
+        key="third_octave_max",
+        page=True,
+        name="third-octave levels",
+        title="third-octave levels, deviation",
+        symbol="",
+        unit="dB",
+        definition="Largest level difference over all bands within 40 dB of the highest one.",
+        source="theory/spectra",
+        read=lambda deviation: deviation.third_octave_max_dB,
+        form="fixed",
+        digits=2,
+        remark=lambda deviation: (
+            f"\nup to {quantity(deviation.third_octave_up_to_Hz, 'Hz', 3)}"
+            if isfinite(deviation.third_octave_max_dB)
+            else ""
+        ),
+    ),
+    Measure(
+        key="third_octave_up_to",
+        name="third-octave levels, up to",
+        symbol="",
+        unit="Hz",
+        definition="Highest band compared.",
+        source="theory/spectra",
+        read=lambda deviation: deviation.third_octave_up_to_Hz,
+        digits=3,
+    ),
+)
+"""How far one level is from another."""

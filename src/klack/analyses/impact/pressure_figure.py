@@ -1,0 +1,131 @@
+"""Where the bodies carry while they touch: the forces of all contact points as pictures over time.
+
+Of bodies in three dimensions the upper row shows the line load, that is the force per length of the
+ring (or along x of a spot), over time, and the lower row the pressure at the peak force.
+Axisymmetric bodies have one row: the pressure across the contact over time.  White is no contact.
+Several runs stand side by side at one scale.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from klack.analyses.impact.contact_map import cell_edges
+from klack.analyses.impact.pressure_view import (
+    PressureView,
+    across_window,
+    common_cells,
+    line_load,
+    peak_pressure,
+    record_edges,
+)
+from klack.analyses.impact.pressure_wording import pressure_note
+from klack.report.printed import STYLE, plain, svg
+
+__all__ = ["PressureFigure", "draw_pressure", "pressure_figure"]
+
+Floats = NDArray[np.float64]
+
+_MAP = "viridis"
+_INK = "#22262b"
+_TITLE_LETTERS = 84
+"""Letters that stand side by side above all columns together."""
+_NOTHING = 1e-9
+"""Share of the highest value below which nothing is carried (round-off)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressureFigure:
+    """Picture (SVG) and what has to be said about it."""
+
+    image: bytes
+    note: str
+
+
+def pressure_figure(views: Sequence[PressureView]) -> PressureFigure:
+    """Draw one or more runs of one shape side by side, and say what is seen."""
+    return PressureFigure(draw_pressure(views), pressure_note(views))
+
+
+def draw_pressure(views: Sequence[PressureView]) -> bytes:
+    """Draw one or more runs of one shape side by side, as SVG."""
+    shape = views[0].places.shape
+    is_flat, is_spot = shape in ("meridian", "disc"), shape == "spot"
+    with rc_context(STYLE | {"axes.grid": False}):
+        # fields by runs; of spots, which are as high as wide, a row holds the fields of one run
+        rows, columns = (len(views), 2) if is_spot else (1 if is_flat else 2, len(views))
+        height = 0.3 + (2.6 if is_flat or is_spot else 2.3) * rows
+        figure = Figure(figsize=(6.7, height), layout="constrained")
+        grid = figure.subplots(rows, columns, squeeze=False)
+        grid = grid.T if is_spot else grid
+        longest = 1e6 * max(float(record_edges(view)[-1]) for view in views)
+        for axes, view in zip(grid[0], views, strict=True):
+            axes.set_title(plain(fill(view.title, _TITLE_LETTERS // columns)), fontsize=8)
+            axes.set_ylim(0.0, longest)
+            axes.axhline(1e6 * view.time[view.peak], color=_INK, linewidth=0.7, dashes=(4, 3))
+            axes.set_ylabel("time since first touch [µs]")
+        if is_flat:
+            _draw_profiles(figure, grid[0], views)
+        else:
+            _draw_unrolled(figure, grid, views)
+        if not is_spot:
+            for axes in grid[:, 1:].ravel():
+                axes.set_ylabel("")
+        return svg(figure)
+
+
+def _draw_profiles(figure: Figure, row: Any, views: Sequence[PressureView]) -> None:
+    """Pressure over the distance across an axisymmetric contact and time."""
+    pressures = [1e-6 * view.force / view.area for view in views]
+    norm = _common_scale(pressures)
+    low, high = across_window(views)
+    is_ring = views[0].places.shape == "meridian"
+    for axes, view, pressure in zip(row, views, pressures, strict=True):
+        order, edges = cell_edges(view.places)
+        mesh = _paint(axes, 1e6 * edges, 1e6 * record_edges(view), pressure[:, order], norm)
+        axes.set_xlim(1e6 * low, 1e6 * high)
+        axes.set_xlabel(f"distance {'across the ring' if is_ring else 'from the axis'} [µm]")
+    figure.colorbar(mesh, ax=row, aspect=25).set_label("pressure [MPa]")
+
+
+def _draw_unrolled(figure: Figure, grid: Any, views: Sequence[PressureView]) -> None:
+    """Line load over time above, pressure at peak force below."""
+    is_ring = views[0].places.shape == "ring"
+    cells = common_cells(views)
+    loads = [1e-3 * line_load(view, cut) for view, cut in zip(views, cells, strict=True)]
+    pressures = [1e-6 * peak_pressure(view, cut) for view, cut in zip(views, cells, strict=True)]
+    load_scale, pressure_scale = _common_scale(loads), _common_scale(pressures)
+    for column, (view, cut) in enumerate(zip(views, cells, strict=True)):
+        upper, lower = grid[:, column]
+        x = cut.along if is_ring else 1e6 * cut.along
+        above = _paint(upper, x, 1e6 * record_edges(view), loads[column], load_scale)
+        below = _paint(lower, x, 1e6 * cut.across, pressures[column], pressure_scale)
+        for axes in (upper, lower):
+            axes.set_xlim(x[0], x[-1])
+            if is_ring:
+                axes.set_xticks(range(0, 361, 90))
+            axes.set_xlabel("angle round the axis [°]" if is_ring else "x [µm]")
+        lower.set_ylabel("distance across the ring [µm]" if is_ring else "y [µm]")
+        lower.set_ylim(1e6 * cut.across[0], 1e6 * cut.across[-1])
+        lower.set_title(f"at peak force, after {1e6 * view.time[view.peak]:.3g} µs", fontsize=8)
+        if not is_ring:
+            lower.set_aspect("equal")
+    figure.colorbar(above, ax=grid[0], aspect=22).set_label("line load [N/mm]")
+    figure.colorbar(below, ax=grid[1], aspect=22).set_label("pressure [MPa]")
+
+
+def _common_scale(fields: Sequence[Floats]) -> Normalize:
+    return Normalize(0.0, max(float(values.max()) for values in fields))
+
+
+def _paint(axes: Any, x: Floats, y: Floats, values: Floats, norm: Normalize) -> Any:
+    """Cells in colour, as pixels; white where nothing is carried."""
+    carried = np.ma.masked_less_equal(values, _NOTHING * float(norm.vmax or 0.0))
+    return axes.pcolorfast(x, y, carried, norm=norm, cmap=_MAP, rasterized=True)

@@ -1,0 +1,266 @@
+"""What one impact study leaves behind: everything that a report or a comparison needs.
+
+The numbers are plain arrays and small frozen records, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+from klack.assembling.body_summary import BodySummary
+from klack.contact.history import ImpactHistory
+from klack.contact.restitution import Deviation, ImpactMeasures
+from klack.reduction.structure import Structure
+from klack.reduction.transfer import TransferComparison
+
+__all__ = [
+    "SETTLED",
+    "ContactSummary",
+    "ImpactStudy",
+    "LawSummary",
+    "LevelResult",
+    "ModalEnergy",
+    "PressureRecord",
+    "SectionPicture",
+]
+
+
+SETTLED = 0.02
+"""Largest spread of the force history [-] of a run that others may be measured by."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactSummary:
+    """Static frictionless contact of the two full bodies.
+
+    Parameters
+    ----------
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``.
+    points : int
+        Number of contact points (mortar multipliers).
+    half_width : float [m]
+        Half width of the contact at the highest force of the impact.
+    size_ratio : float [-]
+        Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    points_across : int
+        Contact points that carry across the whole width then; 0 where nobody knows.
+    doubts : tuple of str
+        Why no error can be judged on these meshes, each in a few words.
+    approach, force, area : array, shape (n,) [m], [N], [m^2]
+        Ladder from first touch.
+    """
+
+    surfaces: str
+    points: int
+    half_width: float
+    size_ratio: float
+    approach: NDArray[np.float64]
+    force: NDArray[np.float64]
+    area: NDArray[np.float64]
+    points_across: int = 0
+    doubts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawSummary:
+    """The local contact law of the reduced level and its classical alternative.
+
+    Parameters
+    ----------
+    kind : str
+        ``"consistent"``, ``"linear"``, ``"hertz"``.
+    indentation, force : array [m], [N]
+    share : array [-]
+        Share of the static compliance that the law carries, at each ``force``.
+    linear_stiffness : float [N/m]
+        Straight line through the law over ``fit_range``.
+    fit_range : tuple of float [N]
+    classical_stiffness : float [N/m]
+        Linear fit of a static submodel of the contact region alone.
+    classical_size : float [m]
+        Radius of that submodel.
+    """
+
+    kind: str
+    indentation: NDArray[np.float64]
+    force: NDArray[np.float64]
+    share: NDArray[np.float64]
+    linear_stiffness: float
+    fit_range: tuple[float, float]
+    classical_stiffness: float
+    classical_size: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalEnergy:
+    """Energy left in the modes of one body after separation: (n,) [Hz], (n,) [J]."""
+
+    body: str
+    frequency: NDArray[np.float64]
+    energy: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PressureRecord:
+    """Forces of all contact points during the first impact.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Middle of each recorded step.
+    points : array, shape (nc, dimension) [m]
+        Where the contact points are.
+    area : array, shape (nc,) [m^2]
+        The pressure of a point is its force over its area.
+    point_force : float32 array, shape (n, nc) [N]
+    """
+
+    time: NDArray[np.float64]
+    points: NDArray[np.float64]
+    area: NDArray[np.float64]
+    point_force: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LevelResult:
+    """One computed impact.
+
+    Parameters
+    ----------
+    level : str
+        ``lumped``, ``reduced``, ``reduced-attachment``, ``reduced-none``,
+        ``reduced-participation``, ``interface`` or ``full``.
+    label : str
+        What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
+    degrees_of_freedom, steps : int
+    step : float [s]
+    wall_time : float [s]
+        Of the time integration alone.
+    setup_time : float [s]
+        Of everything that this level needs before it can run (shared steps counted once each).
+    energies : mapping of str to float [J]
+        After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
+        entry is ``"initial kinetic"``.
+    energy_residual : float [-]
+        Ledger residual over the initial kinetic energy.
+    modal_energy : tuple of ModalEnergy
+    pressure : PressureRecord or None
+        Of levels that resolve the contact point by point.
+    doubts : tuple of str
+        Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
+    """
+
+    level: str
+    label: str
+    history: ImpactHistory
+    measures: ImpactMeasures
+    degrees_of_freedom: int
+    steps: int
+    step: float
+    wall_time: float
+    setup_time: float
+    energies: Mapping[str, float]
+    energy_residual: float
+    modal_energy: tuple[ModalEnergy, ...] = ()
+    pressure: PressureRecord | None = None
+    doubts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SectionPicture:
+    """Half-section of a body in the (r, z) plane at one instant, true to the mesh.
+
+    Parameters
+    ----------
+    body : str
+    points : array, shape (n, 2) [m]
+        Undeformed coordinates, distance from the axis and height.
+    displacement : array, shape (n, 2) [m]
+        In the same two directions, elastic and rigid.
+    magnitude : array, shape (n,) [m]
+        Length of the displacement vector (three components) that colours the picture.
+    triangles : int array, shape (t, 3)
+    edges : int array, shape (e, 2)
+        Element edges to draw as thin lines.
+    time : float [s]
+    closing : float [m]
+        Mean axial displacement of a body that is held nowhere; 0 for a held one.
+    """
+
+    body: str
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    magnitude: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    time: float
+    closing: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactStudy(CaseRecord):
+    """All levels of one dry impact, side by side.
+
+    Parameters
+    ----------
+    speed, gap : float [m/s], [m]
+    levels : mapping of str to LevelResult
+    reference : str
+        Level whose numbers are the answer: the finest one that nothing speaks against.
+    deviations : mapping of level to Deviation
+        From the reference; none where that has doubts itself.
+    estimates : mapping of level to Deviation
+        Estimated error of reduced levels: their deviation from one interface-level run.
+    estimate_basis : str
+        What that run was, in words; empty without one.
+    estimate_spread : float [-]
+        Difference of its force history (as ``history_l2``) from a run with half as many modes.
+        Above :data:`SETTLED` the run is no reference, and the estimates say little.
+    estimate_doubt : str
+        Why there is no estimate, although one was asked for.
+    structures : tuple of Structure
+        Held bodies as sources of sound; their stop is called ``"contact"``.
+    transfer : tuple of TransferComparison
+    sections : tuple of SectionPicture
+    failures : mapping of str to str
+        Why a level that was asked for has no result, by its name.
+    """
+
+    speed: float
+    gap: float
+    bodies: tuple[BodySummary, ...]
+    contact: ContactSummary
+    law: LawSummary
+    levels: Mapping[str, LevelResult]
+    reference: str
+    deviations: Mapping[str, Deviation]
+    transfer: tuple[TransferComparison, ...] = ()
+    sections: tuple[SectionPicture, ...] = ()
+    estimates: Mapping[str, Deviation] = field(default_factory=dict)
+    estimate_basis: str = ""
+    estimate_spread: float = 0.0
+    structures: tuple[Structure, ...] = ()
+    estimate_doubt: str = ""
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def estimates_settled(self) -> bool:
+        """Tell whether the estimates can be trusted."""
+        return self.estimate_spread <= SETTLED and not self.estimate_doubt
+
+    @property
+    def ordered(self) -> tuple[LevelResult, ...]:
+        """Results in the order of tables: the reference, interface, reduced, the others as run."""
+        best = (self.reference, "interface", "reduced")
+        first = dict.fromkeys(name for name in best if name in self.levels)
+        return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
+
+    def why_missing(self, name: str) -> str:
+        """Words behind "no result of this name": why it failed; empty if it was not asked for."""
+        text = self.failures.get(name, "")
+        return f": it failed ({' '.join(text.split())})" if text else ""

@@ -1,0 +1,412 @@
+"""``klack impact``: one dry impact at the levels asked for, laid over each other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.contact_check import ContactCheck, check_contact, ends_reached
+from klack.analyses.impact.full_level import run_full
+from klack.analyses.impact.given_models import run_given_impact
+from klack.analyses.impact.interface_level import (
+    build_guide,
+    certificate_modes,
+    run_interface,
+    simulate_case,
+    within_reach,
+)
+from klack.analyses.impact.levels import deviations, run_lumped, run_reduced
+from klack.analyses.impact.record import (
+    SETTLED,
+    ContactSummary,
+    ImpactStudy,
+    LawSummary,
+    LevelResult,
+    SectionPicture,
+)
+from klack.analyses.impact.section import section_picture
+from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
+from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
+from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
+from klack.analyses.record import case_fields, run_fields
+from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.modes import (
+    PARTICIPATION_POOL,
+    elastic_count,
+    kept_modes,
+    mode_pools,
+    participating,
+    selection_of,
+)
+from klack.assembling.problem import ContactProblem, build_problem
+from klack.assembling.reduced_pair import (
+    ReducedPair,
+    classical_stiffness,
+    first_stiffness,
+    own_pair,
+    reduce_pair,
+    static_curve,
+)
+from klack.assembling.structures import impact_structures
+from klack.cache.setting import result_cache
+from klack.case.schema import Case, SubmodelLocalLaw
+from klack.contact.history import ImpactHistory
+from klack.contact.laws import LinearLaw
+from klack.contact.restitution import Deviation
+from klack.contact.submodel import LocalStiffness
+from klack.elasticity.eigen import Modes
+from klack.errors import InputError
+from klack.progress import Progress, silent
+from klack.reduction.reduce import Correction
+from klack.reduction.transfer import TransferComparison
+from klack.stages import (
+    StageClock,
+    collected_warnings,
+    for_comparison,
+    warnings_of,
+)
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.result import FullOrderResult
+from klack.units import format_si
+
+__all__ = ["run_impact"]
+
+# What a reduced level needs before it can run, beyond meshes and matrices.
+_SET_UP = ("factorise", "static contact", "modes", "reduced")
+_CORRECTIONS: Mapping[str, Correction] = {
+    "reduced-participation": "consistent",
+    "reduced-attachment": "attachment",
+    "reduced-none": "none",
+}
+_USUAL_STIFFNESS = 1e9
+"""Contact stiffness [N/m] that the literature puts beside modes, corrected or not."""
+
+
+def run_impact(
+    case: Case,
+    *,
+    levels: Sequence[str],
+    certify: bool = True,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> ImpactStudy:
+    """Compute one impact at several levels and compare them.
+
+    Parameters
+    ----------
+    case : Case
+    levels : sequence of str
+        Among :data:`klack.case.impact_sections.LEVELS`.
+    certify : bool
+        Estimate the error of reduced levels by one interface-level run with twice as many modes;
+        bodies without surfaces have no such level.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations; the full order moves two bodies side by side on two cores.
+
+    Returns
+    -------
+    ImpactStudy
+
+    Raises
+    ------
+    IncompleteImpactError
+        When a level fails: with the study of those that did not.
+    """
+    begin = perf_counter()
+    wanted = case.require_levels(levels)
+    _require_time_to_touch(case, case.contact.gap)
+    if not case.has_surfaces:
+        return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
+    clock = StageClock(progress, result_cache())
+    attempts = Attempts()
+    with collected_warnings() as notes:
+        problem = build_problem(case, clock, threads=threads)
+        _require_time_to_touch(case, problem.case.contact.gap)
+        case = problem.case
+        needed = [1]
+        if case.run.transfer is not None:
+            needed.append(TRANSFER_MODES)
+        if "reduced-participation" in wanted:
+            needed.append(PARTICIPATION_POOL)
+        reduced = [level for level in wanted if level.startswith("reduced")]
+        if certify and reduced:
+            needed.append(certificate_modes(case))
+        pools = mode_pools(problem, at_least=max(needed), progress=clock)
+        clock("reduced", 0.0)
+        with warnings_of("modes of the case"):
+            preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        peak = min(preview.pattern_force, problem.static.max_force)
+        own, classical = preview, None
+        if isinstance(case.contact.local_law, SubmodelLocalLaw):
+            classical = classical_stiffness(problem, peak)
+            own = own_pair(problem, pools, stiffness=classical.stiffness)
+        else:
+            what = "the stiffness of the contact zone alone"
+            classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
+        clock("radiating surfaces", 0.0)
+        structures = impact_structures(problem, pools, own)
+        clock("radiating surfaces", 1.0)
+        clock("reduced", 0.5)
+        results: dict[str, LevelResult] = {}
+        for level in wanted:
+            if level == "lumped":
+                with attempts.at(level):
+                    results[level] = run_lumped(problem)
+            elif level.startswith("reduced"):
+                with attempts.at(level), warnings_of(f"level '{level}'"):
+                    pair = own if level == "reduced" else _variant(level, problem, pools)
+                    setup = clock.spent(_SET_UP)
+                    results[level] = _run_variant(case, level, pair, setup_time=setup)
+        clock("reduced", 1.0)
+        if "interface" in wanted:
+            with attempts.at("interface"), warnings_of("level 'interface'"):
+                results["interface"] = _run_interface(problem, pools, own, clock)
+        certificate = None
+        if certify and reduced:
+            certificate = for_comparison(
+                "the estimate of the error",
+                lambda: _certificate(problem, pools, results, clock),
+            )
+        certificate = certificate or _Certificate()
+        transfer: tuple[TransferComparison, ...] = ()
+        if case.run.transfer is not None:
+            found = for_comparison(
+                "the comparison of transfer functions",
+                lambda: compare_transfer(problem, pools, own.ports, progress=clock),
+            )
+            transfer = found or ()
+        check = check_contact(case, problem.pair, problem.static, peak, _surfaces(case))
+        problem.close()
+        sections: tuple[SectionPicture, ...] = ()
+        if "full" in wanted:
+            with attempts.at("full"), warnings_of("level 'full'"):
+                results["full"], run = run_full(
+                    problem,
+                    pools,
+                    kept=kept_modes(problem, pools, own.ports),
+                    progress=clock,
+                    threads=threads,
+                )
+                sections = _sections(problem, run)
+        attempts.require_one(results)
+        check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
+    _take_better(results, certificate)
+    reference = best_level(results)
+    compared = deviations(results, reference)
+    missing = failure_notes(attempts.texts)
+    study = ImpactStudy(
+        **case_fields(case),
+        speed=case.motion.speed,
+        gap=case.contact.gap or 0.0,
+        **run_fields(begin, clock),
+        bodies=_summaries(problem, own),
+        contact=_contact_summary(problem, check),
+        law=_law_summary(own, classical, peak),
+        levels=results,
+        reference=reference,
+        deviations=compared,
+        transfer=transfer,
+        sections=sections,
+        warnings=(*missing, *notes, *trust_notes(results, reference, compared)),
+        failures=attempts.texts,
+        estimates=certificate.estimates,
+        estimate_basis=certificate.basis,
+        estimate_spread=certificate.spread,
+        estimate_doubt=certificate.doubt,
+        structures=structures,
+    )
+    if study.failures:
+        raise IncompleteImpactError(study)
+    return study
+
+
+def _require_time_to_touch(case: Case, gap: float | None) -> None:
+    flight = (gap or 0.0) / case.motion.speed
+    if not flight < case.run.duration:
+        drawn = case.contact.gap is None
+        at = f"{format_si(case.run.duration, 's')}, but first touch at {format_si(flight, 's')}"
+        if drawn:
+            at += f": the parts are drawn {format_si(gap or 0.0, 'm')} apart, without contact.gap"
+        raise InputError(
+            f"{case.path or 'case'}: run.duration",
+            got=at,
+            expected="a time that holds the impact",
+            hint="give contact.gap (for example 0 um): the upper body is then moved there."
+            if drawn
+            else "enlarge run.duration or make contact.gap smaller.",
+        )
+
+
+def _run_interface(
+    problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair, clock: StageClock
+) -> LevelResult:
+    clock("interface", 0.0)
+
+    def run(model: InterfaceModel) -> LevelResult:
+        guide = build_guide(problem, model, pools, ports=own.ports)
+        setup = clock.spent((*_SET_UP[:-1], "interface"))
+        return run_interface(problem, model, guide, setup_time=setup)
+
+    result = within_reach(problem, pools, run, ports=own.ports)
+    clock("interface", 1.0)
+    return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Certificate:
+    """Estimated errors, the run that they refer to, and how far that has settled itself."""
+
+    estimates: Mapping[str, Deviation] = field(default_factory=dict)
+    basis: str = ""
+    spread: float = 0.0
+    doubt: str = ""
+    level: LevelResult | None = None
+
+
+def _certificate(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    results: Mapping[str, LevelResult],
+    clock: StageClock,
+) -> _Certificate:
+    """Deviation of every reduced level from one interface-level run with more modes.
+
+    The same run with half as many modes tells whether it can serve as a reference.
+    """
+    clock("estimate of the error", 0.0)
+    whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
+    if not whole:
+        return _Certificate(doubt="the reduced level is cut off by the end of the run")
+    count = certificate_modes(problem.case)
+
+    def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
+        setup = clock.spent((*_SET_UP[:-1], "estimate of the error"))
+        return model, run_interface(problem, model, None, setup_time=setup)
+
+    def run_again(model: InterfaceModel) -> ImpactHistory:
+        return simulate_case(problem.case, model).history
+
+    with warnings_of(f"estimate of the error, {count} modes"):
+        model, level = within_reach(problem, pools, run, count=count)
+    history = level.history
+    clock("estimate of the error", 0.5)
+    with warnings_of(f"estimate of the error, {count // 2} modes"):
+        fewer = within_reach(problem, pools, run_again, count=count // 2)
+    elastic = model.omega > 0
+    counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
+    clock("estimate of the error", 1.0)
+    return _Certificate(
+        estimates={name: compare_histories(history, results[name].history) for name in whole},
+        basis=f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points",
+        spread=compare_histories(history, fewer).history_l2,
+        doubt=next(iter(level.doubts), ""),
+        level=level,
+    )
+
+
+def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> None:
+    """Take the run behind the estimates among the levels, where it puts the best of them right."""
+    level, best = certificate.level, best_level(results)
+    if level is None or level.doubts or certificate.spread > SETTLED:
+        return
+    if best not in certificate.estimates:
+        return
+    if disagreement(certificate.estimates[best]) > DISAGREEMENT:
+        results["interface"] = replace(level, label=f"{level.label}, run for the estimate")
+
+
+def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) -> ReducedPair:
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    selection = {name: selection_of(problem.case.reduction.choice(name)) for name in names}
+    if level == "reduced-participation":
+        selection = participating(names)
+    return reduce_pair(
+        problem,
+        pools,
+        correction=_CORRECTIONS[level],
+        selection=selection,
+        stiffness=_USUAL_STIFFNESS,
+    )
+
+
+def _run_variant(case: Case, level: str, pair: ReducedPair, *, setup_time: float) -> LevelResult:
+    counts = f"{elastic_count(pair.upper)} + {elastic_count(pair.lower)} modes"
+    words = ", ".join(filter(None, (_CORRECTION_WORDS[pair.upper.correction], _law_words(pair))))
+    if level == "reduced-participation":
+        words += ", modes by participation"
+    return run_reduced(
+        case, pair, level=level, label=f"reduced, {counts}, {words}", setup_time=setup_time
+    )
+
+
+_CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none": "no correction"}
+
+
+def _law_words(pair: ReducedPair) -> str:
+    if pair.local is not None:
+        return "consistent law"
+    if isinstance(pair.law, LinearLaw):
+        return f"{pair.law.stiffness / 1e6:.4g} N/um"
+    return "Hertz law"
+
+
+def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPicture, ...]:
+    time = float(run.history.edges[run.peak_index + 1])
+    bodies = (problem.pair.upper, problem.pair.lower)
+    return tuple(
+        section_picture(body.mesh, fields.peak_displacement, time, body.name)
+        for body, fields in zip(bodies, run.fields, strict=True)
+    )
+
+
+def _summaries(problem: ContactProblem, own: ReducedPair) -> tuple[BodySummary, ...]:
+    return tuple(
+        summarise_body(
+            problem.case, body, reduced, compliance_share=float(reduced.compliance_share[0])
+        )
+        for body, reduced in (
+            (problem.pair.upper, own.upper),
+            (problem.pair.lower, own.lower),
+        )
+    )
+
+
+def _surfaces(case: Case) -> str:
+    return f"{case.contact.moving} on {case.contact.stop}"
+
+
+def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSummary:
+    static = problem.static
+    return ContactSummary(
+        surfaces=_surfaces(problem.case),
+        points=static.space.count,
+        half_width=check.half_width,
+        size_ratio=check.size_ratio,
+        points_across=check.points_across,
+        doubts=check.doubts,
+        approach=static.approach,
+        force=static.force,
+        area=static.area,
+    )
+
+
+def _law_summary(pair: ReducedPair, classical: LocalStiffness | None, peak: float) -> LawSummary:
+    indentation, force = static_curve(pair)
+    fit_range = (0.5 * peak, peak)
+    load = np.linspace(*fit_range, 50)
+    slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
+    share = np.append(np.nan, pair.local.share) if pair.local else np.full(len(force), np.nan)
+    return LawSummary(
+        kind="consistent" if pair.local is not None else "given",
+        indentation=indentation,
+        force=force,
+        share=share,
+        linear_stiffness=float(slope),
+        fit_range=fit_range,
+        classical_stiffness=np.nan if classical is None else classical.stiffness,
+        classical_size=np.nan if classical is None else classical.size,
+    )

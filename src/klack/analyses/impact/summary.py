@@ -1,0 +1,153 @@
+"""The few numbers of a study that a script or a terminal wants."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.contact_doubts import contact_doubt, contact_to_json
+from klack.analyses.impact.measures import (
+    CONTACT_TIME,
+    DEVIATION_MEASURES,
+    LEVEL_MEASURES,
+    PEAK_FORCE,
+)
+from klack.analyses.impact.record import ImpactStudy, LevelResult
+from klack.analyses.json_results import ImpactJson
+from klack.analyses.measures import json_of
+from klack.contact.restitution import Deviation
+
+__all__ = [
+    "SUMMARY_COLUMNS",
+    "answer_line",
+    "estimate_lines",
+    "no_estimate",
+    "study_measured",
+    "study_to_json",
+    "study_told",
+    "summary_rows",
+]
+
+_TOLD = tuple(measure for measure in LEVEL_MEASURES if measure.column is not None)
+SUMMARY_COLUMNS = ("level", *(measure.head for measure in _TOLD))
+
+
+def study_to_json(study: ImpactStudy) -> ImpactJson:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        ``case``; ``complete`` and ``failures``: why levels have no numbers; ``answer``: the level
+        whose numbers to take; ``levels``: per level the numbers of the impact, with ``doubts`` that
+        make it no reference; ``deviation``: of ``reduced`` against the reference, None when there
+        is nothing to compare; ``deviations``: of every level that is not the reference;
+        ``estimated_error``: of every reduced level, by an interface-level run, None where that is
+        no reference; ``contact``: its mesh, with ``doubts`` that concern all levels; ``warnings``.
+        Numbers that do not exist (nan) are None, and so are peak force, contact time and impulse of
+        a run that ends in contact (``cut_off``): ``highest_force_N`` is what it had reached.
+    """
+    deviations = {name: _deviation(item) for name, item in study.deviations.items()}
+    return {
+        "schema": "klack-impact/1",
+        "case": study.case,
+        "complete": not study.failures,
+        "failures": dict(study.failures),
+        "answer": study.reference,
+        "levels": {name: _level(result) for name, result in study.levels.items()},
+        "deviation": deviations.get("reduced"),
+        "deviations": deviations,
+        "estimated_error": {
+            name: _deviation(item) if study.estimates_settled else None
+            for name, item in study.estimates.items()
+        },
+        "contact": contact_to_json(study.contact),
+        "warnings": list(study.warnings),
+    }
+
+
+def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
+    """What a terminal shows: the levels side by side, the answer, how good the others are."""
+    yield TextTable(title=study.title, columns=SUMMARY_COLUMNS, rows=summary_rows(study))
+    yield answer_line(study)
+    if doubt := contact_doubt(study.contact):
+        yield doubt
+    yield from estimate_lines(study)
+
+
+def study_measured(study: ImpactStudy) -> Iterator[Measured]:
+    """Every level with its measures."""
+    for name, level in study.levels.items():
+        yield name, level, LEVEL_MEASURES
+
+
+def answer_line(study: ImpactStudy) -> str:
+    """Say in one line which level is the answer, and what it says."""
+    level = study.levels[study.reference]
+    m = level.measures
+    begin = f"Answer (level '{study.reference}'): "
+    touch = f"{m.approach_speed:.4g} m/s at first touch"
+    if m.cut_off:
+        return (
+            f"{begin}{touch}; the run is cut off in contact, at {m.peak_force:.2f} N so far: "
+            "no peak force, no contact time, no restitution."
+        )
+    contacts = f", {m.sub_contacts} contacts" if m.sub_contacts > 1 else ""
+    return (
+        f"{begin}peak force {PEAK_FORCE.told(level)}, contact time {CONTACT_TIME.told(level)}"
+        f"{contacts}; {touch}, "
+        f"{100 * m.restitution:.2f} % of it after the impact."
+    )
+
+
+def no_estimate(study: ImpactStudy) -> str:
+    """Why the error of reduced levels was not estimated; empty where it was, or not asked for."""
+    if study.estimate_doubt:
+        return f"No estimate of the error: {study.estimate_doubt}"
+    if study.estimates and not study.estimates_settled:
+        return (
+            "No estimate of the error: the interface level itself has not settled (its force "
+            f"history changes by {100 * study.estimate_spread:.0f} % when the modes are doubled), "
+            "as when flat faces meet all at once. Compare with --level full."
+        )
+    return ""
+
+
+def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
+    """Say how good every reduced level is, one line each."""
+    if reason := no_estimate(study):
+        return (reason,)
+    return tuple(
+        f"Estimated error of '{name}': peak force {_percent(item.peak_force)}, contact time "
+        f"{_percent(item.contact_time)}, impulse {_percent(item.impulse)}, restitution "
+        f"{_signed(item.restitution, 4)} (against the {study.estimate_basis})."
+        for name, item in study.estimates.items()
+    )
+
+
+def _percent(value: float) -> str:
+    """Two significant digits, but nothing below a hundredth of a per cent."""
+    if not abs(value) < float("inf"):
+        return "unknown"
+    size = abs(100.0 * value)
+    digits = 2 if size < 1.0 else 1 if size < 10.0 else 0
+    return _signed(100.0 * value, digits) + " %"
+
+
+def _signed(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}" if abs(value) < float("inf") else "unknown"
+
+
+def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`SUMMARY_COLUMNS`, one per level, as text."""
+    return tuple(
+        (name, *(measure.cell(result) for measure in _TOLD))
+        for name, result in study.levels.items()
+    )
+
+
+def _level(result: LevelResult) -> dict[str, Any]:
+    return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts)}
+
+
+def _deviation(deviation: Deviation) -> dict[str, Any]:
+    return json_of(DEVIATION_MEASURES, deviation)

@@ -1,0 +1,111 @@
+"""Transfer functions of both bodies at the contact: full order against reduced."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.problem import ContactProblem
+from klack.case.schema import TransferSweep
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.progress import Progress
+from klack.reduction.damping import LossFactor
+from klack.reduction.full_order import full_order_receptance
+from klack.reduction.ports import Port
+from klack.reduction.receptance import Receptance, reduced_receptance
+from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_entry
+from klack.reduction.reduce import reduce_body
+from klack.reduction.selection import ByCount
+from klack.reduction.transfer import TransferComparison, compare_receptances
+
+__all__ = ["TRANSFER_MODES", "compare_transfer"]
+
+_COUNTS = (20, 50)
+TRANSFER_MODES = max(_COUNTS)
+"""Elastic modes of each body that the comparison needs."""
+
+# With less damping the notches between two points of the axis would decide the comparison.
+_LOSS_FACTOR = 0.01
+
+
+def compare_transfer(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port],
+    *,
+    progress: Progress,
+) -> tuple[TransferComparison, ...]:
+    """Compare 20 and 50 modes, with and without correction, with the full order.
+
+    Both carry the same structural damping, so that every peak and notch is finite.
+    """
+    sweep = problem.case.run.transfer or TransferSweep.model_validate(
+        {"from": "2 kHz", "to": "400 kHz", "points": 300}
+    )
+    frequencies = np.geomspace(sweep.lowest, sweep.highest, sweep.points)
+    comparisons = []
+    bodies = (
+        (problem.pair.upper, problem.flexibility_upper),
+        (problem.pair.lower, problem.flexibility_lower),
+    )
+    for i, ((body, flexibility), port) in enumerate(zip(bodies, ports, strict=True)):
+        progress("transfer functions", i / 2)
+        comparisons.append(_compare(body, flexibility, pools[body.name], port, frequencies))
+    progress("transfer functions", 1.0)
+    return tuple(comparisons)
+
+
+def _compare(
+    body: ElasticBody,
+    flexibility: Flexibility,
+    pool: Modes,
+    port: Port,
+    frequencies: NDArray[np.float64],
+) -> TransferComparison:
+    full = flexibility.remembered(
+        "full-order receptance",
+        (port.name, port.pattern, frequencies, _LOSS_FACTOR, pool.omega, pool.shapes),
+        lambda: full_order_receptance(
+            body,
+            [port],
+            frequencies,
+            loss_factor=_LOSS_FACTOR,
+            flexibility=flexibility,
+            modes=pool,
+        ),
+        entry_of_receptance,
+        receptance_of_entry,
+    )
+    candidates: list[Receptance] = []
+    for count in _COUNTS:
+        if count > len(pool.omega):
+            continue
+        reduced = reduce_body(
+            body,
+            [port],
+            modes=ByCount(count),
+            correction="consistent",
+            damping=LossFactor(eta=_LOSS_FACTOR),
+            modes_pool=pool,
+            flexibility=flexibility,
+        )
+        for with_residual, words in ((False, "modes alone"), (True, "modes with correction")):
+            candidates.append(
+                reduced_receptance(
+                    reduced,
+                    frequencies,
+                    with_residual=with_residual,
+                    loss_factor=_LOSS_FACTOR,
+                    label=f"{count} {words}",
+                )
+            )
+    return compare_receptances(
+        full.receptance,
+        candidates,
+        port.name,
+        body=body.name,
+        loss_factor=_LOSS_FACTOR,
+        reference_note=full.note,
+    )

@@ -1,0 +1,218 @@
+r"""Which level of an impact can be relied on: is its time step short enough, is its record whole.
+
+A step of the full order or of a contact law sees the first touch only at its end.  Measured on
+three impacts (docs, *full order*): with n steps per contact the peak force is low by up to
+:math:`40 / n^2`, so 100 steps keep half a per cent with a margin.  The trapezoidal rule of the full
+order also lengthens the periods of the bodies by :math:`(\omega h)^2 / 12`, which 26 steps per
+period keep below half a per cent; modal levels are exact there.
+"""
+
+from collections.abc import Mapping
+from math import isfinite, sqrt
+
+import numpy as np
+
+from klack.analyses.impact.record import LevelResult
+from klack.contact.history import ImpactHistory
+from klack.contact.restitution import Deviation, ImpactMeasures, find_contacts
+from klack.units import format_si
+
+__all__ = [
+    "DISAGREEMENT",
+    "best_level",
+    "disagreement",
+    "doubts_of",
+    "doubts_of_history",
+    "trust_notes",
+]
+
+DISAGREEMENT = 0.02
+"""Largest difference of two levels [-] up to which they say the same."""
+
+_STEPS_PER_CONTACT = 100
+_STEPS_OF_RISE = 5  # from a tenth to half of the peak; a half sine of 100 steps takes 13
+_STEPS_PER_PERIOD = 2.0 * np.pi / sqrt(12.0 * 0.005)
+_CARRIES = 0.05  # share of the impulse from which a contact has to be resolved
+_RINGS = 0.01  # share of the initial energy from which a mode has to be resolved
+
+_BEST = ("full", "interface", "reduced")
+_ALTERNATIVES = ("interface", "reduced", "reduced-participation")
+_KEYS = {"full": "run.full_step", "interface": "run.interface_step"}
+
+
+def best_level(results: Mapping[str, LevelResult]) -> str:
+    """Level whose numbers are the answer: the finest one that nothing speaks against.
+
+    Parameters
+    ----------
+    results : mapping of str to LevelResult
+        Not empty.  The lumped model and variants of the reduced one are never better than another.
+    """
+    variants = [name for name in results if name.startswith("reduced")]
+    known = [name for name in (*_BEST, *variants, *results) if name in results]
+    sound = [name for name in known if not results[name].doubts and name != "lumped"]
+    return next(iter([*sound, *known]))
+
+
+def disagreement(deviation: Deviation) -> float:
+    """Largest of the differences in peak force, contact time, impulse and restitution [-]."""
+    numbers = (
+        deviation.peak_force,
+        deviation.contact_time,
+        deviation.impulse,
+        deviation.restitution,
+    )
+    return max((abs(value) for value in numbers if isfinite(value)), default=0.0)
+
+
+def trust_notes(
+    results: Mapping[str, LevelResult], answer: str, deviations: Mapping[str, Deviation]
+) -> tuple[str, ...]:
+    """Say what speaks against levels, which of them is the answer, and which it puts right.
+
+    Parameters
+    ----------
+    results : mapping of str to LevelResult
+    answer : str
+        Name of the best level.
+    deviations : mapping of str to Deviation
+        From the best level.
+    """
+    doubted: dict[str, list[str]] = {}
+    for name, result in results.items():
+        for doubt in result.doubts:
+            doubted.setdefault(doubt, []).append(name)
+    notes = [f"{_named(names)}: {doubt}" for doubt, names in doubted.items()]
+    finer = [name for name in _BEST[: _rank(answer)] if name in results]
+    if results[answer].doubts and len(results) > 1:
+        notes.append("no level can be a reference: deviations of the others are not given.")
+    elif finer:
+        notes.append(
+            f"the answer is that of level '{answer}'; {_named(finer)} is no reference, see above."
+        )
+    others = {name: result for name, result in results.items() if name != answer}
+    second = best_level(others) if others else answer
+    for name in dict.fromkeys((*_ALTERNATIVES, second)):
+        if (
+            name in deviations
+            and name != "lumped"
+            and disagreement(deviations[name]) > DISAGREEMENT
+        ):
+            notes.append(_verdict(name, deviations[name], answer, results[answer]))
+    return tuple(notes)
+
+
+def _rank(level: str) -> int:
+    return _BEST.index(level) if level in _BEST else len(_BEST)
+
+
+def _named(names: list[str]) -> str:
+    return f"level{'s' * (len(names) > 1)} {', '.join(repr(name) for name in names)}"
+
+
+def _verdict(name: str, apart: Deviation, answer: str, best: LevelResult) -> str:
+    return (
+        f"level '{name}' is off by {100 * apart.peak_force:+.1f} % in peak force, "
+        f"{100 * apart.contact_time:+.1f} % in contact time and {apart.restitution:+.4f} in "
+        f"restitution from level '{answer}' ({best.label}). The answer is that of level "
+        f"'{answer}', not that of level '{name}'."
+    )
+
+
+def doubts_of(result: LevelResult) -> tuple[str, ...]:
+    """Reasons why a level cannot measure others; see :func:`doubts_of_history`."""
+    return doubts_of_history(
+        result.history,
+        result.measures,
+        step=result.step,
+        key=_KEYS.get(result.level, "run.reduced_step"),
+        periods=_periods(result) if result.level == "full" else np.zeros(0),
+    )
+
+
+def doubts_of_history(
+    history: ImpactHistory,
+    measures: ImpactMeasures,
+    *,
+    step: float,
+    key: str,
+    periods: np.ndarray,
+) -> tuple[str, ...]:
+    """Reasons why a run cannot measure others, sentences that end in what to try.
+
+    Parameters
+    ----------
+    history : ImpactHistory
+    measures : ImpactMeasures
+        Of this history.
+    step : float [s]
+        Of the integration.
+    key : str
+        Where a case gives the step.
+    periods : array [s]
+        Of the modes that ring and that the time integration does not take exactly.
+    """
+    if measures.cut_off:
+        return (
+            "the run ends before the bodies have parted: peak force, contact time and impulse are "
+            "cut off, and there is no restitution. Try: a longer run.duration, two to three times "
+            "the contact time.",
+        )
+    shortest = _shortest_contact(history, measures)
+    if shortest < _STEPS_PER_CONTACT * step:
+        return (
+            f"the time step is too coarse: {shortest / step:.3g} steps of {format_si(step, 's')} "
+            f"in a contact of {format_si(shortest, 's', 3)}; {_STEPS_PER_CONTACT} keep the peak "
+            f"force within 0.5 %. Try: {key}: {_rounded(shortest / _STEPS_PER_CONTACT)}.",
+        )
+    period = float(np.min(periods, initial=np.inf))
+    if period < _STEPS_PER_PERIOD * step:
+        return (
+            f"the time step is too coarse: {period / step:.3g} steps of {format_si(step, 's')} in "
+            f"a vibration of {format_si(1.0 / period, 'Hz', 3)} that takes part of the energy; "
+            f"{_STEPS_PER_PERIOD:.0f} keep its period within 0.5 %. Try: {key}: "
+            f"{_rounded(period / _STEPS_PER_PERIOD)}.",
+        )
+    if (rise := _rise(history, measures)) < _STEPS_OF_RISE * step:
+        return (
+            f"the force rises within {rise / step:.2g} steps of {format_si(step, 's')}, as where "
+            "flat faces meet all at once: its peak depends on step and mesh, impulse and "
+            f"restitution hardly do. Try: {key}: {_rounded(step / 4)}, and look whether the peak "
+            "settles.",
+        )
+    return ()
+
+
+def _shortest_contact(history: ImpactHistory, measures: ImpactMeasures) -> float:
+    """Duration of the shortest contact of the first impact that carries a share of it [s]."""
+    return min(
+        phase.duration
+        for phase in _phases(history, measures)
+        if np.sum(history.force[phase.first : phase.last]) * history.step
+        >= _CARRIES * measures.impulse
+    )
+
+
+def _rise(history: ImpactHistory, measures: ImpactMeasures) -> float:
+    """Time that the force takes from a tenth to half of the peak [s], before the peak."""
+    strongest = _phases(history, measures)[measures.strongest - 1]
+    force = history.force[strongest.first : strongest.last]
+    top = float(force.max())
+    return float(np.argmax(force >= 0.5 * top) - np.argmax(force >= 0.1 * top)) * history.step
+
+
+def _phases(history: ImpactHistory, measures: ImpactMeasures) -> list:
+    return list(find_contacts(history)[: measures.sub_contacts])
+
+
+def _periods(result: LevelResult) -> np.ndarray:
+    """Periods of the modes that hold a share of the energy [s]."""
+    initial = result.history.ledger.initial
+    frequency = [item.frequency[item.energy > _RINGS * initial] for item in result.modal_energy]
+    return 1.0 / np.concatenate([np.zeros(0), *frequency])
+
+
+def _rounded(step: float) -> str:
+    """Time step below the one given, in two digits that a case can hold."""
+    power = 10.0 ** (np.floor(np.log10(step)) - 1)
+    return format_si(float(np.floor(step / power) * power), "s", 2)

@@ -1,0 +1,71 @@
+"""Results that are not whole: levels of an impact that failed beside those that did not."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.stroke.missing import missing_notes
+from klack.analyses.stroke.record import StrokeStudy
+from klack.errors import ConvergenceError
+from klack.stages import FAILURES
+
+__all__ = ["Attempts", "IncompleteImpactError", "failure_notes", "missing_in"]
+
+
+class IncompleteImpactError(ConvergenceError):
+    """A level of an impact failed; ``study`` holds those that did not.
+
+    Parameters
+    ----------
+    study : ImpactStudy
+        Says in its ``failures`` and its warnings what is missing.
+    """
+
+    def __init__(self, study: ImpactStudy) -> None:
+        super().__init__("\n".join(failure_notes(study.failures)))
+        self.study = study
+
+
+class Attempts:
+    """Levels one after another: one that fails costs the others nothing."""
+
+    def __init__(self) -> None:
+        self.errors: dict[str, Exception] = {}
+
+    @contextmanager
+    def at(self, name: str) -> Iterator[None]:
+        """Keep the error of a level, to go on without it."""
+        try:
+            yield
+        except FAILURES as error:
+            self.errors[name] = error
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Which levels failed, and why."""
+        return {
+            name: str(error) or f"it ended with a {type(error).__name__}"
+            for name, error in self.errors.items()
+        }
+
+    def require_one(self, levels: Mapping[str, object]) -> None:
+        """Raise the first error where no level has a result."""
+        if not levels:
+            raise next(iter(self.errors.values()))
+
+
+def failure_notes(failures: Mapping[str, str]) -> tuple[str, ...]:
+    """Say which levels of an impact are missing, and why; empty if none is."""
+    return tuple(
+        f"level '{name}' failed, there are no numbers of it: {' '.join(text.split())}"
+        for name, text in failures.items()
+    )
+
+
+def missing_in(study: object) -> tuple[str, ...]:
+    """Say what is missing in a stored result, for commands that go on with it."""
+    if isinstance(study, ImpactStudy):
+        return failure_notes(study.failures)
+    if isinstance(study, StrokeStudy):
+        return missing_notes(study.variants, (), None)
+    return ()

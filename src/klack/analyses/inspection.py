@@ -1,0 +1,242 @@
+"""What is in a file of another program, before a case is written for it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from klack.assembling.assembled_bodies import assembled_body
+from klack.assembling.given_bodies import reduced_from_file
+from klack.case.bodies import CaseFile
+from klack.case.surface_names import require_surface_names
+from klack.errors import InputError
+from klack.input.existing_file import refuse_lfs_pointer
+from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.mesh import Mesh
+from klack.mesh.quality import corner_volume, mesh_summary
+from klack.mesh.step_content import StepContent, StepPart, step_content
+from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
+from klack.model_files.system_matrix import SystemMatrix, WhichMatrixError
+from klack.reduction.reduced_body import ReducedBody
+
+__all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
+
+Row = tuple[str, str, str]
+"""What, its name, its numbers in words."""
+
+
+STEP_ENDINGS = (".step", ".stp")
+
+INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
+"""Endings of the files that :func:`inspect_file` knows."""
+
+
+def inspect_file(
+    path: Path, unit_length: float | None = None, matrix: str | None = None
+) -> tuple[Row, ...]:
+    """What a STEP file, a mesh, a matrix or an FMU holds.
+
+    Parameters
+    ----------
+    path : Path
+        With one of the endings of :data:`INSPECTED`.
+    unit_length : float [m] or None
+        Of a mesh whose file does not name it.
+    matrix : str or None
+        Name of one matrix in a file of several; all of them without.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is of another kind.
+    """
+    ending = path.suffix.lower()
+    if not path.is_file():
+        hint = "check the spelling and the folder."
+        raise InputError(str(path), got="no such file", expected="a file", hint=hint)
+    refuse_lfs_pointer(path)
+    if ending in STEP_ENDINGS:
+        return tuple(_step_rows(step_content(path)))
+    if ending in MESH_FORMATS:
+        return tuple(_mesh_rows(read_mesh_file(path, unit_length, solids_only=True)))
+    if ending in MATRIX_FORMATS:
+        return tuple(_rows_of_matrices(path, matrix))
+    if ending == ".fmu":
+        return tuple(_fmu_rows(inspect_fmu(path)))
+    raise InputError(
+        str(path),
+        got=f"a file that ends in '{path.suffix}'",
+        expected=f"one of: {', '.join(dict.fromkeys(INSPECTED))}",
+        hint="klack inspect reads CAD, meshes, matrices and FMUs.",
+    )
+
+
+def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
+    """What other programs gave for the bodies of a case, checked as a run checks it.
+
+    Yields the name of each body and its rows.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read, for matrices and models that no body has, and, after the
+        rows of all bodies, for a surface that the case names and its file does not have.
+    """
+    known: dict[str, tuple[str, ...]] = {}
+    for name, body in case.bodies.items():
+        if body.reduced is not None:
+            yield name, tuple(_reduced_rows(reduced_from_file(case, name)))
+        elif body.matrices is not None:
+            yield name, assembled_body(case, name).rows()
+        elif body.geometry.mesh is not None:
+            mesh = body.geometry.mesh
+            solids = tuple(body.material) if isinstance(body.material, dict) else None
+            model = read_mesh_file(
+                mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
+            )
+            known[name] = tuple(model.mesh.surfaces)
+            yield name, tuple(_mesh_rows(model))
+        elif body.geometry.step is not None:
+            content = step_content(body.geometry.step.file)
+            known[name] = tuple(face.name for face in content.faces)
+            yield name, tuple(_step_rows(content))
+        else:
+            yield name, (("geometry", "", "meshed by klack when the case runs"),)
+    require_surface_names(case, known)
+
+
+def _reduced_rows(body: ReducedBody) -> Iterator[Row]:
+    elastic = body.frequencies[body.rigid_count :]
+    kind = "free" if body.rigid_count else "held"
+    yield "reduced model", kind, f"{len(elastic)} elastic modes, {body.rigid_count} rigid ones"
+    if body.rigid_count:
+        yield "mass", "", f"{body.mass * 1e3:.6g} g"
+    if len(elastic):
+        low, high = elastic.min() / 1e3, elastic.max() / 1e3
+        yield "frequencies", "", f"{low:.5g} to {high:.5g} kHz"
+    ratios = body.damping[body.rigid_count :]
+    if len(ratios):
+        low, high = (round(100 * float(z), 9) for z in (ratios.min(), ratios.max()))
+        yield "damping", "", f"{low:.3g} %" if low == high else f"{low:.3g} to {high:.3g} %"
+    static = np.diag(body.static_compliance)
+    for port, compliance, share in zip(body.port_names, static, body.compliance_share, strict=True):
+        yield (
+            "port",
+            port,
+            f"elastic compliance {compliance * 1e9:.4g} nm/N, {100 * share:.3g} % of it in the "
+            "modes",
+        )
+
+
+def _step_rows(content: StepContent) -> Iterator[Row]:
+    for solid in content.solids:
+        yield "solid", solid.name, f"{solid.size * 1e9:.6g} mm^3, {_box(solid)}"
+    for face in content.faces:
+        count = "" if face.count == 1 else f"{face.count} faces, "
+        yield "surface", face.name, f"{count}{face.size * 1e6:.5g} mm^2, {_box(face)}"
+    nameless = sum(not face.named for face in content.faces)
+    if nameless:
+        faces = "1 face" if nameless == 1 else f"{nameless} faces"
+        yield "note", "", f"{faces} without a name in the file: numbered by klack"
+
+
+def _box(part: StepPart) -> str:
+    """Box around a part, along each axis."""
+    spans = zip("xyz", part.low, part.high, strict=True)
+    return ", ".join(f"{axis} {_range(np.array([low, high]))}" for axis, low, high in spans)
+
+
+def _mesh_rows(model: MeshModel) -> Iterator[Row]:
+    mesh = model.mesh
+    summary = mesh_summary(mesh)
+    kind = {2: "axisymmetric (r, z)", 3: "three-dimensional"}[mesh.dimension]
+    yield "mesh", kind, f"{summary.nodes} nodes, {summary.elements} elements"
+    for family, count in summary.families.items():
+        yield "elements", family, str(count)
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    for axis, a, b in zip("rz" if mesh.dimension == 2 else "xyz", low, high, strict=True):
+        yield "extent", axis, _range(np.array([a, b]))
+    yield "edges", "", f"{summary.smallest_edge * 1e3:.3g} to {summary.largest_edge * 1e3:.3g} mm"
+    yield "worst element", f"quality {summary.worst_quality:.2f}", summary.worst_element
+    yield "volume", "", f"{corner_volume(mesh) * 1e9:.6g} mm^3"
+    for solid in mesh.solids:
+        count = sum(len(block.connectivity) for block in mesh.blocks if block.solid == solid)
+        material = model.sections.get(solid, "")
+        yield "solid", solid, f"{count} elements" + (f", material {material}" if material else "")
+    for name, surface in mesh.surfaces.items():
+        yield "surface", name, f"{surface.face_count} faces, {_around(mesh, surface.nodes)}"
+    for name, nodes in mesh.node_sets.items():
+        yield "node set", name, f"{len(nodes)} nodes, {_around(mesh, nodes)}"
+    for name, given in model.materials.items():
+        density = "none" if given.density is None else f"{given.density:.6g}"
+        yield (
+            "material",
+            name,
+            f"E {given.young:.6g}, nu {given.poisson:.4g}, density {density} (units of the file)",
+        )
+    for name, kind in model.foreign_materials.items():
+        yield "material", name, f"{kind}; klack computes isotropic materials only"
+    for kind, count in model.left_out.items():
+        yield "left out", kind, f"{count} elements; a case needs 'elements: solids-only' for them"
+
+
+def _rows_of_matrices(path: Path, name: str | None) -> Iterator[Row]:
+    """One matrix, or all of a file of several."""
+    try:
+        yield from _matrix_rows(read_matrix(path, name=name))
+        return
+    except WhichMatrixError as error:
+        if name is not None or len(error.names) < 2:
+            raise
+        names = error.names
+    for each in names:
+        try:
+            rows = tuple(_matrix_rows(read_matrix(path, name=each)))
+        except InputError as error:
+            rows = (("matrix", each, f"not usable: {error.got}"),)
+        yield from rows
+
+
+def _matrix_rows(found: SystemMatrix) -> Iterator[Row]:
+    A = found.matrix
+    yield "matrix", found.name, f"{A.shape[0]} rows, {A.nnz} entries, both triangles"
+    diagonal = A.diagonal()
+    yield "diagonal", "", f"{diagonal.min():.6g} to {diagonal.max():.6g} (units of the file)"
+    if found.rows is None:
+        yield "rows", "", "the file does not say which: give 'dofs', or x, y, z node after node"
+    else:
+        nodes = found.rows.node
+        numbers = f"{len(np.unique(nodes))} nodes, {nodes.min()} to {nodes.max()}"
+        ways = ", ".join(_WAYS.get(int(d), str(d)) for d in np.unique(found.rows.direction))
+        yield "rows", numbers, f"directions {ways}"
+    if found.held is not None and found.held.node.size:
+        yield "held", "", f"{found.held.node.size} constrained rows are left out of the file"
+    for note in found.notes:
+        yield "note", "", note
+
+
+_WAYS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}
+
+
+def _fmu_rows(fmu: FmuDescription) -> Iterator[Row]:
+    kind = "model exchange only: klack cannot run it" if fmu.model_exchange else "co-simulation"
+    yield "FMU", fmu.identifier, f"{kind}, FMI {fmu.version}.0"
+    for causality in ("input", "output", "parameter"):
+        for name, variable in fmu.variables.items():
+            if variable.causality == causality:
+                yield causality, name, variable.unit or "no unit"
+
+
+def _around(mesh: Mesh, nodes: np.ndarray) -> str:
+    """Where some nodes lie: their height and their distance from the axis."""
+    points = mesh.points[nodes]
+    radius = points[:, 0] if mesh.dimension == 2 else np.hypot(points[:, 0], points[:, 1])
+    return f"z {_range(points[:, -1])}, r {_range(radius)}"
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = (round(float(v) * 1e3, 7) + 0.0 for v in (values.min(), values.max()))
+    return f"{low:.5g} mm" if high - low < 1e-6 else f"{low:.5g} to {high:.5g} mm"

@@ -1,0 +1,1 @@
+"""What is heard of an impact or a stroke."""

@@ -1,0 +1,185 @@
+"""What the forces of the stops do to one held body: energy, mobility, hold, radiation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.air import Air
+from klack.acoustics.force_bands import force_bands
+from klack.acoustics.force_response import ModalResponse, modal_response
+from klack.acoustics.injected import injected_density, injected_energy
+from klack.acoustics.mobility import transfer_mobility
+from klack.acoustics.mount import Mount, mounted
+from klack.acoustics.plate import Plate
+from klack.acoustics.port_forces import port_forces
+from klack.acoustics.radiation import Efficiency, power_transfer
+from klack.acoustics.surface_bands import surface_spectra
+from klack.acoustics.third_octave import ThirdOctaves
+from klack.analyses.noise.balance import share_at
+from klack.analyses.noise.record import BodyNoise, Surface
+from klack.reduction.structure import Structure
+from klack.signals import TimeSeries
+
+__all__ = ["ASSUMED_DAMPING", "Surroundings", "body_noise", "port_transfers"]
+
+Floats = NDArray[np.float64]
+
+ASSUMED_DAMPING = 0.005
+"""Damping ratio of modes that sound, where the case gives none: a loss factor of 1 %."""
+_LOWEST, _HIGHEST = 20.0, 400e3  # [Hz] of mobilities
+_AUDIBLE = 24e3  # [Hz]
+_LINES, _ROUND_A_PEAK = 1200, 40
+_LONGEST = 4_000_000  # values of a spectrum that resolves every resonance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surroundings:
+    """What is below a held body, and the air.
+
+    Parameters
+    ----------
+    mount, plate : Mount, Plate or None
+    air : Air
+    efficiency : "piston" or "unity"
+    period : float [s]
+        From click to click.
+    share : array, shape (b,) [-]
+        Of the energy of the forces per band that is not balanced within the valve.
+    octaves : ThirdOctaves
+        The bands.
+    """
+
+    mount: Mount | None
+    plate: Plate | None
+    air: Air
+    efficiency: Efficiency
+    period: float
+    share: Floats
+    octaves: ThirdOctaves
+
+
+def body_noise(
+    structure: Structure,
+    stop_forces: Mapping[str, TimeSeries],
+    around: Surroundings,
+) -> BodyNoise | None:
+    """Vibration and radiation of one body; None if no stop pushes it.
+
+    Parameters
+    ----------
+    structure : Structure
+        Rigidly held, as the forces were computed.
+    stop_forces : mapping of stop to TimeSeries [N]
+    around : Surroundings
+        Of the radiation.
+    """
+    forces = port_forces(structure, stop_forces)
+    if not forces:
+        return None
+    moved = modal_response(structure, forces)
+    sounding = damped(structure)
+    bands = np.column_stack([around.octaves.low, around.octaves.high])
+    frequency = frequency_lines(structure, None, _LOWEST, _HIGHEST)
+    spectra = surface_spectra(sounding, forces, bands, mount=around.mount, plate=around.plate)
+    estimate = spectra.radiated(efficiency=around.efficiency, air=around.air)
+    bound = spectra.radiated(efficiency="unity", air=around.air)
+    velocity = spectra.face_velocity(period=around.period)
+    area = list(structure.group_area) + [np.nan] * (len(estimate.names) - len(structure.group_area))
+    ports = tuple(forces)
+    stops = dict(zip(structure.port_names, structure.port_stops, strict=True))
+    return BodyNoise(
+        name=structure.name,
+        mass=structure.mass,
+        highest_frequency=structure.highest_frequency,
+        modes=structure.omega.size,
+        ports=ports,
+        stops=tuple(stops[port] for port in ports),
+        injected=np.array([moved.injected[structure.port_index(port)] for port in ports]),
+        vibration_energy=moved.vibration_energy,
+        vibration_spectral=_by_mobility(structure, forces),
+        dissipated=float(moved.dissipated.sum()),
+        ringing=float(moved.ringing.sum()),
+        static_energy=_static_energy(moved),
+        residual=moved.residual,
+        assumed=sounding is not structure,
+        frequency=frequency,
+        mobility=np.array(
+            [[transfer_mobility(sounding, a, b, frequency) for b in ports] for a in ports]
+        ),
+        blocked=moved.blocked_force,
+        blocked_bands=force_bands(moved.blocked_force),
+        groups=estimate.names,
+        area=np.array(area),
+        radiated=estimate.energy * around.share,
+        upper_bound=bound.energy * around.share,
+        support_energy=float(spectra.support_energy() @ around.share),
+        surface=Surface(
+            points=structure.points,
+            faces=structure.faces,
+            face_group=structure.face_group,
+            velocity=(velocity * np.sqrt(around.share)[:, None]).astype(np.float32),
+        ),
+    )
+
+
+def port_transfers(
+    structure: Structure, stop_forces: Mapping[str, TimeSeries], around: Surroundings
+) -> list[tuple[TimeSeries, Floats, Floats]]:
+    """Of every port that is hit: force [N], audible frequencies [Hz], radiated power [W/N^2]."""
+    sounding = damped(structure)
+    frequency = frequency_lines(sounding, around.mount, 15.0, _AUDIBLE)
+    found = []
+    for port, force in port_forces(structure, stop_forces).items():
+        transfer = power_transfer(
+            sounding,
+            frequency,
+            port,
+            mount=around.mount,
+            plate=around.plate,
+            efficiency=around.efficiency,
+            air=around.air,
+        )
+        left = share_at(frequency, around.octaves, around.share)
+        found.append((force, frequency, transfer.total * left))
+    return found
+
+
+def damped(structure: Structure) -> Structure:
+    """Give modes without damping the assumed one; without end they would ring, and radiate."""
+    if np.all(structure.damping > 0.0):
+        return structure
+    damping = np.where(structure.damping > 0.0, structure.damping, ASSUMED_DAMPING)
+    return replace(structure, damping=damping)
+
+
+def frequency_lines(structure: Structure, mount: Mount | None, low: float, high: float) -> Floats:
+    """Rising frequencies [Hz] that resolve every resonance, also those on the mount."""
+    kinds = [damped(structure)]
+    if mount is not None:
+        kinds.append(mounted(kinds[0], mount))
+    lines = [np.geomspace(low, high, _LINES)]
+    # denser towards each peak: half widths by the tangent of even angles
+    offsets = np.tan(np.linspace(-1.55, 1.55, _ROUND_A_PEAK))
+    for kind in kinds:
+        for omega, damping in zip(kind.omega, kind.damping, strict=True):
+            f = omega / (2.0 * np.pi)
+            if f < 1.2 * high:
+                lines.append(f * (1.0 + np.append(damping, 1e-4) * offsets[:, None]).ravel())
+    whole = np.unique(np.concatenate(lines))
+    return np.asarray(whole[(whole >= low) & (whole <= high)])
+
+
+def _by_mobility(structure: Structure, forces: Mapping[str, TimeSeries]) -> float:
+    """Vibration energy by ``int 2 Re(Y) |F|^2 df`` [J]; nan where its lines are too narrow."""
+    width = structure.damping * structure.omega / (2.0 * np.pi)
+    step = next(iter(forces.values())).step
+    if not np.all(width > 0.0) or 3.0 / (width.min() * step) > _LONGEST:
+        return float("nan")
+    return injected_energy(injected_density(structure, forces))
+
+
+def _static_energy(moved: ModalResponse) -> float:
+    """Injected, but neither lost nor ringing [J]."""
+    return moved.injected_energy - moved.vibration_energy

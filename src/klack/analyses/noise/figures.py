@@ -1,0 +1,486 @@
+"""The figures of a noise report, each built from a study by one function.
+
+One colour and dash per design; the first design is the one that the others are compared with.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.signal_statistics import EXPOSURE_REFERENCE
+from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
+from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
+from klack.report.chart import AxisSpec, Band, Chart, Colour, Curve, Mark, Panel, Style
+from klack.report.thinning import thinned
+from klack.report.wording import quantity
+
+__all__ = [
+    "SOUND_ENERGY_REFERENCE",
+    "blocked_charts",
+    "click_charts",
+    "force_chart",
+    "mobility_charts",
+    "radiation_chart",
+    "spectrum_chart",
+    "strongest_chart",
+]
+
+Floats = NDArray[np.float64]
+
+SOUND_ENERGY_REFERENCE = 1e-12  # [J], the reference of ISO 3740 for sound energy levels
+_LOOKS: tuple[tuple[Colour, Style, float], ...] = (
+    ("black", "solid", 2.0),
+    ("red", "dashed", 2.0),
+    ("blue", "dashdot", 1.9),
+    ("orange", "dotted", 2.2),
+    ("green", "long", 1.9),
+    ("pink", "sparse", 2.1),
+)
+_SMALLEST = 1e-300
+_FREQUENCY = (0.02, 200.0)  # [kHz]
+_SILENCE = 60.0  # [dB] below the highest value that a level chart shows
+
+
+def _look(index: int) -> tuple[Colour, Style, float]:
+    return _LOOKS[index % len(_LOOKS)]
+
+
+def _curve(
+    x: Floats, y: Floats, index: int, label: str, *, listed: bool = True, steps: bool = False
+) -> Curve:
+    colour, style, width = _look(index)
+    return Curve(
+        x=x,
+        y=y,
+        label=label,
+        colour=colour,
+        style=style,
+        width=width,
+        listed=listed,
+        drawn="steps" if steps else "line",
+    )
+
+
+def _designs(study: NoiseStudy) -> list[tuple[int, NoiseDesign]]:
+    return list(enumerate(study.designs))
+
+
+def _stop_names(study: NoiseStudy) -> list[str]:
+    return list(dict.fromkeys(stop.stop for design in study.designs for stop in design.stops))
+
+
+def _body_names(study: NoiseStudy) -> list[str]:
+    return list(dict.fromkeys(body.name for design in study.designs for body in design.bodies))
+
+
+def _bodies(study: NoiseStudy, name: str) -> list[tuple[int, NoiseDesign, BodyNoise]]:
+    return [
+        (i, design, body)
+        for i, design in _designs(study)
+        for body in design.bodies
+        if body.name == name
+    ]
+
+
+# --------------------------------------------------------------------------- force over time
+
+
+def force_chart(study: NoiseStudy) -> Chart:
+    """Force of every stop over the whole record."""
+    scale, unit = _time_unit(study)
+    panels, named = [], set()
+    for name in _stop_names(study):
+        curves = []
+        for i, design in _designs(study):
+            for stop in design.stops:
+                if stop.stop == name:
+                    x, y = thinned(scale * stop.force.time, stop.force.values)
+                    listed = design.label not in named
+                    named.add(design.label)
+                    curves.append(_curve(x, y, i, design.label, listed=listed))
+        panels.append(Panel(y=AxisSpec(label=name, unit="N"), curves=tuple(curves), share=0.6))
+    return Chart(
+        name="force",
+        title="Force of the stops over time",
+        x=AxisSpec(label="time", unit=unit),
+        panels=tuple(panels),
+        note=(
+            "Contact and film together, above zero when the stop is pressed. Every impulse is "
+            "kept: fine steps near the impacts, record means between them."
+        ),
+    )
+
+
+def _time_unit(study: NoiseStudy) -> tuple[float, str]:
+    longest = max(s.force.values.size * s.force.step for d in study.designs for s in d.stops)
+    return (1e3, "ms") if longest > 1e-3 else (1e6, "µs")
+
+
+def strongest_chart(study: NoiseStudy) -> Chart:
+    """Strongest impact on every stop, first touch at zero."""
+    panels, named = [], set()
+    for name in _stop_names(study):
+        curves = []
+        for i, design in _designs(study):
+            for stop in design.stops:
+                if stop.stop == name and stop.impacts:
+                    x, y = thinned(1e6 * stop.first.time, stop.first.values)
+                    listed = design.label not in named
+                    named.add(design.label)
+                    curves.append(_curve(x, y, i, design.label, listed=listed))
+        if curves:
+            axis = AxisSpec(label=name, unit="N")
+            panels.append(Panel(y=axis, curves=tuple(curves), share=0.7))
+    return Chart(
+        name="strongest",
+        title="The strongest impact on every stop",
+        x=AxisSpec(label="time since first touch", unit="µs", range=_window(panels)),
+        panels=tuple(panels),
+        note="First touch is placed at zero.",
+    )
+
+
+def _window(panels: Sequence[Panel]) -> tuple[float, float]:
+    """Where the force is above a hundredth of its peak, with some time around it [us]."""
+    begins, ends = [], []
+    for panel in panels:
+        for curve in panel.curves:
+            strong = np.flatnonzero(curve.y > 0.01 * curve.y.max())
+            begins.append(curve.x[strong[0]])
+            ends.append(curve.x[strong[-1]])
+    if not begins:
+        return 0.0, 1.0
+    margin = 0.15 * (max(ends) - min(begins))
+    return float(min(begins) - margin), float(max(ends) + margin)
+
+
+# --------------------------------------------------------------------------- force over frequency
+
+
+def spectrum_chart(study: NoiseStudy) -> Chart:
+    """Spectra of the strongest impacts; third octaves, difference and gathered energy of all."""
+    panels, named = [], set()
+    for name in _stop_names(study):
+        curves = []
+        for i, design in _designs(study):
+            for stop in design.stops:
+                if stop.stop == name and stop.impacts:
+                    listed = design.label not in named
+                    named.add(design.label)
+                    x = 1e-3 * stop.frequency
+                    curves.append(_curve(x, stop.level, i, design.label, listed=listed))
+        if curves:
+            panels.append(_level_panel(name, "dB re 1 µN s", curves, 70.0))
+    bands, left, gathered, differences = [], [], [], []
+    reference = study.reference
+    for i, design in _designs(study):
+        octaves = design.stops[0].bands
+        level = _level(design.band_energy, ENERGY_REFERENCE)
+        listed = design.label not in named
+        named.add(design.label)
+        bands.append(_steps(octaves, level, i, design.label, listed=listed))
+        if design.balanced_below:
+            unbalanced = _level(design.unbalanced_energy, ENERGY_REFERENCE)
+            steps = _steps(octaves, unbalanced, i, "")
+            left.append(replace(steps, width=0.9, style="dotted"))
+        total = np.cumsum(design.unbalanced_energy)
+        x = np.append(1e-3 * octaves.low[0], 1e-3 * octaves.high)
+        share = 100.0 * np.append(0.0, total) / max(float(total[-1]), _SMALLEST)
+        gathered.append(_curve(x, share, i, design.label, listed=False))
+        if design is not reference and _same_bands(design, reference):
+            apart = _level(design.unbalanced_energy, ENERGY_REFERENCE) - _level(
+                reference.unbalanced_energy, ENERGY_REFERENCE
+            )
+            differences.append(_steps(octaves, apart, i, design.label))
+    bands_panel = _level_panel("bands", "dB re 1 pN²s", [*bands, *left], 70.0)
+    panels.append(replace(bands_panel, bands=_trusted(study)))
+    if differences:
+        panels.append(_difference_panel(differences))
+    axis = AxisSpec(label="energy below", unit="%", range=(0.0, 103.0))
+    panels.append(Panel(y=axis, curves=tuple(gathered), share=0.55))
+    note = (
+        "Above: magnitude of the Fourier integral of the strongest impact on each stop; its left "
+        "end is the impulse. Third octaves: ∫ F² dt of the whole record per band, all stops "
+        "together. Bottom: share of it below each frequency."
+    )
+    if left:
+        note += (
+            " Thin dotted lines: what springs, magnet and fluid do not balance within the valve "
+            "(mass times acceleration of the needle); difference and share are those of it."
+        )
+    if differences:
+        note += f" Difference: minus '{reference.name}', with lines at ±3 dB."
+    return Chart(
+        name="spectrum",
+        title="Spectrum of the force",
+        x=_FREQUENCY_AXIS,
+        panels=tuple(panels),
+        note=f"{note} {_trusted_words(study)}".strip(),
+    )
+
+
+_FREQUENCY_AXIS = AxisSpec(label="frequency", unit="kHz", log=True, range=_FREQUENCY)
+
+
+def _level(energy: Floats, reference: float) -> Floats:
+    return np.asarray(10.0 * np.log10(np.maximum(energy, _SMALLEST) / reference))
+
+
+def _same_bands(one: NoiseDesign, other: NoiseDesign) -> bool:
+    return np.array_equal(one.stops[0].bands.number, other.stops[0].bands.number)
+
+
+def _steps(
+    octaves: ThirdOctaves, values: Floats, index: int, label: str, *, listed: bool = False
+) -> Curve:
+    """Values as steps from band edge to band edge."""
+    edges = 1e-3 * np.append(octaves.low, octaves.high[-1])
+    heights = np.append(values, values[-1])
+    return _curve(edges, heights, index, label, listed=listed, steps=True)
+
+
+def _level_panel(label: str, unit: str, curves: Sequence[Curve], depth: float) -> Panel:
+    """Panel that reaches at most ``depth`` below the highest level; notches go deeper."""
+    highest = max(float(np.nanmax(curve.y)) for curve in curves)
+    lowest = max(min(float(np.nanmin(curve.y)) for curve in curves), highest - depth)
+    limits = (5.0 * floor((lowest - 2.0) / 5.0), 5.0 * ceil((highest + 3.0) / 5.0))
+    return Panel(y=AxisSpec(label=label, unit=unit, range=limits), curves=tuple(curves), share=0.7)
+
+
+def _difference_panel(curves: Sequence[Curve]) -> Panel:
+    largest = max(float(np.nanmax(np.abs(curve.y))) for curve in curves)
+    limit = min(max(1.1 * largest, 5.0), 40.0)
+    return Panel(
+        y=AxisSpec(label="difference", unit="dB", range=(-limit, limit)),
+        curves=tuple(curves),
+        marks=tuple(Mark(value=value, axis="y") for value in (-3.0, 0.0, 3.0)),
+        share=0.5,
+    )
+
+
+def _limits(study: NoiseStudy) -> tuple[float, float]:
+    """Frequencies between which every design can be believed [Hz]; nan if no limit is known."""
+    tops = [d.valid_up_to for d in study.designs if np.isfinite(d.valid_up_to)]
+    return max(d.valid_from for d in study.designs), min(tops, default=float("nan"))
+
+
+def _trusted(study: NoiseStudy) -> tuple[Band, ...]:
+    low, high = _limits(study)
+    if not np.isfinite(high):
+        return ()
+    low, high = max(1e-3 * low, _FREQUENCY[0]), min(1e-3 * high, _FREQUENCY[1])
+    return (Band(low=low, high=high, label="valid"),) if low < high else ()
+
+
+def _trusted_words(study: NoiseStudy) -> str:
+    low, high = _limits(study)
+    if not np.isfinite(high):
+        return "Rigid bodies: no wave shapes this force, and no limit is known."
+    begin = f"from one over the record, {quantity(low, 'Hz', 3)}, " if low else ""
+    return f"Shaded: {begin}up to the highest kept mode, {quantity(high, 'Hz', 3)}."
+
+
+# --------------------------------------------------------------------------- structure
+
+
+def mobility_charts(study: NoiseStudy) -> tuple[Chart, ...]:
+    """Drive-point and transfer mobility of every body that is hit."""
+    return tuple(_mobility_chart(study, name) for name in _body_names(study))
+
+
+def _mobility_chart(study: NoiseStudy, name: str) -> Chart:
+    curves: list[Curve] = []
+    marks: dict[float, Mark] = {}
+    bodies = _distinct(_bodies(study, name))
+    for design, body in bodies:
+        whose = f"{design.name}, " if len(bodies) > 1 else ""
+        for p, port in enumerate(body.ports):
+            for q in range(p, len(body.ports)):
+                values = np.abs(body.mobility[p, q])
+                what = f"at '{port}'" if p == q else f"from '{port}' to '{body.ports[q]}'"
+                label = f"{whose}{what}"
+                curves.append(_curve(1e-3 * body.frequency, values, len(curves), label))
+        top = 1e-3 * body.highest_frequency
+        if top < 1e-3 * body.frequency[-1]:
+            marks[top] = Mark(value=top, label="highest kept mode")
+    low, high = (float(1e-3 * bodies[0][1].frequency[i]) for i in (0, -1))
+    values = np.concatenate([curve.y for curve in curves])
+    top_value = float(values.max())
+    limits = (max(float(values.min()), 1e-7 * top_value), 3.0 * top_value)
+    return Chart(
+        name=f"mobility-{name}",
+        title=f"Mobility of the {name}",
+        x=AxisSpec(label="frequency", unit="kHz", log=True, range=(low, high)),
+        panels=(
+            Panel(
+                y=AxisSpec(label="velocity per force", unit="m/(N s)", log=True, range=limits),
+                curves=tuple(curves),
+                marks=tuple(marks.values()),
+            ),
+        ),
+        note=(
+            "Velocity of a contact per harmonic force, at the same contact (drive point) or at "
+            "another one (transfer). Rigidly held body, without fluid."
+        ),
+    )
+
+
+def _distinct(
+    found: Sequence[tuple[int, NoiseDesign, BodyNoise]],
+) -> list[tuple[NoiseDesign, BodyNoise]]:
+    """Bodies of different mobility; variants of one valve share theirs."""
+    result: list[tuple[NoiseDesign, BodyNoise]] = []
+    for _, design, body in found:
+        if not any(
+            body.mobility.shape == other.mobility.shape
+            and np.allclose(body.mobility, other.mobility, rtol=1e-9, atol=0.0)
+            for _, other in result
+        ):
+            result.append((design, body))
+    return result
+
+
+def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
+    """Force on the support of every body, over time and in third octaves."""
+    charts = []
+    for name in _body_names(study):
+        curves, bands, differences = [], [], []
+        found = _bodies(study, name)
+        scale, unit = _time_unit(study)
+        for i, design, body in found:
+            x, y = thinned(scale * body.blocked.time, body.blocked.values)
+            curves.append(_curve(x, y, i, design.label))
+            level = _level(body.blocked_bands.energy, ENERGY_REFERENCE)
+            bands.append((body.blocked_bands, level, i, design))
+            first = bands[0]
+            if i and first[0].number.size == body.blocked_bands.number.size:
+                differences.append((body.blocked_bands, level - first[1], i, design))
+        time = AxisSpec(label="time", unit=unit)
+        panel = Panel(y=AxisSpec(label="force", unit="N"), curves=tuple(curves), share=0.8)
+        charts.append(
+            Chart(
+                name=f"blocked-{name}",
+                title=f"Force of the {name} on its rigid support",
+                x=time,
+                panels=(panel,),
+                note="What the hold has to bear along the axis, if it is rigid (blocked force).",
+            )
+        )
+        steps = [_steps(b, level, i, d.label, listed=True) for b, level, i, d in bands]
+        panels = [
+            replace(_level_panel("level", "dB re 1 pN²s", steps, 80.0), bands=_trusted(study))
+        ]
+        if differences:
+            panels.append(
+                _difference_panel([_steps(b, y, i, d.label) for b, y, i, d in differences])
+            )
+        charts.append(
+            Chart(
+                name=f"blocked-bands-{name}",
+                title=f"Force of the {name} on its rigid support, third octaves",
+                x=_FREQUENCY_AXIS,
+                panels=tuple(panels),
+                note=(
+                    "A record that ends while the body still rings is cut there: bands below one "
+                    f"over its length are those of the cut. {_trusted_words(study)}"
+                ),
+            )
+        )
+    return tuple(charts)
+
+
+def radiation_chart(study: NoiseStudy) -> Chart | None:
+    """Estimated sound energy per band, its upper bound, and the difference of designs."""
+    with_bodies = [(i, design) for i, design in _designs(study) if design.bodies]
+    if not with_bodies:
+        return None
+    curves, bounds, differences = [], [], []
+    first = with_bodies[0][1]
+    for i, design in with_bodies:
+        octaves = design.stops[0].bands
+        level = _level(design.radiated_bands, SOUND_ENERGY_REFERENCE)
+        curves.append(_steps(octaves, level, i, design.label, listed=True))
+        bound = np.sum([body.upper_bound.sum(axis=0) for body in design.bodies], axis=0)
+        steps = _steps(octaves, _level(bound, SOUND_ENERGY_REFERENCE), i, "")
+        bounds.append(replace(steps, width=0.9, style="dotted"))
+        if design is not first and _same_bands(design, first):
+            apart = level - _level(first.radiated_bands, SOUND_ENERGY_REFERENCE)
+            differences.append(_steps(octaves, apart, i, design.label))
+    panel = _level_panel("energy", "dB re 1 pJ", [*curves, *bounds], 80.0)
+    panels = [replace(panel, bands=_trusted(study))]
+    if differences:
+        panels.append(_difference_panel(differences))
+    return Chart(
+        name="radiation",
+        title="Radiated sound energy of one run, an estimate",
+        x=_FREQUENCY_AXIS,
+        panels=tuple(panels),
+        note=(
+            "Thick: estimate, with the radiation efficiency of the case. Thin dotted lines: upper "
+            f"bound, radiation efficiency 1 in every band. {_trusted_words(study)}"
+        ),
+    )
+
+
+# --------------------------------------------------------------------------- sound
+
+
+def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
+    """Sound pressure of one click over time, its third octaves, and its loudness."""
+    heard = [(i, d, d.sound) for i, d in _designs(study) if d.sound is not None]
+    if not heard:
+        return ()
+    waves, loud, bands, differences = [], [], [], []
+    first = heard[0][2]
+    ends = [_end(sound.pressure.time, sound.pressure.values) for *_, sound in heard]
+    begin = 1e3 * min(float(sound.pressure.time[0]) for *_, sound in heard)
+    window = (begin, 1e3 * max(ends))
+    for i, design, sound in heard:
+        x, y = thinned(1e3 * sound.pressure.time, 1e3 * sound.pressure.values, window=window)
+        waves.append(_curve(x, y, i, design.label))
+        loud.append(
+            _curve(
+                1e3 * sound.loudness.time, sound.loudness.loudness, i, design.label, listed=False
+            )
+        )
+        level = _level(sound.bands.energy, EXPOSURE_REFERENCE)
+        bands.append(_steps(sound.bands, level, i, design.label, listed=True))
+        if sound is not first:
+            apart = level - _level(first.bands.energy, EXPOSURE_REFERENCE)
+            differences.append(_steps(sound.bands, apart, i, design.label))
+    distance = quantity(heard[0][1].settings.distance, "m", 3)
+    over_time = Chart(
+        name="click",
+        title=f"One click at {distance}: sound pressure and loudness",
+        x=AxisSpec(label="time", unit="ms", range=window),
+        panels=(
+            Panel(y=AxisSpec(label="pressure", unit="mPa"), curves=tuple(waves)),
+            Panel(y=AxisSpec(label="loudness", unit="sone"), curves=tuple(loud), share=0.6),
+        ),
+        note=(
+            "Estimate: monopole in a free field with minimum phase; without the travel time. "
+            "Loudness after ISO 532-1 for sounds that vary in time; it decays more slowly than the "
+            "sound, as hearing does."
+        ),
+    )
+    panels = [_level_panel("level", "dB re (20 µPa)²s", bands, _SILENCE)]
+    if differences:
+        panels.append(_difference_panel(differences))
+    over_bands = Chart(
+        name="click-bands",
+        title=f"One click at {distance}, third octaves",
+        x=AxisSpec(label="frequency", unit="kHz", log=True, range=(0.02, 20.0)),
+        panels=tuple(panels),
+        note="Sound exposure of one click per band, without weighting. Sound ends at 20 kHz.",
+    )
+    return over_time, over_bands
+
+
+def _end(time: Floats, values: Floats) -> float:
+    """When the sound has fallen below a hundredth of its peak, with some time after it [s]."""
+    loud = np.flatnonzero(np.abs(values) > 0.01 * np.abs(values).max())
+    last = float(time[loud[-1]]) if loud.size else float(time[-1])
+    return min(last + 0.1 * (last - float(time[0])) + 5e-3, float(time[-1]))

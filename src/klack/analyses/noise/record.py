@@ -1,0 +1,359 @@
+"""What one noise study leaves behind: from the force of every stop to the sound of a click.
+
+The numbers are plain arrays and small frozen records, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.loudness import Loudness
+from klack.acoustics.signal_statistics import SoundStatistics
+from klack.acoustics.third_octave import ThirdOctaves
+from klack.analyses.record import Record
+from klack.signals import TimeSeries
+
+__all__ = [
+    "BodyNoise",
+    "ClickSound",
+    "NoiseDesign",
+    "NoiseSettings",
+    "NoiseStudy",
+    "StopForce",
+    "Surface",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StopForce:
+    """Force of one stop over time and frequency.
+
+    Parameters
+    ----------
+    stop : str
+        Component; ``"contact"`` for an impact.
+    impacts : int
+    peak_force : float [N]
+        Largest mean over a step.
+    impulse : float [N s]
+        Of the whole record, with what presses at rest.
+    force : TimeSeries [N]
+        Means over steps, above zero when it presses.
+    first : TimeSeries [N]
+        The strongest impact alone.
+    frequency, level : array, shape (k,) [Hz], [dB re 1 uN s]
+        Magnitude of the Fourier integral of the strongest impact.
+    bands : ThirdOctaves
+        Energies of the whole record, from 20 Hz to 200 kHz [N^2 s].
+    """
+
+    stop: str
+    impacts: int
+    peak_force: float
+    impulse: float
+    force: TimeSeries
+    first: TimeSeries
+    frequency: Floats
+    level: Floats
+    bands: ThirdOctaves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Faces of a body in the air and how fast they move in each band.
+
+    Parameters
+    ----------
+    points : array, shape (n, dimension) [m]
+        (r, z) or (x, y, z).
+    faces : int array, shape (f, 2) or (f, 3 or 4)
+    face_group : int array, shape (f,)
+    velocity : float32 array, shape (b, f) [m/s]
+        Normal velocity in each band, rms over one period of the drive pattern.
+    """
+
+    points: Floats
+    faces: NDArray[np.int64]
+    face_group: NDArray[np.int64]
+    velocity: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyNoise:
+    """A held body as the forces move it.
+
+    ``p`` ports that are hit, ``b`` bands, ``g`` groups of the surface (the last one may be the
+    plate), ``k`` frequencies.
+
+    Parameters
+    ----------
+    name : str
+    mass : float [kg]
+    highest_frequency : float [Hz]
+        Highest kept mode.
+    modes : int
+    ports, stops : tuple of str
+    injected : array, shape (p,) [J]
+        ``int F v dt``: structure-borne energy through each port.
+    vibration_energy : float [J]
+        Lost in the modes, or still ringing when the record ends: by the motion over time.
+    vibration_spectral : float [J]
+        The same by ``int 2 Re(Y) |F|^2 df``; nan for a body without damping.
+    dissipated, ringing : float [J]
+        Parts of the vibration energy.
+    static_energy : float [J]
+        What the modes store statically at the end, less at the start: the rest of what was
+        injected.
+    residual : float [-]
+        Of the balance of energy, over the energy turned over.
+    assumed : bool
+        Whether the damping that radiation takes is assumed, because the case gives none.
+    frequency : array, shape (k,) [Hz]
+    mobility : complex array, shape (p, p, k) [m/s/N]
+        Drive-point on the diagonal, transfer beside it.
+    blocked : TimeSeries [N]
+        Force on the rigid support.
+    blocked_bands : ThirdOctaves [N^2 s]
+    groups : tuple of str
+    area : array, shape (g,) [m^2]
+        Nan for the plate.
+    radiated : array, shape (g, b) [J]
+        Estimate of the radiated sound energy, on the mount and with the plate of the case.
+    upper_bound : array, shape (g, b) [J]
+        Equivalent radiated energy ``rho c int v_n^2 dA dt``: radiation efficiency 1.
+    support_energy : float [J]
+        That flows through the held surfaces into mount and plate; nan in results of former
+        versions.
+    surface : Surface
+    """
+
+    name: str
+    mass: float
+    highest_frequency: float
+    modes: int
+    ports: tuple[str, ...]
+    stops: tuple[str, ...]
+    injected: Floats
+    vibration_energy: float
+    vibration_spectral: float
+    dissipated: float
+    ringing: float
+    static_energy: float
+    residual: float
+    assumed: bool
+    frequency: Floats
+    mobility: NDArray[np.complex128]
+    blocked: TimeSeries
+    blocked_bands: ThirdOctaves
+    groups: tuple[str, ...]
+    area: Floats
+    radiated: Floats
+    upper_bound: Floats
+    surface: Surface
+    support_energy: float = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClickSound:
+    """What is heard of one stroke, an estimate.
+
+    Parameters
+    ----------
+    pressure : TimeSeries [Pa]
+        Of one click, free field, at :attr:`NoiseSettings.distance`.
+    statistics : SoundStatistics
+        Of one click.
+    bands : ThirdOctaves [Pa^2 s]
+        Sound exposures of one click.
+    pattern : SoundStatistics
+        Of the drive pattern, over whole periods.
+    loudness : Loudness
+        Of one click.
+    """
+
+    pressure: TimeSeries
+    statistics: SoundStatistics
+    bands: ThirdOctaves
+    pattern: SoundStatistics
+    loudness: Loudness
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseSettings:
+    """Section ``noise`` of a case, in SI.
+
+    Parameters
+    ----------
+    mount, plate : str
+        In words; empty without.
+    radiation : str
+        ``"piston"`` or ``"unity"``.
+    distance : float [m]
+    air_density : float [kg/m^3]
+    sound_speed : float [m/s]
+    rate : float [Hz]
+        Strokes per second of the drive pattern.
+    duration : float [s]
+        Of the drive pattern.
+    given : bool
+        Whether the case has such a section.
+    """
+
+    mount: str
+    plate: str
+    radiation: str
+    distance: float
+    air_density: float
+    sound_speed: float
+    rate: float
+    duration: float
+    given: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NoiseDesign:
+    """One design: a stroke or an impact from force to ear.
+
+    Parameters
+    ----------
+    name : str
+        Short, unique in the study.
+    label, detail : str
+        What a legend says; what was run, in words.
+    kind : str
+        ``"impact"`` or ``"stroke"``.
+    case, case_text, run : str
+        ``run`` names the variant or level.
+    valid_from, valid_up_to : float [Hz]
+        One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
+        the bodies, nan without any.
+    stops : tuple of StopForce
+    net_share : array, shape (b,) [-]
+        Share of the energy of the forces per band that springs, magnets and fluid do not balance
+        within the valve: (mass times acceleration of the needle)^2 over the forces squared.
+        Radiated energy, surface velocity and sound have it.
+    bodies : tuple of BodyNoise
+        Empty if there is no elastic held body.
+    sound : ClickSound or None
+        None without bodies.
+    settings : NoiseSettings
+    notes : tuple of str
+    own_components : mapping of str to str
+        See :class:`klack.analyses.stroke.record.StrokeStudy`.
+    """
+
+    name: str
+    label: str
+    detail: str
+    kind: str
+    case: str
+    case_text: str
+    run: str
+    valid_from: float
+    valid_up_to: float
+    stops: tuple[StopForce, ...]
+    net_share: Floats
+    bodies: tuple[BodyNoise, ...]
+    sound: ClickSound | None
+    settings: NoiseSettings
+    notes: tuple[str, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def band_middle(self) -> Floats:
+        """Middle frequencies of all bands [Hz]."""
+        return self.stops[0].bands.middle
+
+    @property
+    def band_energy(self) -> Floats:
+        """Energy of the forces of all stops together per band [N^2 s]."""
+        return np.asarray(np.sum([stop.bands.energy for stop in self.stops], axis=0))
+
+    @property
+    def unbalanced_energy(self) -> Floats:
+        """Energy of the forces per band that is not balanced within the valve [N^2 s]."""
+        return np.asarray(self.band_energy * self.net_share)
+
+    @property
+    def balanced_below(self) -> float:
+        """Frequency below which half of the forces or more is balanced in the valve [Hz]; or 0."""
+        balanced = np.flatnonzero(self.net_share < 0.5)
+        return float(self.stops[0].bands.high[balanced[-1]]) if balanced.size else 0.0
+
+    @property
+    def support_energy(self) -> float:
+        """Energy through the held surfaces into mounts and plates [J]; nan without bodies.
+
+        It does not stand in :attr:`injected_energy`, whose bodies are held rigidly: on a mount a
+        body moves as a whole and takes up more.  The radiated energy comes from both.
+        """
+        if not self.bodies:
+            return float("nan")
+        return float(sum(body.support_energy for body in self.bodies))
+
+    @property
+    def injected_energy(self) -> float:
+        """Structure-borne energy through all ports of held bodies [J]; nan without bodies."""
+        if not self.bodies:
+            return float("nan")
+        return float(sum(body.injected.sum() for body in self.bodies))
+
+    @property
+    def radiated_energy(self) -> float:
+        """Estimated sound energy [J]; nan without bodies."""
+        return float(self.radiated_bands.sum())
+
+    @property
+    def radiated_bands(self) -> Floats:
+        """Estimated sound energy per band [J]; nan without bodies."""
+        if not self.bodies:
+            return np.full(self.band_middle.size, np.nan)
+        return np.asarray(np.sum([body.radiated.sum(axis=0) for body in self.bodies], axis=0))
+
+    @property
+    def upper_bound(self) -> float:
+        """Equivalent radiated energy, radiation efficiency 1 [J]; nan without bodies."""
+        if not self.bodies:
+            return float("nan")
+        return float(sum(body.upper_bound.sum() for body in self.bodies))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NoiseStudy(Record):
+    """One design, or several side by side; the first one is the one to compare with.
+
+    Parameters
+    ----------
+    wall_time : float [s]
+        Of the noise chain, without the runs before.
+    designs : tuple of NoiseDesign
+    """
+
+    designs: tuple[NoiseDesign, ...]
+
+    @property
+    def reference(self) -> NoiseDesign:
+        """First design: the one that the others are compared with."""
+        return self.designs[0]
+
+    @property
+    def case(self) -> str:
+        """Names of all cases."""
+        return " and ".join(dict.fromkeys(design.case for design in self.designs))
+
+    @property
+    def case_text(self) -> str:
+        """Text of all cases, each once."""
+        return "\n\n".join(dict.fromkeys(item.case_text.rstrip() + "\n" for item in self.designs))
+
+    @property
+    def own_components(self) -> Mapping[str, str]:
+        """Components of all designs that are not part of klack."""
+        return {
+            name: digest for item in self.designs for name, digest in item.own_components.items()
+        }

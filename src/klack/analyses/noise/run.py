@@ -1,0 +1,332 @@
+"""``klack noise``: from the force of every stop to what is heard, for one or several designs."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.air import Air
+from klack.acoustics.drive_pattern import drive_pattern
+from klack.acoustics.force_bands import force_bands
+from klack.acoustics.loudness import time_varying_loudness
+from klack.acoustics.mount import Mount
+from klack.acoustics.plate import Plate
+from klack.acoustics.signal_statistics import pressure_third_octaves, sound_statistics
+from klack.acoustics.sound import click_pressure
+from klack.acoustics.spectrum import force_spectrum, impulse_level
+from klack.acoustics.third_octave import ThirdOctaves
+from klack.analyses.noise.balance import net_share
+from klack.analyses.noise.body import ASSUMED_DAMPING, Surroundings, body_noise, port_transfers
+from klack.analyses.noise.record import (
+    BodyNoise,
+    ClickSound,
+    NoiseDesign,
+    NoiseSettings,
+    NoiseStudy,
+    StopForce,
+)
+from klack.analyses.noise.source import NoiseSource, SourceStop
+from klack.analyses.record import run_fields
+from klack.errors import InputError
+from klack.input.problem import one_of
+from klack.materials import Material
+from klack.progress import Progress, silent
+from klack.signals import TimeSeries
+from klack.stages import StageClock, collected_warnings
+from klack.units import format_si
+
+__all__ = ["run_noise"]
+
+_LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
+_HEARING = 20e3  # [Hz]
+_ENDS_ALIKE = 1e-3  # of the peak
+
+
+def run_noise(
+    sources: Sequence[NoiseSource],
+    *,
+    names: Sequence[str] = (),
+    progress: Progress = silent,
+) -> NoiseStudy:
+    """Follow the noise of some runs from force to ear, and lay them side by side.
+
+    Parameters
+    ----------
+    sources : sequence of NoiseSource
+        One per design; the first one is the one to compare with.
+    names : sequence of str
+        Of the designs; case and run of each source without.
+    progress : callable
+        Called with stage and fraction.
+
+    Returns
+    -------
+    NoiseStudy
+    """
+    begin = perf_counter()
+    names = tuple(names) or tuple(f"{source.case} {source.run}" for source in sources)
+    clock = StageClock(progress)
+    with collected_warnings() as caught:
+        designs = tuple(
+            _design(source, name, several=len(sources) > 1, clock=clock)
+            for source, name in zip(sources, names, strict=True)
+        )
+    notes = dict.fromkeys([*_settings_differ(designs), *_notes(designs), *caught])
+    return NoiseStudy(
+        title=" and ".join(dict.fromkeys(source.title for source in sources)),
+        description="",
+        **run_fields(begin, clock, "mosqito"),
+        designs=designs,
+        warnings=tuple(notes),
+    )
+
+
+def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock) -> NoiseDesign:
+    clock("force spectra", 0.0)
+    stops = tuple(_stop_force(stop) for stop in source.stops)
+    share = net_share(source.net, [stop.bands for stop in stops])
+    around = _surroundings(source, share, stops[0].bands)
+    forces = {stop.name: stop.force for stop in source.stops}
+    clock("vibration and radiation", 0.0)
+    found = [body_noise(structure, forces, around) for structure in source.structures]
+    bodies = tuple(body for body in found if body is not None)
+    clock("sound", 0.0)
+    pressure = _pressure(source, around)
+    sound = _heard(pressure, source, clock) if pressure is not None else None
+    return NoiseDesign(
+        name=name,
+        label=name if several else source.label,
+        detail=source.label,
+        kind=source.kind,
+        case=source.case,
+        case_text=source.case_text,
+        run=source.run,
+        valid_from=_valid_from(source.stops),
+        valid_up_to=source.kept_up_to,
+        stops=stops,
+        net_share=share,
+        bodies=bodies,
+        sound=sound,
+        settings=_settings(source),
+        notes=(*source.notes, *_design_notes(source, bodies, sound)),
+        own_components=source.own_components,
+    )
+
+
+# --------------------------------------------------------------------------- force
+
+
+def _stop_force(stop: SourceStop) -> StopForce:
+    force = stop.force
+    frequency = np.geomspace(_LOWEST, min(_HIGHEST, 0.1 / force.step), _POINTS)
+    return StopForce(
+        stop=stop.name,
+        impacts=stop.impacts,
+        peak_force=float(force.values.max()),
+        impulse=float(force.values.sum() * force.step),
+        force=force,
+        first=stop.strongest,
+        frequency=frequency,
+        level=_level_at(stop.strongest, frequency),
+        bands=force_bands(force),
+    )
+
+
+def _valid_from(stops: Sequence[SourceStop]) -> float:
+    """One over the record [Hz], unless every force ends as it began."""
+    for stop in stops:
+        values = stop.force.values
+        if abs(values[-1] - values[0]) > _ENDS_ALIKE * np.abs(values).max():
+            return 1.0 / (values.size * stop.force.step)
+    return 0.0
+
+
+def _level_at(force: TimeSeries, frequency: np.ndarray) -> np.ndarray:
+    """Level of the spectrum [dB re 1 uN s] at some frequencies."""
+    span = force.values.size * force.step
+    spectrum = force_spectrum(
+        force, high=1.01 * float(frequency[-1]), resolution=min(1.0 / (20.0 * span), 500.0)
+    )
+    return np.asarray(np.interp(frequency, spectrum.frequency, impulse_level(spectrum)))
+
+
+# --------------------------------------------------------------------------- surroundings
+
+
+def _surroundings(
+    source: NoiseSource, share: NDArray[np.float64], octaves: ThirdOctaves
+) -> Surroundings:
+    noise = source.noise
+    mount, plate = noise.mount, noise.plate
+    return Surroundings(
+        mount=None
+        if mount is None
+        else Mount(
+            stiffness=mount.stiffness,
+            loss_factor=mount.loss_factor,
+            # one mount carries all held bodies
+            mass=mount.mass or sum(structure.mass for structure in source.structures),
+        ),
+        plate=None
+        if plate is None
+        else Plate(
+            thickness=plate.thickness,
+            area=plate.area,
+            material=_material(source, plate.material),
+            loss_factor=plate.loss_factor,
+        ),
+        air=Air(density=noise.air_density, sound_speed=noise.sound_speed),
+        efficiency=noise.radiation,
+        period=1.0 / noise.drive.rate,
+        share=share,
+        octaves=octaves,
+    )
+
+
+def _material(source: NoiseSource, name: str) -> Material:
+    if name not in source.materials:
+        raise InputError(
+            f"case {source.case}: noise.plate.material",
+            got=f"'{name}'",
+            expected=f"one of the materials of the case: {one_of(source.materials)}",
+            hint="add it to 'materials'.",
+        )
+    given = source.materials[name]
+    return Material(name=name, young=given.young, poisson=given.poisson, density=given.density)
+
+
+def _settings(source: NoiseSource) -> NoiseSettings:
+    noise = source.noise
+    mount, plate = noise.mount, noise.plate
+    below, carried = "", ""
+    if mount is not None:
+        mass = f", {format_si(1e3 * mount.mass, 'g')} on it" if mount.mass is not None else ""
+        below = (
+            f"{format_si(mount.stiffness, 'N/m')}, loss factor {100 * mount.loss_factor:.3g} %"
+            f"{mass}"
+        )
+    if plate is not None:
+        carried = (
+            f"{format_si(plate.thickness, 'm')} of {plate.material}, {plate.area:.3g} m², loss "
+            f"factor {100 * plate.loss_factor:.3g} %"
+        )
+    return NoiseSettings(
+        mount=below,
+        plate=carried,
+        radiation=noise.radiation,
+        distance=noise.distance,
+        air_density=noise.air_density,
+        sound_speed=noise.sound_speed,
+        rate=noise.drive.rate,
+        duration=noise.drive.duration,
+        given=source.given,
+    )
+
+
+# --------------------------------------------------------------------------- sound
+
+
+def _pressure(source: NoiseSource, around: Surroundings) -> TimeSeries | None:
+    """Sound pressure of all ports of all bodies; None without any that radiates."""
+    forces = {stop.name: stop.force for stop in source.stops}
+    parts = [
+        click_pressure(
+            force,
+            frequency,
+            transfer,
+            distance=source.noise.distance,
+            density=source.noise.air_density,
+            sound_speed=source.noise.sound_speed,
+        )
+        for structure in source.structures
+        for force, frequency, transfer in port_transfers(structure, forces, around)
+        if np.any(transfer > 0.0)
+    ]
+    if not parts:
+        return None
+    return TimeSeries(
+        step=parts[0].step,
+        values=np.sum([part.values for part in parts], axis=0),
+        unit="Pa",
+        start=parts[0].start,
+        name="click",
+    )
+
+
+def _heard(pressure: TimeSeries, source: NoiseSource, clock: StageClock) -> ClickSound:
+    rate = source.noise.drive.rate
+    periods = max(1.0, np.floor(source.noise.drive.duration * rate + 1e-9))
+    pattern = drive_pattern(pressure, rate, periods / rate)
+    statistics, of_pattern = sound_statistics(pressure), sound_statistics(pattern)
+    bands: ThirdOctaves = pressure_third_octaves(pressure)
+    clock("loudness", 0.0)
+    return ClickSound(
+        pressure=pressure,
+        statistics=statistics,
+        bands=bands,
+        pattern=of_pattern,
+        loudness=time_varying_loudness(pressure),
+    )
+
+
+# --------------------------------------------------------------------------- notes
+
+
+def _design_notes(
+    source: NoiseSource, bodies: Sequence[BodyNoise], sound: ClickSound | None
+) -> tuple[str, ...]:
+    found = []
+    if not bodies:
+        found.append("There is no elastic held body: only the spectra of the force are known.")
+    if bodies and not source.given:
+        found.append(
+            f"Case {source.case} has no section 'noise': rigid hold, no plate. A small body that "
+            "is held rigidly radiates next to nothing that can be heard."
+        )
+    assumed = [body.name for body in bodies if body.assumed]
+    if assumed:
+        found.append(
+            f"The case gives no damping of {' and '.join(assumed)}; for mobility and radiation "
+            f"{100 * ASSUMED_DAMPING:g} % of critical damping is assumed."
+        )
+    if np.isfinite(source.kept_up_to) and source.kept_up_to < _HEARING:
+        found.append(
+            f"The highest modes are kept up to {format_si(source.kept_up_to, 'Hz')} only, which "
+            "can be heard: keep more modes."
+        )
+    if bodies and not np.isfinite(source.kept_up_to):
+        found.append(
+            f"The force of '{source.run}' is that of rigid bodies: it has no waves, and no limit "
+            "of validity is known."
+        )
+    if sound is not None and sound.loudness.note:
+        found.append(f"The click is {sound.loudness.note}.")
+    return tuple(found)
+
+
+def _notes(designs: Sequence[NoiseDesign]) -> list[str]:
+    return [
+        f"{design.name}: {note}" if len(designs) > 1 else note
+        for design in designs
+        for note in design.notes
+    ]
+
+
+def _settings_differ(designs: Sequence[NoiseDesign]) -> list[str]:
+    first = designs[0].settings
+    words = {
+        "distance": "the distance",
+        "mount": "the mount",
+        "plate": "the plate",
+        "radiation": "the radiation efficiency",
+        "rate": "the rate of the drive pattern",
+    }
+    found = [
+        word
+        for key, word in words.items()
+        if any(getattr(design.settings, key) != getattr(first, key) for design in designs)
+    ]
+    if not found:
+        return []
+    return [f"The designs differ in more than their valves: {', '.join(found)}."]

@@ -1,0 +1,67 @@
+"""Sound files of a noise study: one click and the drive pattern of every design, to one scale."""
+
+import re
+from pathlib import Path
+
+from klack.acoustics.drive_pattern import drive_pattern
+from klack.acoustics.wav import full_scale_of, write_wav
+from klack.analyses.noise.record import NoiseDesign, NoiseStudy
+from klack.signals import TimeSeries
+
+__all__ = ["StudySound", "common_full_scale", "sound_names", "study_sounds", "write_sounds"]
+
+StudySound = tuple[str, NoiseDesign, TimeSeries]
+"""Name of the file, whose sound it is, and the sound pressure."""
+
+
+def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
+    """Every sound of a study: of each design one click, then its drive pattern [Pa]."""
+    found: list[StudySound] = []
+    for design in study.designs:
+        if design.sound is None:
+            continue
+        click, settings = design.sound.pressure, design.settings
+        pattern = drive_pattern(click, settings.rate, settings.duration)
+        found.append((_file_name("click", study, design), design, click))
+        found.append((_file_name("pattern", study, design), design, pattern))
+    return tuple(found)
+
+
+def common_full_scale(sounds: tuple[StudySound, ...]) -> float:
+    """Full scale of all files of a study [Pa], so that designs compare by ear."""
+    return full_scale_of(*(pressure for *_, pressure in sounds))
+
+
+def sound_names(study: NoiseStudy) -> tuple[str, ...]:
+    """Names of the sound files of a study."""
+    return tuple(
+        _file_name(what, study, design)
+        for design in study.designs
+        if design.sound is not None
+        for what in ("click", "pattern")
+    )
+
+
+def write_sounds(study: NoiseStudy, folder: Path) -> tuple[str, ...]:
+    """Write every sound as a WAV file of 24 bit and 48 kHz, all to the same full scale.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files.
+    """
+    sounds = study_sounds(study)
+    scale = common_full_scale(sounds)
+    for name, _, pressure in sounds:
+        write_wav(folder / name, pressure, full_scale=scale)
+    return tuple(name for name, *_ in sounds)
+
+
+def _file_name(what: str, study: NoiseStudy, design: NoiseDesign) -> str:
+    """``click.wav`` alone, ``click-<design>.wav`` among several."""
+    if len(study.designs) == 1:
+        return f"{what}.wav"
+    words = [re.sub(r"[^A-Za-z0-9_-]+", "-", d.name).strip("-") for d in study.designs]
+    k = study.designs.index(design)
+    word = words[k] if words.count(words[k]) == 1 else f"{words[k]}-{k + 1}"
+    return f"{what}-{word}.wav"

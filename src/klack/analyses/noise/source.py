@@ -1,0 +1,406 @@
+"""Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from ruamel.yaml import YAML
+
+from klack.acoustics.comparison import first_impact
+from klack.analyses.catalogue import analysis_in
+from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.record import ContactSummary, ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.incomplete import failure_notes
+from klack.analyses.noise.force import (
+    before_impact,
+    impact_force,
+    interrupted_impact,
+    stop_forces,
+)
+from klack.analyses.noise.window import first_part
+from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.run import run_stroke
+from klack.assembling.body_summary import BodySummary
+from klack.assembling.structures import IMPACT_STOP
+from klack.case.bodies import CaseMaterial
+from klack.case.noise import CaseNoise
+from klack.case.schema import LEVELS, Case
+from klack.case.valve import VARIANTS, ValveCase
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+from klack.progress import Progress, silent
+from klack.reduction.structure import Structure
+from klack.signals import TimeSeries
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+
+__all__ = [
+    "NoiseSource",
+    "SourceStop",
+    "impact_sources",
+    "load_sources",
+    "run_sources",
+    "stroke_sources",
+]
+
+_HEARD = 0.1  # of the fastest impact: slower ones have less than 1 % of its energy
+_AROUND = 5.0  # contact times shown on each side of the strongest impact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SourceStop:
+    """Force of one stop: all of it, and its strongest impact alone."""
+
+    name: str
+    force: TimeSeries
+    strongest: TimeSeries
+    impacts: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NoiseSource:
+    """One run that makes noise.
+
+    Parameters
+    ----------
+    kind : str
+        ``"impact"`` or ``"stroke"``.
+    case, title, case_text : str
+    run, label : str
+        Name of the variant or level, and in words.
+    stops : tuple of SourceStop
+    structures : tuple of Structure
+    net : TimeSeries or None [N]
+        Mass times acceleration of the needle, means over records: the force that all of the valve
+        together exerts on it.  None where it is the contact force (a needle that only falls), or
+        where it is not known.
+    kept_up_to : float [Hz]
+        Lowest of the highest kept modes of all bodies; nan for rigid ones.
+    noise : CaseNoise
+    given : bool
+        Whether the case has a section ``noise``.
+    materials : mapping of str to CaseMaterial
+    notes : tuple of str
+    own_components : mapping of str to str
+        See :class:`klack.analyses.stroke.record.StrokeStudy`.
+    """
+
+    kind: str
+    case: str
+    title: str
+    case_text: str
+    run: str
+    label: str
+    stops: tuple[SourceStop, ...]
+    structures: tuple[Structure, ...]
+    kept_up_to: float
+    noise: CaseNoise
+    given: bool
+    materials: Mapping[str, CaseMaterial]
+    net: TimeSeries | None = None
+    notes: tuple[str, ...] = ()
+    own_components: Mapping[str, str] = field(default_factory=dict)
+
+
+# --------------------------------------------------------------------------- from disk, from cases
+
+
+def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Take forces and bodies from a stored result of an impact or a stroke.
+
+    Parameters
+    ----------
+    folder : Path
+    names : sequence of str
+        Variants or levels; the best one of an impact and the first one of a stroke without.
+
+    Raises
+    ------
+    InputError
+        If it is another kind of result, or holds no such variant or level.
+    """
+    analysis = analysis_in(folder)
+    if analysis.form.kind not in (ImpactStudy, StrokeStudy):
+        raise _no_source(f"result {folder}", f"a {analysis.form.name}")
+    return sources_of(analysis.load(folder), names)
+
+
+def sources_of(record: object, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Take forces and bodies from the record of an impact or a stroke.
+
+    Raises
+    ------
+    InputError
+        If it is another kind of record, or holds no such variant or level.
+    """
+    if isinstance(record, ImpactStudy):
+        return impact_sources(record, names)
+    if isinstance(record, StrokeStudy):
+        return stroke_sources(record, names)
+    raise _no_source("noise", f"a {type(record).__name__}")
+
+
+def _no_source(where: str, got: str) -> InputError:
+    return InputError(
+        where,
+        got=got,
+        expected="the result of an impact or a stroke",
+        hint="give the folder that klack impact or klack stroke names at the end.",
+    )
+
+
+def run_sources(
+    case: Case | ValveCase,
+    names: Sequence[str] = (),
+    *,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> tuple[NoiseSource, ...]:
+    """Run a case and take forces and bodies from it.
+
+    Parameters
+    ----------
+    case : Case or ValveCase
+    names : sequence of str
+        Levels of an impact, ``reduced`` without; variants of a stroke, the first one without.
+    progress : callable
+    threads : int, optional
+    """
+    if isinstance(case, ValveCase):
+        variants = tuple(names) or case.run.variants[:1]
+        stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
+        return stroke_sources(stroke, tuple(names))
+    levels = case.require_levels(tuple(names) or ("reduced",))
+    # transfer functions are not asked for here, and take longer than all the rest
+    case = case.model_copy(update={"run": case.run.model_copy(update={"transfer": None})})
+    impact = run_impact(case, levels=levels, certify=False, progress=progress, threads=threads)
+    return impact_sources(impact, tuple(names))
+
+
+# --------------------------------------------------------------------------- impacts
+
+
+def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Forces of an impact at some levels; of the best level without.
+
+    The structure is that of the reduced level, whichever level the force comes from.
+    """
+    _require_structures(study)
+    wanted = tuple(levels) or (study.reference,)
+    failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
+    noise, given, materials = _noise_section(study.case_text)
+    found = []
+    for name in wanted:
+        _require("level", name, study.levels, study.why_missing(name))
+        result = study.levels[name]
+        touched = bool(np.any(result.history.force > 0.0))
+        force = impact_force(result.history)
+        found.append(
+            NoiseSource(
+                kind="impact",
+                case=study.case,
+                title=study.title or study.case,
+                case_text=study.case_text,
+                run=name,
+                label=result.label,
+                stops=(
+                    SourceStop(
+                        name=IMPACT_STOP,
+                        force=force,
+                        strongest=first_impact(result.history) if touched else force,
+                        impacts=1 if touched else 0,
+                    ),
+                ),
+                structures=study.structures,
+                kept_up_to=float("nan") if name == "lumped" else _kept_up_to(study.bodies),
+                noise=noise,
+                given=given,
+                materials=materials,
+                notes=(*failed, *_contact_notes([study.contact] if name != "lumped" else ())),
+            )
+        )
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- strokes
+
+
+def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+    """Forces of all stops of a stroke, in some variants; in the first one without."""
+    _require_structures(study)
+    wanted = tuple(variants) or (study.reference.name,)
+    noise, given, materials = _noise_section(study.case_text)
+    found = []
+    for name in wanted:
+        _require("variant", name, study.variants)
+        variant = study.variants[name]
+        followed, cut = first_part(variant.result)
+        variant = replace(variant, result=followed)
+        net = _net_force(study, variant)
+        last = interrupted_impact(variant.result.events, net)
+        found.append(
+            NoiseSource(
+                kind="stroke",
+                case=study.case,
+                title=study.title or study.case,
+                case_text=study.case_text,
+                run=name,
+                label=variant.label,
+                stops=_stops(study, variant, last),
+                structures=study.structures,
+                kept_up_to=_kept_up_to(study.bodies) if variant.flexible else float("nan"),
+                noise=noise,
+                given=given,
+                materials=materials,
+                net=net if net is None else before_impact(net, last),
+                notes=(
+                    *filter(None, [cut]),
+                    *_notes(variant, last),
+                    *_contact_notes(study.stops if variant.flexible else ()),
+                ),
+                own_components=study.own_components,
+            )
+        )
+    return tuple(found)
+
+
+def _stops(
+    study: StrokeStudy, variant: StrokeVariant, last: ImpactEvent | None
+) -> tuple[SourceStop, ...]:
+    """Stops in the order of a stroke, the opening stop first; without the interrupted impact."""
+    order = dict.fromkeys(
+        name for name in (study.channels.opening_stop, study.channels.seat) if name
+    )
+    forces = {name: before_impact(f, last) for name, f in stop_forces(variant.result).items()}
+    result = []
+    for name in order | dict.fromkeys(forces):
+        if name in forces:
+            events = [event for event in variant.impacts(name) if event is not last]
+            result.append(
+                SourceStop(
+                    name=name,
+                    force=forces[name],
+                    strongest=_strongest(forces[name], events),
+                    impacts=len(events),
+                )
+            )
+    return tuple(result)
+
+
+def _strongest(force: TimeSeries, events: Sequence[ImpactEvent]) -> TimeSeries:
+    """Force about the impact with the highest peak, between its neighbours; time from its touch."""
+    if not events:
+        return force
+    k = int(np.argmax([event.peak_force for event in events]))
+    event = events[k]
+    begin = event.time - _AROUND * event.contact_time
+    end = event.time + (1.0 + _AROUND) * event.contact_time
+    if k > 0:
+        begin = max(begin, 0.5 * (_end(events[k - 1]) + event.time))
+    if k + 1 < len(events):
+        end = min(end, 0.5 * (_end(event) + events[k + 1].time))
+    edge = force.start - 0.5 * force.step
+    first = max(0, round((begin - edge) / force.step))
+    last = min(force.values.size, max(first + 2, round((end - edge) / force.step)))
+    return TimeSeries(
+        step=force.step,
+        values=force.values[first:last],
+        unit=force.unit,
+        start=force.start + first * force.step - event.time,
+        name=force.name,
+    )
+
+
+def _end(event: ImpactEvent) -> float:
+    if np.isfinite(event.separation_time):
+        return event.separation_time
+    return event.time + event.contact_time
+
+
+def _net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
+    """Mass times acceleration of the centre of mass of the needle [N], in records."""
+    masses = [body.mass for body in study.bodies if body.name == study.needle]
+    speed = variant.channel(study.channels.velocity)
+    if not masses or speed is None:
+        return None
+    time = variant.result.time
+    step = float(time[1] - time[0])
+    force = masses[0] * np.diff(speed.values) / step
+    return TimeSeries(
+        step=step, values=force, unit="N", start=float(time[0]) + 0.5 * step, name="net force"
+    )
+
+
+def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
+    result: NetworkResult = variant.result
+    found = []
+    fastest = max((event.approach_speed for event in result.events), default=0.0)
+    if last is not None and last.approach_speed > _HEARD * fastest:
+        found.append(
+            f"The run ends in an impact on '{last.stop}' at {last.approach_speed:.2g} m/s, which "
+            f"is left out (the fastest has {fastest:.2g} m/s); run it longer to have the whole of "
+            "it."
+        )
+    if result.failure:
+        found.append(f"The stroke is incomplete: {' '.join(result.failure.split())}")
+    incomplete = [stop for stop, record in result.interfaces.items() if not record.complete]
+    if incomplete:
+        found.append(
+            f"The fine record of {one_of(incomplete)} is not complete: its latest impacts are "
+            "known as means over the records alone."
+        )
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- what both share
+
+
+def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[str, ...]:
+    """What speaks against the contacts that the forces come from."""
+    return tuple(filter(None, map(contact_doubt, contacts)))
+
+
+def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
+    """Refuse a result with held bodies whose modes were not stored."""
+    held = [body.name for body in study.bodies if body.support != "free"]
+    if held and not study.structures:
+        raise InputError(
+            f"result of case {study.case}",
+            got=f"no modes and surfaces of {one_of(held)}, as an earlier version of klack wrote it",
+            expected="a result that holds them",
+            hint="run the case again, then klack noise.",
+        )
+
+
+def _require(what: str, name: str, held: Mapping[str, object], why: str = "") -> None:
+    if name in held:
+        return
+    hint = nearest(name, held, f"run the case with --{what} {name} first.")
+    if what == "level" and name in VARIANTS:
+        hint = f"impacts have levels, variants are of strokes: --level {next(iter(held))}."
+    elif what == "variant" and name in LEVELS:
+        hint = f"strokes have variants, levels are of impacts: --variant {next(iter(held))}."
+    raise InputError(
+        what,
+        got=f"'{name}', which the result does not hold{why}",
+        expected=f"one of: {one_of(held)}",
+        hint=hint,
+    )
+
+
+def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
+    tops = [float(body.frequencies[-1]) for body in bodies if body.frequencies.size]
+    return min(tops, default=float("nan"))
+
+
+def _noise_section(text: str) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
+    """Section ``noise`` and materials of the text of a case that was checked when it was run."""
+    data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines
+    given = data.get("noise") is not None
+    noise = CaseNoise.model_validate(data["noise"] if given else {})
+    materials = {
+        key: CaseMaterial.model_validate(value)
+        for key, value in (data.get("materials") or {}).items()
+    }
+    return noise, given, materials

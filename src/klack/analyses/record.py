@@ -1,0 +1,180 @@
+"""What every record begins with: what was computed, by which version, when, and how long it took.
+
+A record is what an analysis leaves behind.  Its fields are stored under their own names
+(:mod:`klack.analyses.store`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from time import perf_counter
+from typing import Protocol, TypedDict
+
+from klack import __version__
+from klack.stages import StageClock
+
+__all__ = [
+    "AnyRecord",
+    "CaseFields",
+    "CaseRecord",
+    "Record",
+    "RunFields",
+    "case_fields",
+    "run_fields",
+]
+
+_LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """Begin of every record.
+
+    Parameters
+    ----------
+    title, description : str
+    version : str
+        Of klack; ``versions`` holds those of the libraries.
+    created : str
+        ISO 8601.
+    wall_time : float [s]
+        Of the whole analysis.
+    stage_times : mapping of str to float [s]
+    warnings : tuple of str
+    """
+
+    title: str
+    description: str
+    version: str
+    versions: Mapping[str, str]
+    created: str
+    wall_time: float
+    stage_times: Mapping[str, float]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseRecord(Record):
+    """Begin of the record of one case.
+
+    Parameters
+    ----------
+    case : str
+        Name.
+    case_text : str
+        The file itself.
+    own_components : mapping of str to str
+        Components that are not part of klack: first digits of the SHA-256 of their code, by name.
+    """
+
+    case: str
+    case_text: str
+    own_components: Mapping[str, str] = field(default_factory=dict)
+
+
+class AnyRecord(Protocol):
+    """What can be read of every record, be it of one case or of several."""
+
+    @property
+    def case(self) -> str:
+        """Name of the case, or names of all."""
+
+    @property
+    def case_text(self) -> str:
+        """The files themselves."""
+
+    @property
+    def own_components(self) -> Mapping[str, str]:
+        """Components that are not part of klack."""
+
+    @property
+    def title(self) -> str:
+        """Of the case."""
+
+    @property
+    def description(self) -> str:
+        """Of the case."""
+
+    @property
+    def version(self) -> str:
+        """Of klack."""
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Of the libraries."""
+
+    @property
+    def created(self) -> str:
+        """ISO 8601."""
+
+    @property
+    def wall_time(self) -> float:
+        """Of the whole analysis [s]."""
+
+    @property
+    def stage_times(self) -> Mapping[str, float]:
+        """Wall time of each stage [s]."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know about the numbers."""
+
+
+class RunFields(TypedDict):
+    """Fields of a record that the run itself gives."""
+
+    version: str
+    versions: dict[str, str]
+    created: str
+    wall_time: float
+    stage_times: Mapping[str, float]
+
+
+class CaseFields(TypedDict):
+    """Fields of a record that its case gives."""
+
+    case: str
+    title: str
+    description: str
+    case_text: str
+    own_components: Mapping[str, str]
+
+
+class _Case(Protocol):
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def source(self) -> str: ...
+    @property
+    def own_components(self) -> Mapping[str, str]: ...
+
+
+def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
+    """Versions and times of a run that began at ``begin`` of ``time.perf_counter`` [s]."""
+    return {
+        "version": __version__,
+        "versions": {name: version(name) for name in (*_LIBRARIES, *libraries)},
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wall_time": perf_counter() - begin,
+        "stage_times": clock.times(),
+    }
+
+
+def case_fields(case: _Case | CaseRecord, case_text: str | None = None) -> CaseFields:
+    """Name, words and text of a case, or of the record that an analysis begins with."""
+    if isinstance(case, CaseRecord):
+        name, text = case.case, case.case_text
+    else:
+        name, text = case.name, case.source
+    return {
+        "case": name,
+        "title": case.title,
+        "description": case.description.strip(),
+        "case_text": text if case_text is None else case_text,
+        "own_components": case.own_components,
+    }

@@ -1,0 +1,1 @@
+"""Bodies reduced to modes and static corrections."""

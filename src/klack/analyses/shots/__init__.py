@@ -1,0 +1,1 @@
+"""Many drops of one valve, each a little different."""

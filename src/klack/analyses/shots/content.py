@@ -1,0 +1,338 @@
+"""What a report of shots says, before it is laid out: the same words for screen and paper."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.impact.pressure_figure import pressure_figure
+from klack.analyses.impact.pressure_view import PressureView, pressure_view
+from klack.analyses.impact.pressure_wording import pressure_rows
+from klack.analyses.measures import Measure, glossary
+from klack.analyses.page import page_of
+from klack.analyses.shots.figures import (
+    Shown,
+    distribution_chart,
+    force_traces_chart,
+    height_traces_chart,
+    peak_chart,
+    rebound_chart,
+)
+from klack.analyses.shots.map import shots_map
+from klack.analyses.shots.measures import DRAWN, FIRST_IMPACT, ROCKING, Shot
+from klack.analyses.shots.record import ShotColumns, ShotsStudy
+from klack.analyses.shots.wording import (
+    largest_size,
+    length_unit,
+    shot_name,
+    shots_answer,
+)
+from klack.report.page import Content, Section, Table
+from klack.report.wording import count, quantity, signed, signed_share
+
+__all__ = ["shots_content"]
+
+_LISTED = 100
+"""Shots in the table; the result holds all of them."""
+_RELATED, _FEWEST = 0.5, 5
+"""Least rank correlation that is worth a sentence, and the shots that it takes."""
+
+
+def shots_content(study: ShotsStudy) -> Content:
+    """Put a study into words, tables and figures."""
+    sections = [
+        Section(
+            title="Is the highest rebound the centred one?",
+            paragraphs=(_rule(study),),
+            charts=tuple(rebound_chart(study, shown) for shown in _explaining(study)),
+        ),
+        Section(title="Where the shots were", picture=shots_map(study)),
+        Section(title="How the rebounds are distributed", charts=(distribution_chart(study),)),
+        Section(title="Force and time of the first impact", charts=(peak_chart(study),)),
+        Section(title="Over time", charts=(height_traces_chart(study), force_traces_chart(study))),
+        _pressure(study),
+        _drawn(study),
+        _shots(study),
+    ]
+    return page_of(
+        study,
+        f"{study.shots.count} shots",
+        subtitle=(f"seed {study.seed}",),
+        answer=shots_answer(study),
+        numbers=_number_table(study),
+        sections=sections,
+        definitions=_DEFINITIONS,
+        limits=_LIMITS,
+    )
+
+
+# --------------------------------------------------------------------------- sections
+
+
+def _rule(study: ShotsStudy) -> str:
+    """How special the centred impact is, and what the rebound goes with."""
+    rank, text = study.rule.rank, "No shot rebounds as high as the centred impact."
+    if rank:
+        text = f"{_shots_of(rank)} at least as high as the centred impact."
+    related = {
+        shown.label: _rank_correlation(shown.of(study.shots), study.shots.rebound_height)
+        for shown in _drawn_numbers(study)
+    }
+    strongest = max(related, key=lambda label: abs(related[label]))
+    if abs(related[strongest]) > _RELATED:
+        grows = "rises" if related[strongest] > 0 else "falls"
+        text += (
+            f" Of all that was drawn, the rebound height goes most with the {strongest}: it "
+            f"{grows} with it (rank correlation {signed(related[strongest], 2)})."
+        )
+    return text
+
+
+def _rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Spearman's coefficient of what both columns know; 0 where one of them is constant."""
+    from scipy.stats import rankdata  # half a second to load, which every other report saves
+
+    known = np.isfinite(one) & np.isfinite(other)
+    first, second = rankdata(one[known]), rankdata(other[known])
+    if known.sum() < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
+        return 0.0
+    return float(np.corrcoef(first, second)[0, 1])
+
+
+def _shots_of(number: int) -> str:
+    return "One shot rebounds" if number == 1 else f"{number} shots rebound"
+
+
+def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
+    """What varies from shot to shot and may explain the rebound, as axes."""
+    candidates = (
+        Shown("eccentricity", "eccentricity", *length_unit(study.shots.eccentricity)),
+        Shown("tilt", "tilt", "°", np.degrees(1.0)),
+        Shown("force", "closing force", "N", 1.0),
+        Shown("friction", "friction in the guide", "", 1.0),
+        Shown("waviness", "out-of-roundness, rms", "nm", 1e9),
+    )
+    varying = [shown for shown in candidates if _varies(study.shots, shown.column)]
+    return varying or list(candidates[:2])
+
+
+def _explaining(study: ShotsStudy) -> list[Shown]:
+    """Eccentricity and tilt, and what else the rebound height goes with."""
+    height = study.shots.rebound_height
+    return [
+        shown
+        for shown in _drawn_numbers(study)
+        if shown.column in ("eccentricity", "tilt")
+        or abs(_rank_correlation(shown.of(study.shots), height)) > _RELATED
+    ]
+
+
+def _varies(shots: ShotColumns, column: str) -> bool:
+    values = getattr(shots, column)
+    return float(np.ptp(values)) > 1e-9 * largest_size(values)
+
+
+def _pressure(study: ShotsStudy) -> Section:
+    """Contact pressure of the centred impact, the highest and the lowest shot."""
+    title = "Pressure in the contact"
+    lowest = int(np.nanargmin(study.shots.restitution))
+    names = {
+        "centric": "centred impact",
+        "highest": f"highest rebound, {shot_name(study.highest)}",
+        "lowest": f"lowest restitution, {shot_name(lowest)}",
+    }
+    found = [
+        # the first record holds the first touch
+        pressure_view(names.get(key, key), record, float(record.time[0]) - 0.5 * study.step)
+        for key, record in study.pressures.items()
+    ]
+    views: list[PressureView] = [view for view in found if view is not None]
+    views = [view for view in views if view.places.shape == views[0].places.shape]
+    if not views:
+        return Section(title=title)
+    columns = ("", *(view.title for view in views))
+    return Section(
+        title=title,
+        picture=pressure_figure(views),
+        tables=(Table(columns=columns, rows=pressure_rows(views)),),
+    )
+
+
+def _drawn(study: ShotsStudy) -> Section:
+    facts = [
+        ("seed", str(study.seed)),
+        ("guide", study.guide or "none"),
+        ("surfaces", study.surfaces),
+        ("moving mass", quantity(1e3 * study.mass, "g")),
+        (
+            "start",
+            f"{study.speed:.4g}\N{NO-BREAK SPACE}m/s, {quantity(study.start_height, 'm', 3)} above "
+            "first touch",
+        ),
+        ("kept elastic modes", " + ".join(count(number) for number in study.modes)),
+        ("contact points", count(study.points)),
+        ("time step", quantity(study.step, "s", 3)),
+        (
+            "computing time of the shots",
+            f"{quantity(study.shot_time, 's', 3)} on {study.workers} "
+            f"process{'es' if study.workers != 1 else ''}",
+        ),
+    ]
+    if study.resumed:
+        facts.append(("taken over from an interrupted run", f"{count(study.resumed)} shots"))
+    drawn = Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items()))
+    fixed = Table(columns=("what all shots share", ""), rows=tuple(facts))
+    return Section(title="What was drawn from what", tables=(drawn, fixed))
+
+
+def _shots(study: ShotsStudy) -> Section:
+    """One row per shot, the centred impact first."""
+    shown = [column for column in _columns(study) if column[3] or _varies(study.shots, column[2])]
+    rows = [("centred", *(text(study.centric.row(0)) for _, text, _, _ in shown))]
+    for i in range(min(study.shots.count, _LISTED)):
+        row = study.shots.row(i)
+        mark = "\nhighest" if i == study.highest else ""
+        rows.append((f"{i}{mark}", *(text(row) for _, text, _, _ in shown)))
+    paragraphs: tuple[str, ...] = ()
+    if study.shots.count > _LISTED:
+        paragraphs = (f"The first {_LISTED} of {count(study.shots.count)} shots.",)
+    return Section(
+        title="All shots",
+        paragraphs=paragraphs,
+        tables=(Table(columns=("shot", *(title for title, *_ in shown)), rows=tuple(rows)),),
+    )
+
+
+_ShotText = Callable[[dict[str, float]], str]
+
+
+def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
+    """Head, text, column, and whether it stands there even if it never varies."""
+    unit, factor = length_unit(study.shots.rebound_height)
+    return (
+        ("off axis\n[µm]", _plain("eccentricity", 1e6, 2), "eccentricity", True),
+        ("towards\n[°]", _angle("direction"), "direction", False),
+        ("tilt\n[°]", _plain("tilt", np.degrees(1.0), 4), "tilt", True),
+        ("towards\n[°]", _angle("tilt_direction"), "tilt_direction", False),
+        ("force\n[N]", _plain("force", 1.0, 2), "force", False),
+        ("friction", _plain("friction", 1.0, 3), "friction", False),
+        ("waviness\n[nm]", _plain("waviness", 1e9, 0), "waviness", False),
+        ("restitution", _plain("restitution", 1.0, 4), "restitution", True),
+        (f"rebound\n[{unit}]", _plain("rebound_height", factor, 3), "rebound_height", True),
+        ("peak\n[N]", _plain("peak_force", 1.0, 1), "peak_force", True),
+        ("contact\n[µs]", _plain("contact_time", 1e6, 2), "contact_time", True),
+    )
+
+
+def _angle(column: str) -> _ShotText:
+    """Whole degrees from 0 to 359."""
+    return lambda row: f"{round(np.degrees(row[column])) % 360}"
+
+
+def _plain(column: str, factor: float, decimals: int) -> _ShotText:
+    def text(row: dict[str, float]) -> str:
+        value = factor * row[column]
+        if not np.isfinite(value):
+            return "–"
+        return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
+
+    return text
+
+
+# --------------------------------------------------------------------------- numbers
+
+
+def _number_table(study: ShotsStudy) -> Table:
+    """Centred, highest, and the spread of all shots."""
+    rows = [_number_row(study, measure) for measure in FIRST_IMPACT]
+    rows.append(
+        (
+            ROCKING.name,
+            ROCKING.printed(float(study.centric.rocking[0])),
+            ROCKING.printed(float(study.shots.rocking[study.highest])),
+            ROCKING.printed(float(np.nanmean(study.shots.rocking))),
+            ROCKING.printed(float(np.nanstd(study.shots.rocking))),
+            _range_of(study.shots.rocking, ROCKING.printed),
+        )
+    )
+    worst = largest_size(study.shots.energy_residual)
+    rows.append(("energy residual, largest", "", "", "", "", f"{worst:.1e}".replace("-", "−")))
+    return Table(
+        columns=(
+            "",
+            "centred impact",
+            f"highest rebound\n{shot_name(study.highest)}",
+            "mean",
+            "standard deviation",
+            f"range of {study.shots.count} shots",
+        ),
+        rows=tuple(rows),
+    )
+
+
+def _number_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
+    values = np.asarray(getattr(study.shots, measure.key))
+    centred = float(getattr(study.centric, measure.key)[0])
+    best = float(values[study.highest])
+    apart = best - centred
+    if measure.unit != "1":
+        bias = signed_share(apart / centred) if centred else "–"
+    else:
+        bias = signed(apart, 4)
+    if not np.isfinite(values).any():
+        return (measure.name, measure.printed(centred), *["–"] * 4)
+    return (
+        measure.name,
+        measure.printed(centred),
+        f"{measure.printed(best)}\n{bias}",
+        measure.printed(float(np.nanmean(values))),
+        measure.printed(float(np.nanstd(values))),
+        _range_of(values, measure.printed),
+    )
+
+
+def _range_of(values: NDArray[np.float64], text: Callable[[float], str]) -> str:
+    return f"{text(float(np.nanmin(values)))} to {text(float(np.nanmax(values)))}"
+
+
+# --------------------------------------------------------------------------- words
+
+_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    (
+        "shot",
+        "One drop of the moving body onto its seat, with its bounces, at the interface level: both "
+        "bodies as modes, the contact decided point by point, six rigid degrees of freedom of the "
+        "moving body. Only what is listed under 'What was drawn from what' differs between shots.",
+    ),
+    (
+        "centred impact",
+        "The same drop without eccentricity, tilt, out-of-roundness and Coulomb friction, with the "
+        "mean closing force.",
+    ),
+    (
+        "the rule, its bias",
+        "Rebounds of dry shots scatter, and the highest one is usually taken as that of a centred "
+        "impact. The bias is the highest value minus the centred one: what the rule gets wrong for "
+        "this valve. It depends on the number of shots and on what was drawn.",
+    ),
+    *glossary((*DRAWN, *FIRST_IMPACT, ROCKING)),
+    (
+        "pressure",
+        "Force of a contact point, normal to the surface, over its area. Sums such as the line "
+        "load are far more accurate than the pressure at one point.",
+    ),
+)
+
+_LIMITS: tuple[tuple[str, str], ...] = (
+    (
+        "Physics",
+        "Linear elastic bodies with small deformations; frictionless contact of smooth surfaces at "
+        "the seat; no fluid, no plastic flow. Out-of-roundness is a fixed shape of the ring that "
+        "differs from shot to shot.",
+    ),
+    (
+        "Chance",
+        "Another seed draws other shots: the highest of so many is itself a random number. The "
+        "answer holds for the distributions stated, not for others.",
+    ),
+)

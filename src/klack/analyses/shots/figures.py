@@ -1,0 +1,322 @@
+"""The figures of a report of shots, each built from a study by one function.
+
+The highest shot is red and the centred impact black in all of them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.shots.record import ShotColumns, ShotsStudy, ShotTraces
+from klack.analyses.shots.wording import length_unit, shot_name
+from klack.report.chart import AxisSpec, Chart, Colour, Curve, Mark, Panel, Style
+
+__all__ = [
+    "Shown",
+    "distribution_chart",
+    "force_traces_chart",
+    "height_traces_chart",
+    "peak_chart",
+    "rebound_chart",
+]
+
+Floats = NDArray[np.float64]
+
+_ALL, _CENTRED, _HIGHEST = "all shots", "centred impact", "highest rebound"
+_MOST_TRACES = 60
+"""Thin lines of shots; more would only cover each other and cost bytes."""
+_LONGER = 1.08
+"""Length of a time axis over the time that matters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A column of shots on an axis: its label, its unit there, and the factor from SI to it."""
+
+    column: str
+    label: str
+    unit: str
+    factor: float
+
+    def of(self, columns: ShotColumns) -> Floats:
+        """Values in that unit."""
+        return self.factor * np.asarray(getattr(columns, self.column))
+
+
+def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
+    """Restitution and rebound height of every shot over one number that was drawn."""
+    drawn, middle = over.of(study.shots), float(over.of(study.centric)[0])
+    height_unit, height_factor = length_unit(study.shots.rebound_height)
+    panels = [
+        _rebound_panel(study, drawn, middle, Shown("restitution", "restitution", "", 1.0)),
+        _rebound_panel(
+            study,
+            drawn,
+            middle,
+            Shown("rebound_height", "rebound height", height_unit, height_factor),
+        ),
+    ]
+    return Chart(
+        name=f"rebound-{over.column}",
+        title=f"Rebound over {over.label}",
+        x=AxisSpec(label=over.label, unit=over.unit),
+        panels=tuple(panel for panel in panels if panel is not None),
+        note=(
+            "Every point is one shot. Dashed: the centred impact; dotted: how far the highest "
+            "rebound of all shots is from it, the bias of the rule."
+        ),
+    )
+
+
+def _rebound_panel(study: ShotsStudy, drawn: Floats, middle: float, shown: Shown) -> Panel | None:
+    """One measure over one drawn number; None if no shot has it."""
+    values, centred = shown.of(study.shots), float(shown.of(study.centric)[0])
+    if not np.isfinite(values).any():
+        return None
+    best = study.highest
+    curves = [
+        _points(drawn, values, _ALL, "sky", 1.4, study.shots.count),
+        _single(drawn[best], values[best], _HIGHEST, "red", 2.0, shot_name(best)),
+        Curve(
+            x=np.array([drawn[best], drawn[best]]),
+            y=np.array([values[best], centred]),
+            label="bias",
+            colour="red",
+            style="dotted",
+            width=2.2,
+        ),
+        _single(middle, centred, _CENTRED, "black", 2.5, _CENTRED),
+    ]
+    return Panel(
+        y=AxisSpec(label=shown.label, unit=shown.unit),
+        curves=tuple(curves),
+        marks=(Mark(value=centred, axis="y"),) if np.isfinite(centred) else (),
+    )
+
+
+def _points(x: Floats, y: Floats, label: str, colour: Colour, width: float, count: int) -> Curve:
+    names = tuple(shot_name(i) for i in range(count))
+    return Curve(x=x, y=y, label=label, colour=colour, width=width, drawn="points", names=names)
+
+
+def _single(x: float, y: float, label: str, colour: Colour, width: float, name: str) -> Curve:
+    return Curve(
+        x=np.array([x]),
+        y=np.array([y]),
+        label=label,
+        colour=colour,
+        width=width,
+        drawn="points",
+        names=(name,),
+    )
+
+
+# --------------------------------------------------------------------------- distributions
+
+
+def distribution_chart(study: ShotsStudy) -> Chart:
+    """Histogram and share of shots below, of the rebound height; of the restitution without."""
+    shown = Shown("rebound_height", "rebound height", *length_unit(study.shots.rebound_height))
+    if not np.isfinite(study.shots.rebound_height).all():
+        shown = Shown("restitution", "restitution", "", 1.0)
+    values = np.sort(shown.of(study.shots)[np.isfinite(shown.of(study.shots))])
+    centred = float(shown.of(study.centric)[0])
+    counts, edges = np.histogram(values, bins="sturges")
+    outline = np.concatenate([edges[:1], edges])
+    low, high = min(float(values[0]), centred), max(float(values[-1]), centred)
+    span = (high - low) or 0.01 * abs(high)
+    below = 100 * np.arange(values.size + 1) / values.size
+    marks = [Mark(value=centred, label=_CENTRED)] if np.isfinite(centred) else []
+    marks.append(Mark(value=float(values[-1]), label=_HIGHEST))
+    return Chart(
+        name="distribution",
+        title=f"Distribution of the {shown.label}",
+        x=AxisSpec(
+            label=shown.label, unit=shown.unit, range=(low - 0.06 * span, high + 0.25 * span)
+        ),
+        panels=(
+            Panel(
+                y=AxisSpec(label="shots", range=(0.0, 1.35 * float(counts.max()))),
+                curves=(
+                    Curve(
+                        x=outline,
+                        y=np.concatenate([[0.0], counts, [0.0]]).astype(float),
+                        label="shots per class",
+                        colour="blue",
+                        drawn="steps",
+                        width=2.0,
+                    ),
+                ),
+                marks=tuple(sorted(marks, key=lambda mark: mark.value)),
+                share=0.8,
+            ),
+            Panel(
+                y=AxisSpec(label="share of shots", unit="%", range=(0.0, 104.0)),
+                curves=(
+                    Curve(
+                        x=np.concatenate([values[:1], values]),
+                        y=below,
+                        label="shots that rebound at most so high",
+                        colour="sky",
+                        drawn="steps",
+                        width=2.4,
+                    ),
+                ),
+                marks=tuple(replace(mark, label="") for mark in marks),
+                share=0.8,
+            ),
+        ),
+        note=(
+            f"Above: how many of the {values.size} shots fall into each class. Below: share of "
+            "shots up to each value."
+        ),
+    )
+
+
+def peak_chart(study: ShotsStudy) -> Chart:
+    """Contact time over peak force."""
+    force, time = study.shots.peak_force, 1e6 * study.shots.contact_time
+    best = study.highest
+    return Chart(
+        name="peak",
+        title="Contact time over peak force",
+        x=AxisSpec(label="peak force", unit="N"),
+        panels=(
+            Panel(
+                y=AxisSpec(label="contact time", unit="µs"),
+                curves=(
+                    _points(force, time, _ALL, "sky", 1.4, study.shots.count),
+                    _single(
+                        float(force[best]), float(time[best]), _HIGHEST, "red", 2.0, shot_name(best)
+                    ),
+                    _single(
+                        float(study.centric.peak_force[0]),
+                        1e6 * float(study.centric.contact_time[0]),
+                        _CENTRED,
+                        "black",
+                        2.5,
+                        _CENTRED,
+                    ),
+                ),
+            ),
+        ),
+        note="Of the first impact of every shot. The contact time is that of its first contact.",
+    )
+
+
+# --------------------------------------------------------------------------- over time
+
+
+def height_traces_chart(study: ShotsStudy) -> Chart:
+    """Height of the centre of mass over time, as long as the shots that stand out go on."""
+    unit, factor = length_unit(study.shot_traces.height)
+    bold = _bold(study)
+    ends = [_last(line.traces.time, line.traces.height[line.row]) for line in bold]
+    limit = _LONGER * max(ends)
+    return Chart(
+        name="height",
+        title="Height over time",
+        x=AxisSpec(label="time since first touch", unit="ms", range=(0.0, 1e3 * limit)),
+        panels=(
+            Panel(
+                y=AxisSpec(label="height", unit=unit),
+                curves=tuple(
+                    line.curve(1e3, factor, line.traces.time, line.traces.height, limit)
+                    for line in (*_thin(study), *bold)
+                ),
+                marks=(Mark(value=0.0, axis="y"),),
+            ),
+        ),
+        note=(
+            "Of the centre of mass, above its height at first touch; an eccentric body goes "
+            f"deeper, because it leans into its seat.{_thinned_note(study)}"
+        ),
+    )
+
+
+def force_traces_chart(study: ShotsStudy) -> Chart:
+    """Contact force of the first impact over time."""
+    bold = _bold(study)
+    limit = _LONGER * max(
+        _last(traces.force_time, np.where(traces.force != 0, traces.force, np.nan).T)
+        for traces in (study.shot_traces, study.centric_traces)
+    )
+    return Chart(
+        name="force",
+        title="Contact force of the first impact",
+        x=AxisSpec(label="time since first touch", unit="µs", range=(0.0, 1e6 * limit)),
+        panels=(
+            Panel(
+                y=AxisSpec(label="contact force", unit="N"),
+                curves=tuple(
+                    line.curve(1e6, 1.0, line.traces.force_time, line.traces.force, limit)
+                    for line in (*_thin(study), *bold)
+                ),
+            ),
+        ),
+        note=f"Along the axis, on the moving body.{_thinned_note(study)}",
+    )
+
+
+def _last(time: Floats, values: NDArray[np.float32]) -> float:
+    """Last time at which something is known, (k,) or (k, n) of it [s]."""
+    known = np.isfinite(values).reshape(len(time), -1).any(axis=1)
+    return float(time[known][-1]) if known.any() else float(time[-1])
+
+
+def _thinned_note(study: ShotsStudy) -> str:
+    extra = study.shots.count - _MOST_TRACES
+    return f" The first {_MOST_TRACES} shots are drawn." if extra > 0 else ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """One shot as a line: its row in the traces, and its look."""
+
+    traces: ShotTraces
+    row: int
+    label: str
+    colour: Colour
+    style: Style
+    width: float
+    listed: bool = True
+
+    def curve(
+        self,
+        time_factor: float,
+        factor: float,
+        time: Floats,
+        values: NDArray[np.float32],
+        limit: float,
+    ) -> Curve:
+        """The line up to ``limit`` [s]."""
+        seen = time <= limit
+        return Curve(
+            x=time_factor * time[seen],
+            y=factor * np.asarray(values[self.row][seen], dtype=float),
+            label=self.label,
+            colour=self.colour,
+            style=self.style,
+            width=self.width,
+            listed=self.listed,
+        )
+
+
+def _thin(study: ShotsStudy) -> list[_Line]:
+    """Many thin lines, the first with the name of all."""
+    return [
+        _Line(study.shot_traces, i, "" if i else _ALL, "sky", "solid", 0.6, listed=not i)
+        for i in range(min(study.shots.count, _MOST_TRACES))
+    ]
+
+
+def _bold(study: ShotsStudy) -> list[_Line]:
+    """Lowest, highest and centred, on top of all others."""
+    lowest, highest = int(np.nanargmin(study.shots.restitution)), study.highest
+    shots, low, high = study.shot_traces, shot_name(lowest), shot_name(highest)
+    return [
+        _Line(shots, lowest, f"lowest restitution, {low}", "orange", "dashed", 2.2),
+        _Line(shots, highest, f"{_HIGHEST}, {high}", "red", "solid", 2.2),
+        _Line(study.centric_traces, 0, _CENTRED, "black", "dashdot", 2.2),
+    ]

@@ -1,0 +1,313 @@
+"""One drop of a valve at the interface level, from a draw to its numbers."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.shots.draw import ShotDraw, polar
+from klack.analyses.shots.record import ShotColumns, ShotTraces
+from klack.contact.gap_update import RigidGaps
+from klack.contact.restitution import ImpactMeasures, measure_impact
+from klack.mesh.rigid import Pose
+from klack.transient.guide import Guide
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_result import InterfaceResult
+from klack.transient.interface_run import simulate_interface
+
+__all__ = [
+    "ShotOutcome",
+    "ShotSetup",
+    "columns_of",
+    "rigid_placement",
+    "run_shot",
+    "simulate_shot",
+    "traces_of",
+]
+
+_TRACE_POINTS = 600
+_FORCE_POINTS = 400
+_APEX_POINTS = 16  # between two records of the motion in flight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShotSetup:
+    """Everything that all shots of a valve share; plain arrays, cheap to send to other processes.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+        Centred, in first touch.
+    guide : Guide or None
+    gaps : RigidGaps
+    about : array, shape (3,) [m]
+        Point of the axis at the height of first touch, about which the moving body leans.
+    inertia : array, shape (3, 3) [kg m^2]
+        Of the moving body about its centre of mass.
+    opposite_gap : array, shape (m,) [m]
+        Gaps of the contact points of a stop above, at the placement of the model.
+    opposite_slope : array, shape (m, 6)
+        Their change per unit of a rigid placement; there the gaps stay linear.
+    radial : array, shape (nc - m,) [-]
+        Change of each gap at the seat per unit growth of the radius of the moving body.
+    angle : array, shape (nc - m,) [rad]
+        Of each contact point round the axis.
+    speed : float [m/s]
+    start_height : float [m]
+        Above first touch.
+    spring_stiffness : float [N/m]
+    duration, step : float [s]
+    impacts : int
+    force_span : float [s]
+        Length of the record of the first impact.
+    """
+
+    model: InterfaceModel
+    guide: Guide | None
+    gaps: RigidGaps
+    about: NDArray[np.float64]
+    inertia: NDArray[np.float64]
+    opposite_gap: NDArray[np.float64]
+    opposite_slope: NDArray[np.float64]
+    radial: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    speed: float
+    start_height: float
+    spring_stiffness: float
+    duration: float
+    step: float
+    impacts: int
+    force_span: float
+
+    @property
+    def trace_time(self) -> NDArray[np.float64]:
+        """Grid of the motion, from first touch [s]."""
+        return np.linspace(0.0, self.duration, _TRACE_POINTS + 1)
+
+    @property
+    def force_time(self) -> NDArray[np.float64]:
+        """Grid of the force of the first impact, from first touch [s]."""
+        return np.linspace(0.0, self.force_span, _FORCE_POINTS + 1)
+
+    def gaps_of(self, draw: ShotDraw) -> "ShotGaps":
+        """Gaps as a function of the placement, with the ring of this draw."""
+        added = self.radial * draw.radial_deviation(self.angle)
+        return ShotGaps(self.gaps, added, self.opposite_gap, self.opposite_slope)
+
+    def placement(self, draw: ShotDraw) -> NDArray[np.float64]:
+        """Rigid placement of the moving body at the start, but for its height, shape (6,)."""
+        return rigid_placement(draw.aside, draw.lean, self.about, self.model.centre)
+
+
+def rigid_placement(
+    aside: NDArray[np.float64],
+    lean: NDArray[np.float64],
+    about: NDArray[np.float64],
+    centre: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Translation of ``centre`` [m] and rotation vector [rad] of a body off its axis, shape (6,).
+
+    Parameters
+    ----------
+    aside, lean : array, shape (2,) [m], [rad]
+        Position of its axis at the height of ``about``, and slope of the axis.
+    about, centre : array, shape (3,) [m]
+    """
+    rotation = np.array([-lean[1], lean[0], 0.0])  # z x d
+    pose = Pose(rotation=rotation, about=about, shift=np.append(aside, 0.0))
+    return np.concatenate([pose.of(centre) - centre, rotation])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShotGaps:
+    """Gaps [m] at a rigid placement, with what an out-of-round ring adds to them."""
+
+    exact: RigidGaps
+    added: NDArray[np.float64]
+    opposite_gap: NDArray[np.float64]
+    opposite_slope: NDArray[np.float64]
+
+    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps, shape (nc,) [m], at a placement, shape (6,) [m], [rad]."""
+        seat = self.exact(placement) + self.added
+        return np.concatenate([seat, self.opposite_gap + self.opposite_slope @ placement])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShotOutcome:
+    """What came out of one shot.
+
+    Parameters
+    ----------
+    index : int
+    numbers : mapping of str to float
+        One for each field of :class:`klack.analyses.shots.record.ShotColumns`.
+    height, force : float32 array
+        On the grids of the setup.
+    approach : float [m]
+        Largest way of the moving body after first touch.
+    """
+
+    index: int
+    numbers: dict[str, float]
+    height: NDArray[np.float32]
+    force: NDArray[np.float32]
+    approach: float
+
+
+def simulate_shot(
+    setup: ShotSetup, draw: ShotDraw, *, impacts: int | None = None, points: bool = False
+) -> InterfaceResult:
+    """Let the moving body fly as drawn.
+
+    Parameters
+    ----------
+    setup : ShotSetup
+    draw : ShotDraw
+    impacts : int, optional
+        Stop earlier than the setup says.
+    points : bool
+        Keep the force of every contact point.
+    """
+    guide = setup.guide.with_friction(draw.friction) if setup.guide is not None else None
+    return simulate_interface(
+        setup.model,
+        speed=setup.speed,
+        duration=setup.duration,
+        step=setup.step,
+        force=draw.force + setup.spring_stiffness * setup.start_height,
+        spring_stiffness=setup.spring_stiffness,
+        guide=guide,
+        offset=setup.placement(draw),
+        height=setup.start_height,
+        gaps=setup.gaps_of(draw),
+        flight=True,
+        impacts=setup.impacts if impacts is None else impacts,
+        points=points,
+    )
+
+
+def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
+    """Simulate one shot and measure its first impact and its rebound."""
+    result = simulate_shot(setup, draw)
+    first = measure_impact(result.impacts[0].history)
+    second = np.nan
+    if len(result.impacts) > 1:
+        second = measure_impact(result.impacts[1].history).first_touch
+    time, height = _path(result)
+    height = height - np.interp(first.first_touch, time, height)
+    release = first.first_touch + first.total_contact_time
+    eccentricity, direction = polar(draw.aside)
+    tilt, tilt_direction = polar(draw.lean)
+    numbers = {
+        "eccentricity": eccentricity,
+        "direction": direction,
+        "tilt": tilt,
+        "tilt_direction": tilt_direction,
+        "force": draw.force,
+        "friction": draw.friction,
+        "waviness": draw.waviness,
+        "approach_speed": first.approach_speed,
+        "restitution": first.restitution,
+        "rebound_height": _highest(time, height, release, second),
+        "peak_force": first.peak_force,
+        "contact_time": first.contact_time,
+        "impulse": first.impulse,
+        "sub_contacts": float(first.sub_contacts),
+        "rocking": _rocking(setup, result, release, first),
+        "second_impact": second - first.first_touch,
+        "impacts": float(len(result.impacts)),
+        "energy_residual": result.energy.residual,
+    }
+    trace = np.interp(first.first_touch + setup.trace_time, time, height, right=np.nan)
+    history = result.impacts[0].history
+    force = np.interp(
+        first.first_touch + setup.force_time, history.time, history.force, left=0.0, right=0.0
+    )
+    return ShotOutcome(
+        index=draw.index,
+        numbers={key: float(value) for key, value in numbers.items()},
+        height=trace.astype(np.float32),
+        force=force.astype(np.float32),
+        approach=result.approach,
+    )
+
+
+def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
+    """Numbers of several shots as columns."""
+    return ShotColumns(
+        **{
+            field.name: np.array([outcome.numbers[field.name] for outcome in outcomes])
+            for field in fields(ShotColumns)
+        }
+    )
+
+
+def traces_of(setup: ShotSetup, outcomes: list[ShotOutcome]) -> ShotTraces:
+    """Motion and force of several shots in rows."""
+    return ShotTraces(
+        time=setup.trace_time,
+        height=np.stack([outcome.height for outcome in outcomes]),
+        force_time=setup.force_time,
+        force=np.stack([outcome.force for outcome in outcomes]),
+    )
+
+
+def _path(result: InterfaceResult) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Height of the centre of mass over time: all steps of impacts, parabolas in flight."""
+    motion = result.motion
+    z, v = motion.position[:, 2], motion.velocity[:, 2]
+    times, heights = [], []
+    spans = []
+    for segment in result.impacts:
+        history = segment.history
+        speed = segment.side * history.velocity_a
+        way = np.cumsum(0.5 * (speed[1:] + speed[:-1])) * history.step
+        times.append(history.edges)
+        heights.append(segment.position[2] + np.append(0.0, way))
+        spans.append((history.edges[0], history.edges[-1]))
+    s = np.arange(_APEX_POINTS) / _APEX_POINTS
+    for i in range(len(motion.time) - 1):
+        start, end = motion.time[i], motion.time[i + 1]
+        middle = 0.5 * (start + end)
+        if any(first <= middle <= last for first, last in spans):
+            continue
+        h = end - start
+        # cubic through both positions and velocities (Hermite); exact under a constant force
+        curve = (
+            z[i] * (1 + 2 * s) * (1 - s) ** 2
+            + z[i + 1] * s**2 * (3 - 2 * s)
+            + h * s * (1 - s) * (v[i] * (1 - s) - v[i + 1] * s)
+        )
+        times.append(start + h * s)
+        heights.append(curve)
+    times.append(motion.time[-1:])
+    heights.append(z[-1:])
+    time, height = np.concatenate(times), np.concatenate(heights)
+    order = np.argsort(time, kind="stable")
+    return time[order], height[order]
+
+
+def _highest(
+    time: NDArray[np.float64], height: NDArray[np.float64], release: float, second: float
+) -> float:
+    """Highest place between two impacts; nan if the record ends before it was reached."""
+    end = second if np.isfinite(second) else np.inf
+    flight = np.flatnonzero((time >= release) & (time <= end))
+    if not len(flight):
+        return float("nan")
+    top = flight[np.argmax(height[flight])]
+    if top == flight[-1] and not np.isfinite(second):
+        return float("nan")
+    return float(height[top])
+
+
+def _rocking(
+    setup: ShotSetup, result: InterfaceResult, release: float, first: ImpactMeasures
+) -> float:
+    """Kinetic energy across the axis and of rotation after the impact, over that of approach."""
+    motion = result.motion
+    after = min(int(np.searchsorted(motion.time, release)), len(motion.time) - 1)
+    v = motion.velocity[after]
+    energy = setup.model.mass * float(v[:2] @ v[:2]) + float(v[3:] @ setup.inertia @ v[3:])
+    return energy / (setup.model.mass * first.approach_speed**2)

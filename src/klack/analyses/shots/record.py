@@ -1,0 +1,208 @@
+"""What ``klack shots`` leaves behind: many drops of one valve, and the drop that is centred.
+
+The numbers are plain columns, one row per shot, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.impact.record import PressureRecord
+from klack.analyses.record import CaseRecord
+
+__all__ = [
+    "RuleVerdict",
+    "ShotColumns",
+    "ShotTraces",
+    "ShotsStudy",
+]
+
+Column = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotColumns:
+    """Shots in rows: what was drawn, and what came out.
+
+    Every field is an array of shape (n,).
+
+    Parameters
+    ----------
+    eccentricity, direction : array [m], [rad]
+        Distance of the axis of the moving body from that of the seat at the height of first touch,
+        and where to (from x towards y), at the start.
+    tilt, tilt_direction : array [rad]
+        Angle between the axes, and where the upper end leans to.
+    force : array [N]
+        Closing force at first touch.
+    friction : array [-]
+        Coulomb's coefficient in the guide.
+    waviness : array [m]
+        Root mean square out-of-roundness of the ring.
+    approach_speed : array [m/s]
+        Of the first impact.
+    restitution : array [-]
+    rebound_height : array [m]
+        Highest position of the centre of mass between the first impact and the second, above that
+        at first touch; nan if the shot ended on the way up.
+    peak_force, contact_time, impulse : array [N], [s], [N s]
+        Of the first impact; the impulse of all its contacts.
+    sub_contacts : array [-]
+        Contacts of which the first impact consists.
+    rocking : array [-]
+        Kinetic energy of rotation and lateral motion right after the first impact, over the energy
+        of approach.
+    second_impact : array [s]
+        Time from the first touch to that of the second impact; nan if there was none.
+    impacts : array [-]
+        Impacts until the shot ended.
+    energy_residual : array [-]
+        Energy from nowhere over the initial energy, of the whole shot.
+    """
+
+    eccentricity: Column
+    direction: Column
+    tilt: Column
+    tilt_direction: Column
+    force: Column
+    friction: Column
+    waviness: Column
+    approach_speed: Column
+    restitution: Column
+    rebound_height: Column
+    peak_force: Column
+    contact_time: Column
+    impulse: Column
+    sub_contacts: Column
+    rocking: Column
+    second_impact: Column
+    impacts: Column
+    energy_residual: Column
+
+    @property
+    def count(self) -> int:
+        """Number of shots."""
+        return len(self.restitution)
+
+    def row(self, index: int) -> dict[str, float]:
+        """Return all numbers of one shot by the name of their column."""
+        return {field.name: float(getattr(self, field.name)[index]) for field in fields(self)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotTraces:
+    """Motion and first impact over time, one row per shot, on grids that all rows share.
+
+    Parameters
+    ----------
+    time : array, shape (k,) [s]
+        From the first touch.
+    height : float32 array, shape (n, k) [m]
+        Of the centre of mass, above that at first touch; nan after the end of the shot.
+    force_time : array, shape (m,) [s]
+        From the first touch.
+    force : float32 array, shape (n, m) [N]
+        Axial contact force of the first impact.
+    """
+
+    time: Column
+    height: NDArray[np.float32]
+    force_time: Column
+    force: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RuleVerdict:
+    """Whether the highest rebound of all shots is the one of a centred impact.
+
+    Parameters
+    ----------
+    restitution_bias : float [-]
+        Restitution of the shot with the highest rebound, minus the centred one.
+    rebound_height_bias : float [m]
+        The same of the rebound height.
+    relative_restitution_bias, relative_rebound_height_bias : float [-]
+        Over the centred values.
+    rank : int
+        How many shots rebound at least as high as the centred one.
+    holds : bool
+        True if the relative bias of the restitution is below 1 %.
+    sentence : str
+        The answer in words.
+    """
+
+    restitution_bias: float
+    rebound_height_bias: float
+    relative_restitution_bias: float
+    relative_rebound_height_bias: float
+    rank: int
+    holds: bool
+    sentence: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotsStudy(CaseRecord):
+    """All shots of one valve, side by side.
+
+    Parameters
+    ----------
+    shot_time : float [s]
+        Wall time of the shots alone, on ``workers`` processes.
+    seed : int
+    workers : int
+    resumed : int
+        Shots that an earlier, interrupted run had finished.
+    speed : float [m/s]
+        At the start, ``start_height`` [m] above first touch.
+    step : float [s]
+        Of the time loop.
+    distributions : mapping of str to str
+        What was drawn from what, in words.
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``.
+    guide : str
+        The guide in words; empty without one.
+    mass : float [kg]
+        Of the moving body.
+    modes : tuple of int
+        Kept elastic modes of the moving body and of the one it hits.
+    points : int
+        Contact points.
+    approach : float [m]
+        Largest approach of any shot.
+    shots : ShotColumns
+    centric : ShotColumns
+        One row: no eccentricity, tilt, waviness or Coulomb friction, and the mean force.
+    shot_traces, centric_traces : ShotTraces
+    highest : int
+        Row of the shot with the highest rebound.
+    rule : RuleVerdict
+    pressures : mapping of str to PressureRecord
+        Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
+        ``"lowest"`` for the shot with the lowest restitution.
+    """
+
+    shot_time: float
+    seed: int
+    workers: int
+    resumed: int
+    speed: float
+    start_height: float
+    step: float
+    distributions: Mapping[str, str]
+    surfaces: str
+    guide: str
+    mass: float
+    modes: tuple[int, ...]
+    points: int
+    approach: float
+    shots: ShotColumns
+    centric: ShotColumns
+    shot_traces: ShotTraces
+    centric_traces: ShotTraces
+    highest: int
+    rule: RuleVerdict
+    pressures: Mapping[str, PressureRecord]

@@ -1,0 +1,239 @@
+"""``klack shots``: many drops of one valve, each a little different, and the centred one."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.record import PressureRecord
+from klack.analyses.record import case_fields, run_fields
+from klack.analyses.shots.draw import (
+    ShotDraw,
+    centric_draw,
+    closing_force,
+    draw_shot,
+    shots_of,
+)
+from klack.analyses.shots.log import shot_log, shots_mark
+from klack.analyses.shots.model import ShotModel, build_shots
+from klack.analyses.shots.one_shot import ShotSetup, columns_of, run_shot, simulate_shot, traces_of
+from klack.analyses.shots.pool import run_shots_on
+from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
+from klack.cache.setting import result_cache
+from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.schema import Case
+from klack.cores import available_cores
+from klack.errors import ConvergenceError
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+from klack.units import format_si
+
+__all__ = ["judge_rule", "run_shots"]
+
+_RULE_HOLDS = 0.01
+_LARGE_RESIDUAL = 1e-3
+
+
+def run_shots(
+    case: Case,
+    *,
+    count: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    folder: Path | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> ShotsStudy:
+    """Draw and compute many shots of one valve.
+
+    Parameters
+    ----------
+    case : Case
+        With a section ``shots``.
+    count, seed : int, optional
+        Instead of those of the case.
+    workers : int, optional
+        Processes; as many as there are cores without.
+    folder : Path, optional
+        Where finished shots are kept until all are there: an interrupted run goes on from them.
+        See :class:`klack.analyses.unfinished.UnfinishedLog`.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Returns
+    -------
+    ShotsStudy
+
+    Raises
+    ------
+    InputError
+        A case without shots, numbers that cannot be, a contact that leaves the contact points.
+    ConvergenceError
+        A shot that cannot be computed.
+    """
+    begin = perf_counter()
+    stated = shots_of(case)
+    count = stated.count if count is None else count
+    seed = stated.seed if seed is None else seed
+    workers = available_cores() if workers is None else workers
+    clock = StageClock(progress, result_cache())
+    mark = shots_mark(case, seed, threads)
+    with shot_log(folder, mark) as log, collected_warnings() as notes:
+        model = build_shots(case, clock, threads=threads)
+        draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
+        resumed = sum(draw.index in log.done for draw in draws)
+        clock("shots", 0.0)
+        centred = centric_draw(case)
+        centric = run_shot(model.setup, centred)
+        run_shots_on(workers, model.setup, draws, log, clock)
+        outcomes = [log.done[draw.index] for draw in draws]
+        shots = columns_of(outcomes)
+        alone = columns_of([centric])
+        highest = _highest(shots)
+        lowest = int(np.nanargmin(shots.restitution))
+        pictured = {"centric": centred, "highest": draws[highest], "lowest": draws[lowest]}
+        pressures = _pressures(model.setup, pictured)
+        clock("shots", 1.0)
+    return ShotsStudy(
+        **case_fields(case),
+        **run_fields(begin, clock),
+        shot_time=clock.spent(("shots",)),
+        seed=seed,
+        workers=workers,
+        resumed=resumed,
+        speed=case.motion.speed,
+        start_height=model.setup.start_height,
+        step=model.setup.step,
+        distributions=_distributions(case),
+        surfaces=f"{case.contact.moving} on {case.contact.stop}",
+        guide=_guide_in_words(case.guide),
+        mass=model.setup.model.mass,
+        modes=model.modes,
+        points=model.setup.model.count,
+        approach=max(outcome.approach for outcome in (*outcomes, centric)),
+        shots=shots,
+        centric=alone,
+        shot_traces=traces_of(model.setup, outcomes),
+        centric_traces=traces_of(model.setup, [centric]),
+        highest=highest,
+        rule=judge_rule(shots, alone, highest),
+        pressures=pressures,
+        warnings=(*notes, *_notes(model, shots)),
+    )
+
+
+def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVerdict:
+    """Compare the shot with the highest rebound with the centred one.
+
+    Measurements cannot centre a needle; they take the highest rebound of many shots for the centred
+    one.  That is right as long as everything off centre costs rebound, and wrong where something
+    that varies (the closing force, for one) lifts single shots above the centred one.
+    """
+    e, h = float(shots.restitution[highest]), float(shots.rebound_height[highest])
+    aside = float(shots.eccentricity[highest])
+    e0, h0 = float(centric.restitution[0]), float(centric.rebound_height[0])
+    restitution, height = e / e0 - 1.0, h / h0 - 1.0
+    holds = abs(restitution) < _RULE_HOLDS
+    found = (
+        f"Of {shots.count} shots, shot {highest}, {format_si(aside, 'm', 2)} off the axis, "
+        f"rebounds highest: {format_si(h, 'm', 3)} at a restitution of {e:.4f}; "
+        f"the centred shot has {format_si(h0, 'm', 3)} and {e0:.4f}."
+    )
+    verdict = (
+        f"Taking the highest rebound of {shots.count} for the centred one is "
+        f"{'right' if holds else 'wrong'} for this valve: the restitution is off by "
+        f"{100.0 * restitution:+.2f} % and the rebound height by {100.0 * height:+.1f} %."
+    )
+    return RuleVerdict(
+        restitution_bias=e - e0,
+        rebound_height_bias=h - h0,
+        relative_restitution_bias=restitution,
+        relative_rebound_height_bias=height,
+        rank=int(np.sum(shots.rebound_height >= h0)),
+        holds=holds,
+        sentence=f"{found} {verdict}",
+    )
+
+
+def _highest(shots: ShotColumns) -> int:
+    """Row with the highest rebound."""
+    complete = np.isfinite(shots.rebound_height) & np.isfinite(shots.restitution)
+    if not np.any(complete):
+        raise ConvergenceError(
+            "shots: no shot came to the top of a rebound that follows a clear separation.\n"
+            "Try: a longer shots.duration, or another closing force: rebounds of less than 50 us "
+            "belong to one impact."
+        )
+    return int(np.argmax(np.where(complete, shots.rebound_height, -np.inf)))
+
+
+def _pressures(setup: ShotSetup, pictured: Mapping[str, ShotDraw]) -> dict[str, PressureRecord]:
+    """Contact forces point by point of the first impact of some shots."""
+    records = {}
+    for name, draw in pictured.items():
+        first = simulate_shot(setup, draw, impacts=1, points=True).impacts[0]
+        record = pressure_record(
+            first.history, first.point_force, setup.model.points, setup.model.area
+        )
+        if record is not None:
+            records[name] = record
+    return records
+
+
+def _distributions(case: Case) -> dict[str, str]:
+    shots = shots_of(case)
+    words = {"closing force": closing_force(case).text("N")}
+    if shots.eccentricity is not None:
+        words["eccentricity"] = shots.eccentricity.text("m")
+    if shots.tilt is not None:
+        words["tilt"] = shots.tilt.text("rad")
+    if shots.eccentricity is None and shots.tilt is None and case.guide is not None:
+        words["eccentricity and tilt"] = (
+            f"axis anywhere in the clearance of {format_si(case.guide.clearance, 'm')} at "
+            "the lowest and the highest guiding height"
+        )
+    if shots.friction is not None:
+        words["friction"] = shots.friction.text("")
+    elif case.guide is not None:
+        words["friction"] = format_si(case.guide.friction, "")
+    if shots.waviness is not None:
+        low, high = shots.waviness.harmonics
+        words["waviness"] = f"{shots.waviness.rms.text('m')}; {low} to {high} waves round the ring"
+    return words
+
+
+def _guide_in_words(guide: CaseGuide | None) -> str:
+    if guide is None:
+        return ""
+    heights = " and ".join(format_si(height, "m") for height in guide.heights)
+    law = guide.law
+    if isinstance(law, LinearGuideLaw):
+        stiffness = f"{format_si(law.stiffness, 'N/m')}"
+    else:
+        bore = "rigid bore" if law.bore is None else f"bore of {format_si(law.bore, 'N/m')}"
+        stiffness = f"elastic shaft in a {bore}"
+    text = f"{guide.surface} at {heights}, clearance {format_si(guide.clearance, 'm')}, {stiffness}"
+    if guide.viscous > 0.0:
+        text += f", drag {format_si(guide.viscous, 'N s/m')}"
+    return text
+
+
+def _notes(model: ShotModel, shots: ShotColumns) -> tuple[str, ...]:
+    """What a reader of the numbers should know."""
+    notes = []
+    unfinished = int(np.sum(~np.isfinite(shots.rebound_height)))
+    if unfinished:
+        notes.append(
+            f"{unfinished} of {shots.count} shots ended before the top of their rebound and have "
+            "no rebound height. Try: a longer shots.duration."
+        )
+    residual = float(np.max(np.abs(shots.energy_residual)))
+    if residual > _LARGE_RESIDUAL:
+        notes.append(
+            f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step."
+        )
+    return tuple(notes)

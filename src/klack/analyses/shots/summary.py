@@ -1,0 +1,135 @@
+"""The few numbers of a study of shots that a script or a terminal wants."""
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.json_results import ShotsJson
+from klack.analyses.measures import json_of
+from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
+from klack.analyses.shots.record import ShotColumns, ShotsStudy
+from klack.units import format_si
+
+__all__ = [
+    "DISTRIBUTION_COLUMNS",
+    "QUANTILES",
+    "distribution_rows",
+    "shots_measured",
+    "shots_to_json",
+    "shots_told",
+]
+
+DISTRIBUTION_COLUMNS = (
+    "measure",
+    "centred",
+    "highest rebound",
+    "mean",
+    "standard deviation",
+    "lowest",
+    "median",
+    "highest",
+)
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Shares of the shots that stay below."""
+
+
+def shots_to_json(study: ShotsStudy) -> ShotsJson:
+    """Plain numbers in SI, the unit in the key.
+
+    Returns
+    -------
+    dict
+        ``case``, ``seed``; ``centric`` and ``shots``: the numbers of the centred shot and of every
+        other; ``highest``: index of the highest rebound; ``distribution``: per measure its mean,
+        standard deviation and quantiles; ``rule``: highest rebound minus centred shot.  Numbers
+        that do not exist (nan) are None.
+    """
+    rule = study.rule
+    return {
+        "schema": "klack-shots/1",
+        "case": study.case,
+        "klack": study.version,
+        "seed": study.seed,
+        "centric": _row(study.centric, 0),
+        "shots": [_row(study.shots, i) for i in range(study.shots.count)],
+        "highest": study.highest,
+        "distribution": {
+            measure.json_key: _distribution(getattr(study.shots, measure.key))
+            for measure in FIRST_IMPACT
+        },
+        "rule": {
+            "holds": rule.holds,
+            "restitution_bias": _number(rule.restitution_bias),
+            "rebound_height_bias": _number(rule.rebound_height_bias),
+            "relative_restitution_bias": _number(rule.relative_restitution_bias),
+            "relative_rebound_height_bias": _number(rule.relative_rebound_height_bias),
+            "shots_at_least_as_high_as_centric": rule.rank,
+            "sentence": rule.sentence,
+        },
+        "wall_time_s": _number(study.wall_time),
+        "shot_time_s": _number(study.shot_time),
+        "workers": study.workers,
+        "resumed": study.resumed,
+    }
+
+
+def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
+    """What a terminal shows: the distribution of each measure, and the rule."""
+    title = f"{study.title}: {study.shots.count} shots, seed {study.seed}"
+    yield TextTable(title=title, columns=DISTRIBUTION_COLUMNS, rows=distribution_rows(study))
+    yield study.rule.sentence
+
+
+def shots_measured(study: ShotsStudy) -> Iterator[Measured]:
+    """The centred shot and every other with its measures."""
+    yield "centred", study.centric.row(0), SHOT_MEASURES
+    for index in range(study.shots.count):
+        yield f"shot {index}", study.shots.row(index), SHOT_MEASURES
+
+
+def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`DISTRIBUTION_COLUMNS`, one per measure, as text."""
+    rows = []
+    for measure in FIRST_IMPACT:
+        values = getattr(study.shots, measure.key)
+        known = values[np.isfinite(values)]
+        numbers = (
+            float(getattr(study.centric, measure.key)[0]),
+            float(values[study.highest]),
+            float(np.mean(known)),
+            float(np.std(known)),
+            *(float(np.quantile(known, share)) for share in (0.0, 0.5, 1.0)),
+        )
+        rows.append((measure.name, *(_text(number, measure.unit) for number in numbers)))
+    return tuple(rows)
+
+
+def _row(columns: ShotColumns, index: int) -> dict[str, Any]:
+    return json_of(SHOT_MEASURES, columns.row(index))
+
+
+def _distribution(values: np.ndarray) -> dict[str, float | None]:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return dict.fromkeys(("mean", "standard_deviation"))
+    quantiles = {f"quantile_{share:g}": float(np.quantile(known, share)) for share in QUANTILES}
+    return {
+        "mean": float(np.mean(known)),
+        "standard_deviation": float(np.std(known)),
+        **quantiles,
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if isfinite(value) else None
+
+
+def _text(value: float, unit: str) -> str:
+    if not isfinite(value):
+        return "–"
+    return format_si(value, unit) if unit != "1" else f"{value:.4f}"

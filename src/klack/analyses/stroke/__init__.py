@@ -1,0 +1,1 @@
+"""One actuation of a whole valve."""

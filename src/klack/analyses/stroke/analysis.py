@@ -1,0 +1,65 @@
+"""A stroke study on disk; see :mod:`klack.analyses.store`.
+
+``result.zarr/study/variants/wet/result/channels/coil current/values`` is the current of the wet
+run; its unit stands beside it as ``unit``.
+"""
+
+from dataclasses import replace
+from math import isfinite
+
+from klack.analyses.analysis import Analysis
+from klack.analyses.store import RecordFormat
+from klack.analyses.stroke.measures import EVENT_MEASURES
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.summary import stroke_measured, stroke_to_json, stroke_told
+from klack.reduction.structure import STRUCTURE_UNITS
+from klack.report.page import Content
+
+__all__ = ["STROKE"]
+
+
+def _stroke_content(study: StrokeStudy) -> Content:
+    from klack.analyses.stroke.content import stroke_content
+
+    return stroke_content(study)
+
+
+def _renewed(study: StrokeStudy) -> StrokeStudy:
+    """None for the nan with which earlier versions said that there is no such number."""
+    return replace(study, lift=_known(study.lift), switch_off=_known(study.switch_off))
+
+
+def _known(value: float | None) -> float | None:
+    return value if value is not None and isfinite(value) else None
+
+
+STROKE = Analysis(
+    form=RecordFormat(
+        name="klack stroke study",
+        version=1,
+        kind=StrokeStudy,
+        command="klack stroke",
+        units={
+            **STRUCTURE_UNITS,
+            "time": "s",
+            "step": "s",
+            "contact_force": "N",
+            "film_force": "N",
+            "gap": "m",
+            "indentation": "m",
+            "force": "N",
+            "share": "1",
+            "approach": "m",
+            "static_force": "N",
+            "area": "m^2",
+            "frequencies": "Hz",
+            **{measure.key: measure.unit for measure in EVENT_MEASURES},
+        },
+        tables=("events",),
+    ),
+    content=_stroke_content,
+    to_json=stroke_to_json,
+    told=stroke_told,
+    measured=stroke_measured,
+    renewed=_renewed,
+)

@@ -1,0 +1,410 @@
+"""What a stroke report says, before it is laid out: the same words for screen and paper."""
+
+from collections.abc import Callable
+from math import isfinite
+
+import numpy as np
+
+from klack.analyses.impact.content import body_table, size_verdict
+from klack.analyses.measures import Measure, glossary
+from klack.analyses.page import page_of
+from klack.analyses.stroke.figures import (
+    actuation_chart,
+    echo_chart,
+    energy_bars,
+    first_impact_chart,
+    mechanical_energy_bars,
+    shown_stops,
+    stop_law_chart,
+    variants_chart,
+)
+from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.missing import cut_records
+from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.summary import (
+    TIME_COLUMNS,
+    first_impact,
+    start_text,
+    time_rows,
+)
+from klack.analyses.stroke.wording import largest, stroke_answer
+from klack.report.chart import BarChart, Chart
+from klack.report.page import Content, Section, Table
+from klack.report.wording import quantity
+from klack.simulation.network_result import EnergyBooks
+
+__all__ = ["stroke_charts", "stroke_content"]
+
+_MOST_IMPACTS = 12
+_ROUND_OFF = 1e-12
+"""Share of the throughput below which an energy is zero."""
+
+
+def stroke_content(study: StrokeStudy) -> Content:
+    """Put a study into words, tables and figures."""
+    sections = [
+        Section(
+            title="The actuation",
+            charts=_named(actuation_chart(study)),
+            tables=_time_tables(study),
+        ),
+        _comparison(study, wet=True),
+        Section(title="First impacts", charts=_named(*_first_impacts(study))),
+        Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
+        _comparison(study, wet=False),
+        _impacts(study),
+        Section(
+            title="Energy",
+            charts=_named(energy_bars(study), mechanical_energy_bars(study)),
+            tables=(_energy_table(study),),
+        ),
+        _computed(study),
+        Section(
+            title="Local laws of the stops",
+            charts=_named(*(stop_law_chart(stop) for stop in study.stops)),
+        ),
+    ]
+    return page_of(
+        study,
+        "Stroke of a valve",
+        answer=stroke_answer(study),
+        numbers=_number_table(study),
+        sections=sections,
+        definitions=_DEFINITIONS,
+        limits=_limits(study),
+    )
+
+
+def stroke_charts(study: StrokeStudy) -> tuple[Chart | BarChart, ...]:
+    """Every figure that the study has data for, in the order of the report."""
+    return tuple(chart for section in stroke_content(study).sections for chart in section.charts)
+
+
+def _named(*charts: Chart | BarChart | None) -> tuple[Chart | BarChart, ...]:
+    return tuple(chart for chart in charts if chart is not None)
+
+
+# --------------------------------------------------------------------------- sections
+
+
+def _flexible(study: StrokeStudy) -> list[str]:
+    """Variants with elastic bodies; all if there are none."""
+    found = [name for name, variant in study.variants.items() if variant.flexible]
+    return found or list(study.variants)
+
+
+def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
+    """Lay dry over wet, or lumped over flexible; empty if there is nothing to compare."""
+    if wet:
+        names, title = _flexible(study), "Dry and wet"
+        kinds = {study.variants[name].wet for name in names}
+        charts = [
+            variants_chart(
+                study,
+                names,
+                name="dry-wet",
+                title="Lift, velocity and forces, dry and wet",
+                note="The same valve with and without its fluid.",
+            )
+        ]
+        return Section(title=title, charts=tuple(charts) if len(kinds) == 2 else ())
+    pairs = [
+        (name, f"{name}-lumped")
+        for name in ("wet", "dry")
+        if {name, f"{name}-lumped"} <= {*study.variants}
+    ]
+    found: list[Chart | BarChart] = []
+    for flexible, lumped in pairs:
+        note = (
+            "Flexible bodies with their consistent local laws against rigid bodies on one spring "
+            "and dashpot per stop."
+        )
+        found.append(
+            variants_chart(
+                study,
+                (flexible, lumped),
+                name=f"lumped-{flexible}",
+                title=f"Flexible against lumped, {flexible}",
+                note=note,
+            )
+        )
+        for stop in shown_stops(study):
+            chart = first_impact_chart(
+                study,
+                stop,
+                (flexible, lumped),
+                name=f"lumped-{flexible}-{stop}",
+                title=f"First impact on '{stop}', flexible against lumped, {flexible}",
+            )
+            found += _named(chart)
+    return Section(title="Flexible against lumped", charts=tuple(found))
+
+
+def _first_impacts(study: StrokeStudy) -> list[Chart | None]:
+    return [
+        first_impact_chart(
+            study,
+            stop,
+            _flexible(study),
+            name=f"first-{stop}",
+            title=f"First impact on '{stop}'",
+        )
+        for stop in shown_stops(study)
+    ]
+
+
+def _echoes(study: StrokeStudy) -> list[Chart | None]:
+    return [echo_chart(study, stop, line) for line in study.lines for stop in shown_stops(study)]
+
+
+def _impacts(study: StrokeStudy) -> Section:
+    paragraphs, tables = [], []
+    for variant in study.variants.values():
+        events = variant.result.events
+        if not events:
+            paragraphs.append(f"Variant '{variant.name}' has no impacts.")
+            continue
+        if len(events) > _MOST_IMPACTS:
+            paragraphs.append(
+                f"Variant '{variant.name}' has {len(events)} impacts; the first {_MOST_IMPACTS} "
+                "are listed, the result and klack stroke --json hold all of them."
+            )
+        rows = [
+            (f"{i + 1}. {event.stop}", *(measure.on_page(event) for measure in _SHOWN))
+            for i, event in enumerate(events[:_MOST_IMPACTS])
+        ]
+        columns = (variant.name, *(measure.title or measure.name for measure in _SHOWN))
+        tables.append(Table(columns=columns, rows=tuple(rows)))
+    return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
+
+
+_SHOWN = tuple(measure for measure in EVENT_MEASURES if measure.page)
+_OF_FIRST = ("approach_speed", "peak_force", "contact_time", "restitution")
+
+
+def _computed(study: StrokeStudy) -> Section:
+    tables = [body_table(study.bodies)] if study.bodies else []
+    if study.stops:
+        tables.append(_stop_table(study.stops))
+    if study.fluid is not None:
+        tables.append(_fluid_table(study.fluid))
+    if study.lines:
+        tables.append(
+            Table(
+                columns=("line", "length", "speed of sound", "echo time 2L/a"),
+                rows=tuple(
+                    (
+                        line.name,
+                        quantity(line.length, "m"),
+                        quantity(line.sound_speed, "m/s"),
+                        quantity(line.echo_time, "s"),
+                    )
+                    for line in study.lines
+                ),
+            )
+        )
+    return Section(title="What was computed from what", tables=tuple(tables))
+
+
+def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
+    rows: tuple[tuple[str, Callable[[StopSummary], str]], ...] = (
+        ("surfaces", lambda stop: stop.surfaces or "none"),
+        ("local law", lambda stop: stop.kind),
+        ("film beside the contact", lambda stop: "yes" if stop.film else "no"),
+        ("gap at the start", lambda stop: quantity(stop.gap, "m", 4)),
+        ("force that shaped the ports", lambda stop: quantity(stop.pattern_force, "N", 3)),
+        ("half width of the contact there", lambda stop: quantity(stop.half_width, "m", 3)),
+        (
+            "element size over half width",
+            lambda stop: (
+                f"{stop.size_ratio:.2f} ({size_verdict(stop.size_ratio)})"
+                if isfinite(stop.size_ratio)
+                else "–"
+            ),
+        ),
+        ("contact points across", lambda stop: str(stop.points_across or "–")),
+        ("doubts about the contact", lambda stop: "\n".join(stop.doubts) or "–"),
+    )
+    return Table(
+        columns=("stop", *(stop.name for stop in stops)),
+        rows=tuple((title, *(text(stop) for stop in stops)) for title, text in rows),
+    )
+
+
+def _fluid_table(fluid: FluidSummary) -> Table:
+    rows = (
+        ("temperature", f"{fluid.temperature - 273.15:.4g} °C"),
+        ("pressure, absolute", f"{1e-5 * fluid.pressure:.4g} bar"),
+        ("density", f"{fluid.density:.4g} kg/m³"),
+        ("bulk modulus, with its gas", f"{1e-9 * fluid.bulk_modulus:.4g} GPa"),
+        ("speed of sound", f"{fluid.sound_speed:.4g} m/s"),
+        ("dynamic viscosity", f"{1e3 * fluid.viscosity:.4g} mPa s"),
+        ("vapour pressure, absolute", f"{1e-5 * fluid.vapour_pressure:.4g} bar"),
+    )
+    return Table(columns=("fluid", fluid.name), rows=rows)
+
+
+# --------------------------------------------------------------------------- tables
+
+
+def _time_tables(study: StrokeStudy) -> tuple[Table, ...]:
+    rows = time_rows(study)
+    return (Table(columns=TIME_COLUMNS, rows=rows),) if rows else ()
+
+
+def _number_table(study: StrokeStudy) -> Table:
+    """Quantities down, variants across."""
+    variants = list(study.variants.values())
+    shown = [_row(measure, variants) for measure in VARIANT_MEASURES if measure.page]
+    first = 1 + max(i for i, row in enumerate(shown) if row[0] in ("closing time", "impacts"))
+    starts = [start_text(variant).removeprefix("start ") for variant in variants]
+    rows = [*shown[:first], ("start", *(text or "continued, or free" for text in starts))]
+    channels = study.channels
+    for title, names, unit in (
+        ("largest current", channels.current, "A"),
+        ("largest magnetic force", channels.magnetic_force, "N"),
+        ("largest lift", (channels.lift,), "m"),
+    ):
+        values = [largest(variant, names) for variant in variants]
+        if np.isfinite(values).any():
+            rows.append((title, *(quantity(value, unit) for value in values)))
+    for stop in shown_stops(study):
+        events = [first_impact(variant, stop) for variant in variants]
+        rows += [
+            (
+                f"first impact, {stop}: {measure.title or measure.name}",
+                *("–" if event is None else measure.on_page(event) for event in events),
+            )
+            for measure in _SHOWN
+            if measure.key in _OF_FIRST
+        ]
+    rows += shown[first:]
+    heads = [
+        f"{variant.name}{' (reference)' if variant is variants[0] and len(variants) > 1 else ''}"
+        f"\n{variant.label}"
+        for variant in variants
+    ]
+    return Table(columns=("", *heads), rows=tuple(rows))
+
+
+def _row(measure: Measure[StrokeVariant], variants: list[StrokeVariant]) -> tuple[str, ...]:
+    name = measure.title or measure.name
+    return (name, *(measure.on_page(variant) for variant in variants))
+
+
+def _energy_table(study: StrokeStudy) -> Table:
+    """Every entry of the books that is not zero in all variants."""
+    variants = list(study.variants.values())
+    books = [variant.result.books for variant in variants]
+    rows: list[tuple[str, ...]] = []
+    for word, entries in _ENERGY_KINDS:
+        values = [entries(book) for book in books]
+        for name in dict.fromkeys(key for value in values for key in value):
+            found = [value.get(name) for value in values]
+            if any(
+                x is not None and abs(x) > _ROUND_OFF * book.throughput
+                for x, book in zip(found, books, strict=True)
+            ):
+                rows.append((f"{word} {name}", *map(_energy, found, books)))
+    rows.append(("throughput", *(quantity(book.throughput, "J") for book in books)))
+    residuals = [
+        f"{quantity(book.residual, 'J', 2)}\n{book.relative_residual:.1e} of the throughput"
+        for book in books
+    ]
+    rows.append(("residual", *(text.replace("e-", "e\N{MINUS SIGN}") for text in residuals)))
+    return Table(columns=("", *study.variants), rows=tuple(rows))
+
+
+def _changes(books: EnergyBooks) -> dict[str, float]:
+    return {key: value - books.stores_before[key] for key, value in books.stores_after.items()}
+
+
+_ENERGY_KINDS: tuple[tuple[str, Callable[[EnergyBooks], dict[str, float]]], ...] = (
+    ("supplied,", lambda books: dict(books.supplies)),
+    ("lost,", lambda books: dict(books.losses)),
+    ("stored more,", _changes),
+)
+
+
+def _energy(value: float | None, books: EnergyBooks) -> str:
+    if value is None:
+        return "–"
+    if abs(value) <= _ROUND_OFF * books.throughput:
+        value = 0.0
+    return quantity(value, "J", 4)
+
+
+# --------------------------------------------------------------------------- words
+
+
+_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    (
+        "variants",
+        "wet: as described in the case; dry: the same without its fluid, films included; lumped: "
+        "rigid bodies on one spring and dashpot per stop.",
+    ),
+    (
+        "opening time, closing time",
+        "From the start of the run to the first touch of the opening stop and of the seat, in the "
+        "first stroke that passes 90 % of the lift (else in the longest). A stroke begins and ends "
+        "at 10 % of the lift from where the needle was at rest; a valve that starts open closes "
+        "first. What a run does not reach, or a film cushions to the end, is not reached.",
+    ),
+    (
+        "impact",
+        "Contacts closer together than the longest period of the needle are one impact. Its speed "
+        "is the closing speed of the centres of mass at first touch, or the highest one since its "
+        "film began to press; its peak force, impulse and restitution count contact and film "
+        "together. A touch slower than 2 % of the fastest impact on a stop does not count as its "
+        "first impact.",
+    ),
+    *glossary(measure for measure in EVENT_MEASURES if measure.page),
+    *glossary(measure for measure in VARIANT_MEASURES if measure.page),
+    (
+        "echo time 2L/a",
+        "Time of a pressure wave to the far end of a line and back.",
+    ),
+)
+
+
+def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
+    limits = [
+        (
+            "Physics",
+            "Motion along one axis; linear elastic bodies with small deformations; frictionless "
+            "contact without plastic flow; one-dimensional waves in lines, chambers with one "
+            "pressure each; magnetic fluxes in a network of reluctances.",
+        ),
+        (
+            "Contact",
+            "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
+            "contact are outside the assumptions.",
+        ),
+    ]
+    tops = [
+        f"{body.name} {quantity(float(body.frequencies[-1]), 'Hz', 3)}"
+        for body in study.bodies
+        if body.frequencies.size
+    ]
+    if tops:
+        limits.append(
+            (
+                "Frequency",
+                f"Highest kept modes: {', '.join(tops)}. Above them a body follows only through "
+                "its static compliance.",
+            )
+        )
+    incomplete = [
+        f"'{stop}' ({variant.name}) at {quantity(end, 's', 4)}"
+        for variant in study.variants.values()
+        for stop, end in cut_records(variant.result).items()
+    ]
+    if incomplete:
+        limits.append(
+            (
+                "Records",
+                f"The fine record ends early, of {', '.join(incomplete)}, because it was full. "
+                "Impacts and channels are complete.",
+            )
+        )
+    return tuple(limits)

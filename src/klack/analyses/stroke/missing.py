@@ -1,0 +1,55 @@
+"""What is not in the record of a stroke, in words: runs that ended early, fine records cut off."""
+
+from collections.abc import Mapping, Sequence
+
+from klack.analyses.stroke.record import StrokeVariant
+from klack.simulation.network_result import NetworkResult
+from klack.units import format_si
+
+__all__ = ["cut_records", "missing_notes"]
+
+
+def missing_notes(
+    variants: Mapping[str, StrokeVariant], not_run: Sequence[str], failure: Exception | None
+) -> tuple[str, ...]:
+    """Say what is missing in the variants of a study; empty if nothing is.
+
+    Parameters
+    ----------
+    variants : mapping of name to StrokeVariant
+    not_run : sequence of str
+        Variants that were asked for and have no record.
+    failure : Exception or None
+        That ended the study.
+    """
+    notes = []
+    for name, variant in variants.items():
+        result = variant.result
+        if result.failure:
+            end = format_si(float(result.time[-1]), "s", 6)
+            notes.append(f"'{name}' is incomplete, it ends at {end}: {_line(result.failure)}")
+        cut = cut_records(result)
+        if cut:
+            ends = ", ".join(f"of '{stop}' at {format_si(t, 's', 4)}" for stop, t in cut.items())
+            notes.append(
+                f"'{name}': the record of the forces in fine steps is full and ends early: {ends}. "
+                "Impacts and channels are complete to the end of the run; curves of later impacts "
+                "are not."
+            )
+    if not_run and failure is not None:
+        because = "" if any(v.result.failure for v in variants.values()) else f": {_line(failure)}"
+        notes.append(f"not computed: {', '.join(not_run)}, because the run failed{because}")
+    return tuple(notes)
+
+
+def cut_records(result: NetworkResult) -> dict[str, float]:
+    """Stops whose fine record was full before the end of the run, and where it ends [s]."""
+    return {
+        stop: float(record.time[-1] + record.step[-1]) if record.time.size else float("nan")
+        for stop, record in result.interfaces.items()
+        if not record.complete
+    }
+
+
+def _line(text: object) -> str:
+    return " ".join(str(text).split())

@@ -1,0 +1,302 @@
+"""What one stroke study leaves behind: the same valve in several variants, side by side.
+
+The numbers are plain arrays and small frozen records, so that a stored study can be reported again
+without the solver.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+from klack.analyses.stroke.times import LiftTimes, Passage
+from klack.assembling.body_summary import BodySummary
+from klack.errors import ConvergenceError
+from klack.reduction.structure import Structure
+from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
+
+__all__ = [
+    "FluidSummary",
+    "IncompleteStrokeError",
+    "LineSummary",
+    "StopSummary",
+    "StrokeChannels",
+    "StrokeStudy",
+    "StrokeVariant",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FluidSummary:
+    """The fluid at its working temperature.
+
+    Parameters
+    ----------
+    name : str
+    temperature : float [K]
+    pressure : float [Pa]
+        Absolute, at which the numbers below hold: the highest start pressure of the valve.
+    density : float [kg/m^3]
+    bulk_modulus : float [Pa]
+        With its entrained gas.
+    sound_speed : float [m/s]
+    viscosity : float [Pa s]
+        Dynamic.
+    vapour_pressure : float [Pa]
+        Absolute.
+    """
+
+    name: str
+    temperature: float
+    pressure: float
+    density: float
+    bulk_modulus: float
+    sound_speed: float
+    viscosity: float
+    vapour_pressure: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineSummary:
+    """One line of the valve.
+
+    Parameters
+    ----------
+    name : str
+        Component.
+    length : float [m]
+    sound_speed : float [m/s]
+        Of its waves, with the elasticity of the wall.
+    echo_time : float [s]
+        ``2 L / a``: spacing of the stairs in pressure and rebound velocity.
+    """
+
+    name: str
+    length: float
+    sound_speed: float
+    echo_time: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StopSummary:
+    """One end stop: its surfaces, static contact and local law.
+
+    Parameters
+    ----------
+    name : str
+        Component of the network, for example ``"seat"``.
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``; empty for a stop without surfaces.
+    kind : str
+        ``"consistent"`` if the law was computed, else the kind that the case gives.
+    gap : float [m]
+        At the start; of the opening stop, the lift.
+    film : bool
+        Whether a squeeze film acts beside the contact.
+    indentation, force : array, shape (k,) [m], [N]
+        Local law; empty for a law that is given.
+    share : array, shape (k,) [-]
+        Share of the static compliance that the law carries, at each force.
+    approach, static_force, area : array, shape (n,) [m], [N], [m^2]
+        Static contact of the two full bodies, from first touch.
+    pattern_force : float [N]
+        Force whose pressure pattern the ports carry; nan for a law that is given.
+    half_width : float [m]
+        Of the contact at that force.
+    size_ratio : float [-]
+        Element size across the contact over the half width; good up to 1, doubtful above 1.5.
+    points_across : int
+        Contact points that carry across the whole width then; 0 where nobody knows.
+    doubts : tuple of str
+        Why no error of impacts on this stop can be judged, each in a few words.
+    """
+
+    name: str
+    surfaces: str
+    kind: str
+    gap: float
+    film: bool
+    indentation: NDArray[np.float64]
+    force: NDArray[np.float64]
+    share: NDArray[np.float64]
+    approach: NDArray[np.float64]
+    static_force: NDArray[np.float64]
+    area: NDArray[np.float64]
+    pattern_force: float
+    half_width: float
+    size_ratio: float
+    points_across: int = 0
+    doubts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StrokeChannels:
+    """Names of the channels that tell the story of a stroke, in every variant that has them.
+
+    Parameters
+    ----------
+    lift : str
+        Displacement of the port at which the lift is measured, for example
+        ``"needle.tip displacement"``; ``lift_velocity`` is its rate.
+    velocity : str
+        Of the centre of mass of the needle.
+    voltage, current, magnetic_force : tuple of str
+        One per solenoid.
+    pressures, flows : tuple of str
+    opening_stop, seat : str
+        Components of the two stops; empty if the valve has none.
+    """
+
+    lift: str
+    lift_velocity: str
+    velocity: str
+    voltage: tuple[str, ...]
+    current: tuple[str, ...]
+    magnetic_force: tuple[str, ...]
+    pressures: tuple[str, ...]
+    flows: tuple[str, ...]
+    opening_stop: str
+    seat: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StrokeVariant:
+    """One run of the valve.
+
+    Parameters
+    ----------
+    name : str
+        ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
+    label : str
+        What a legend says, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
+    wet, flexible : bool
+    modes : int
+        Degrees of freedom of all bodies.
+    opening_time : float or None [s]
+        From the start of the run to the first touch of the opening stop in the stroke of
+        ``times``; None if it is not touched.
+    closing_time : float or None [s]
+        The same for the seat.  A valve that starts open closes before it opens.
+    times : tuple of LiftTimes
+        Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
+        lift, and the touches.
+    result : NetworkResult
+    setup_time : float [s]
+        Wall time of everything before the time loop that is this variant's own.
+    """
+
+    name: str
+    label: str
+    wet: bool
+    flexible: bool
+    modes: int
+    opening_time: float | None
+    closing_time: float | None
+    result: NetworkResult
+    setup_time: float
+    times: tuple[LiftTimes, ...] = ()
+
+    @property
+    def needle_times(self) -> LiftTimes:
+        """Opening and closing of the needle; of older results, its touches only."""
+        if self.times:
+            return self.times[0]
+        touches = [
+            time if time is not None and isfinite(time) else None
+            for time in (self.opening_time, self.closing_time)
+        ]
+        opening, closing = (Passage(touch=touch) for touch in touches)
+        return LiftTimes(
+            body="",
+            starts="closed",
+            lift=None,
+            between_stops=False,
+            opening=opening,
+            closing=closing,
+        )
+
+    def impacts(self, stop: str, *, slowest: float = 0.0) -> tuple[ImpactEvent, ...]:
+        """Impacts on one stop, faster than ``slowest`` [m/s], in order of time."""
+        return tuple(
+            event
+            for event in self.result.events
+            if event.stop == stop and event.approach_speed >= slowest
+        )
+
+    def channel(self, name: str) -> ChannelData | None:
+        """Return a recorded channel; None if this variant has none of this name."""
+        return self.result.channels.get(name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StrokeStudy(CaseRecord):
+    """All variants of one actuation, side by side.
+
+    Parameters
+    ----------
+    needle : str
+        Component of the body that moves.
+    lift : float or None [m]
+        Travel from the seat to the opening stop, both unloaded; None if no stop ends it.
+    switch_off : float or None [s]
+        When the drivers' command ends; None if no driver says.
+    duration, step : float [s]
+    variants : mapping of name to StrokeVariant
+        The first one is the one to compare with; the last one may be incomplete, see
+        :attr:`~klack.simulation.network_result.NetworkResult.failure`.
+    channels : StrokeChannels
+    bodies : tuple of BodySummary
+        Their ``compliance_share`` is the smallest of all contact ports.
+    stops : tuple of StopSummary
+    fluid : FluidSummary or None
+        None for a case without fluid.
+    lines : tuple of LineSummary
+    structures : tuple of Structure
+        Held bodies as sources of sound, their stops by the names of the end stops.
+    """
+
+    needle: str
+    lift: float | None
+    switch_off: float | None
+    duration: float
+    step: float
+    variants: Mapping[str, StrokeVariant]
+    channels: StrokeChannels
+    bodies: tuple[BodySummary, ...]
+    stops: tuple[StopSummary, ...]
+    fluid: FluidSummary | None = None
+    lines: tuple[LineSummary, ...] = ()
+    structures: tuple[Structure, ...] = ()
+
+    @property
+    def reference(self) -> StrokeVariant:
+        """First variant: the one that the others are compared with."""
+        return next(iter(self.variants.values()))
+
+    @property
+    def opening_time(self) -> float | None:
+        """Opening time of the reference [s]; None if it does not reach its stop."""
+        return self.reference.opening_time
+
+    @property
+    def closing_time(self) -> float | None:
+        """Closing time of the reference [s]; None if it does not reach its seat."""
+        return self.reference.closing_time
+
+
+class IncompleteStrokeError(ConvergenceError):
+    """A variant failed on its way; ``study`` holds it until then, and all variants before it.
+
+    Parameters
+    ----------
+    text : str
+    study : StrokeStudy
+        Says in its warnings what is missing.
+    """
+
+    def __init__(self, text: str, study: StrokeStudy) -> None:
+        super().__init__(text)
+        self.study = study

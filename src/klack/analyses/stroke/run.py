@@ -1,0 +1,375 @@
+"""``klack stroke``: one actuation of a whole valve, in the variants asked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from time import perf_counter
+
+import numpy as np
+
+from klack.analyses.impact.contact_check import check_contact
+from klack.analyses.record import case_fields, run_fields
+from klack.analyses.stroke.missing import missing_notes
+from klack.analyses.stroke.record import (
+    FluidSummary,
+    IncompleteStrokeError,
+    LineSummary,
+    StopSummary,
+    StrokeChannels,
+    StrokeStudy,
+    StrokeVariant,
+)
+from klack.analyses.stroke.rest import rest_note
+from klack.analyses.stroke.times import all_lift_times
+from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.valve import Valve, build_valve
+from klack.cache.setting import result_cache
+from klack.case.valve import ValveCase, Variant
+from klack.case.valve_roles import ValveRoles, find_roles
+from klack.errors import ConvergenceError, InputError
+from klack.magnetics.driver import TimedDriver
+from klack.mechanics.end_stop import EndStop
+from klack.network.network import Network
+from klack.network.port import Role
+from klack.network.rows import Rows
+from klack.network.travel import Travel
+from klack.progress import Progress, silent
+from klack.simulation.network_result import IncompleteRunError, NetworkResult
+from klack.simulation.network_run import State, simulate_network
+from klack.stages import StageClock, collected_warnings
+from klack.units import format_si
+
+__all__ = ["run_stroke", "run_variant", "variant_network"]
+
+
+def run_stroke(
+    case: ValveCase,
+    *,
+    variants: Sequence[str] = (),
+    after: StrokeStudy | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> StrokeStudy:
+    """Compute one actuation in several variants and lay them side by side.
+
+    Parameters
+    ----------
+    case : ValveCase
+    variants : sequence of str
+        Among :data:`klack.case.valve_sections.VARIANTS`; those of the case by default.
+    after : StrokeStudy, optional
+        Go on where this study of the same case ended: time goes on, for another duration.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Returns
+    -------
+    StrokeStudy
+
+    Raises
+    ------
+    IncompleteStrokeError
+        When a variant fails on its way: with the study up to there.
+    """
+    begin = perf_counter()
+    wanted = case.require_variants(tuple(variants) or case.run.variants)
+    states = {name: _state(case, after, name) for name in wanted}
+    roles = find_roles(case)
+    clock = StageClock(progress, result_cache())
+    with collected_warnings() as notes:
+        valve = build_valve(case, clock, threads=threads)
+        runs, failure = _runs(valve, roles, states, clock)
+        stops = _stop_summaries(valve)
+    results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
+    rows = [run.rows for run in runs.values()]
+    told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
+    starts = {name: item.result.start for name, item in results.items()}
+    begun = [
+        f"'{name}': {note}"
+        for name, at in starts.items()
+        for note in (at.notes if at else ())
+        if not any(note in other for other in notes)  # a warning already
+    ]
+    missing = missing_notes(results, [name for name in wanted if name not in results], failure)
+    study = StrokeStudy(
+        **case_fields(case),
+        **run_fields(begin, clock),
+        needle=roles.needle,
+        lift=_lift(rows[0], roles.needle),
+        switch_off=_switch_off(valve.network),
+        duration=case.run.duration,
+        step=case.run.step,
+        variants=results,
+        channels=_channels(valve.network, roles, [run.result for run in results.values()]),
+        bodies=_body_summaries(valve),
+        stops=stops,
+        fluid=_fluid_summary(rows),
+        lines=_line_summaries(valve.network, rows),
+        structures=valve.structures,
+        warnings=(*missing, *notes, *begun, *(note for note in told if note)),
+    )
+    if failure is not None:
+        raise IncompleteStrokeError(str(failure), study) from failure
+    return study
+
+
+def variant_network(valve: Valve, variant: Variant) -> Network:
+    """Network of one variant of a valve: without fluid, with rigid bodies, or both."""
+    network = valve.network
+    if variant.startswith("dry"):
+        network = network.dry()
+    lumped = valve.case.lumped
+    if variant.endswith("lumped"):
+        if lumped is None:  # refused by require_variants already
+            raise InputError(
+                "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it."
+            )
+        network = network.lumped(lumped.stiffness, lumped.restitution)
+    return network
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    variant: StrokeVariant
+    rows: Rows
+    failure: ConvergenceError | None
+
+
+def run_variant(
+    case: ValveCase,
+    rows: Rows,
+    progress: Callable[[float], None] = lambda fraction: None,
+    *,
+    state: State | None = None,
+) -> NetworkResult:
+    """Run rows for the time and with the steps that the case asks for, from rest or a state."""
+    return simulate_network(
+        rows,
+        duration=case.run.duration,
+        step=case.run.step,
+        coarse=case.run.coarse,
+        record=case.run.record,
+        state=state,
+        progress=progress,
+    )
+
+
+def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State | None:
+    """State in which a variant of a former study ended; None to start from rest."""
+    if after is None:
+        return None
+    if after.step != case.run.step:  # the clock counts steps
+        raise InputError(
+            "step",
+            got=format_si(case.run.step, "s"),
+            expected=f"{format_si(after.step, 's')}, the step of the result to go on from",
+            hint="keep the step, or run from the start.",
+        )
+    if name not in after.variants:
+        raise InputError(
+            "variant",
+            got=f"'{name}', which the result to go on from does not hold",
+            expected=f"one of: {', '.join(after.variants)}",
+            hint="run that variant from the start first.",
+        )
+    return after.variants[name].result.state
+
+
+def _runs(
+    valve: Valve, roles: ValveRoles, states: Mapping[Variant, State | None], progress: Progress
+) -> tuple[dict[str, _Run], ConvergenceError | None]:
+    """Variants up to the first one that fails, with what there is of it, and its error."""
+    runs: dict[str, _Run] = {}
+    for name, state in states.items():
+        try:
+            runs[name] = _run(valve, roles, name, state, progress)
+        except ConvergenceError as error:
+            if not runs:
+                raise
+            return runs, error
+        failure = runs[name].failure
+        if failure is not None:
+            return runs, failure
+    return runs, None
+
+
+def _run(
+    valve: Valve, roles: ValveRoles, name: Variant, state: State | None, progress: Progress
+) -> _Run:
+    begin = perf_counter()
+    stage = f"run {name}"
+    progress(stage, 0.0)
+    rows = variant_network(valve, name).rows()
+    failure: ConvergenceError | None = None
+    try:
+        result = run_variant(
+            valve.case, rows, lambda fraction: progress(stage, fraction), state=state
+        )
+    except IncompleteRunError as error:
+        result, failure = error.result, error
+    times = all_lift_times(result, rows, roles.needle, roles.point)
+    wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
+    variant = StrokeVariant(
+        name=name,
+        label=_label(valve, rows, wet=wet, flexible=flexible),
+        wet=wet,
+        flexible=flexible,
+        modes=sum(row.body.mode_count for row in rows.bodies),
+        opening_time=times[0].opening.touch if times else None,
+        closing_time=times[0].closing.touch if times else None,
+        times=times,
+        result=result,
+        setup_time=perf_counter() - begin - result.wall_time,
+    )
+    return _Run(variant=variant, rows=rows, failure=failure)
+
+
+def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
+    fluid = "dry"
+    if wet and rows.fluid is not None:
+        fluid = f"{rows.fluid.name} at {_highest_pressure(rows) / 1e5:.3g} bar"
+    elastic = [
+        row.body.mode_count - row.body.rigid_count for row in rows.bodies if row.body.mode_count
+    ]
+    lumped = valve.case.lumped
+    if not flexible and lumped is not None:
+        return f"{fluid}, rigid bodies on {lumped.stiffness / 1e6:.4g} N/um"
+    if not any(elastic):
+        return f"{fluid}, rigid bodies"
+    return f"{fluid}, {' + '.join(str(count) for count in elastic)} modes"
+
+
+def _highest_pressure(rows: Rows) -> float:
+    """Highest pressure of the valve at the start, absolute [Pa]."""
+    return max((node.at_start for node in rows.nodes.values()), default=rows.ambient.pressure)
+
+
+def _lift(rows: Rows, needle: str) -> float | None:
+    """Travel between the stops [m], unloaded; None if nothing ends it."""
+    travel = Travel.of(rows)
+    lift = travel.highest({needle: 1.0})[0] - travel.lowest({needle: 1.0})[0]
+    return lift if isfinite(lift) else None
+
+
+def _switch_off(network: Network) -> float | None:
+    """When the drivers' command ends [s]; None if no driver says."""
+    ends = [part.end for part in network.components.values() if isinstance(part, TimedDriver)]
+    return max((end for end in ends if end is not None), default=None)
+
+
+def _channels(
+    network: Network, roles: ValveRoles, results: Sequence[NetworkResult]
+) -> StrokeChannels:
+    units = {
+        name: data.unit for result in reversed(results) for name, data in result.channels.items()
+    }
+    coils = [
+        name
+        for name, part in network.components.items()
+        if any(port.role is Role.COIL for port in part.port_kinds().values())
+    ]
+
+    def known(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(name for name in names if name in units)
+
+    point = f"{roles.needle}.{roles.point}"
+    return StrokeChannels(
+        lift=f"{point} displacement",
+        lift_velocity=f"{point} velocity",
+        velocity=f"{roles.needle} velocity",
+        voltage=known([f"{coil} voltage" for coil in coils]),
+        current=known([f"{coil} current" for coil in coils]),
+        magnetic_force=known([f"{coil}.armature force" for coil in coils]),
+        pressures=tuple(
+            name for name, unit in units.items() if unit == "Pa" and not name.startswith("ambient ")
+        ),
+        flows=tuple(name for name in units if name.endswith(" flow")),
+        opening_stop=roles.opening_stop,
+        seat=roles.seat,
+    )
+
+
+def _body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
+    result = []
+    for name, body in valve.bodies.items():
+        reduced = valve.reduced[name]
+        contact = [
+            reduced.port_index(port.name)
+            for item in valve.contacts.values()
+            for side, port in zip((item.pair.upper, item.pair.lower), item.ports, strict=True)
+            if side.name == name
+        ]
+        shares = reduced.compliance_share[contact] if contact else np.array([np.nan])
+        summary = summarise_body(valve.case, body, reduced, compliance_share=float(shares.min()))
+        result.append(summary)
+    return tuple(result)
+
+
+def _stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
+    return tuple(
+        _stop_summary(valve, name, part)
+        for name, part in valve.network.components.items()
+        if isinstance(part, EndStop)
+    )
+
+
+def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
+    contact, local = valve.contacts.get(name), valve.laws.get(name)
+    none, nan = np.empty(0), float("nan")
+    surfaces = " on ".join(str(s) for s in valve.case.stops[name].between) if contact else ""
+    check = None
+    if contact is not None:
+        force = contact.pattern_force
+        check = check_contact(valve.case, contact.pair, contact.static, force, surfaces)
+    return StopSummary(
+        name=name,
+        surfaces=surfaces,
+        kind=part.law.kind if part.law is not None else "film",
+        gap=part.gap,
+        film=part.film is not None,
+        indentation=np.append(0.0, local.force_indentation) if local else none,
+        force=np.append(0.0, local.force) if local else none,
+        share=np.append(nan, local.share) if local else none,
+        approach=contact.static.approach if contact else none,
+        static_force=contact.static.force if contact else none,
+        area=contact.static.area if contact else none,
+        pattern_force=contact.pattern_force if contact else nan,
+        half_width=check.half_width if check else nan,
+        size_ratio=check.size_ratio if check else nan,
+        points_across=check.points_across if check else 0,
+        doubts=check.doubts if check else (),
+    )
+
+
+def _fluid_summary(rows: Sequence[Rows]) -> FluidSummary | None:
+    wet = next((item for item in rows if item.fluid is not None), None)
+    if wet is None or wet.fluid is None:
+        return None
+    fluid, p = wet.fluid, _highest_pressure(wet)
+    return FluidSummary(
+        name=fluid.name,
+        temperature=fluid.temperature,
+        pressure=p,
+        density=float(fluid.density(p)),
+        bulk_modulus=float(fluid.bulk_modulus(p)),
+        sound_speed=float(fluid.sound_speed(p)),
+        viscosity=float(fluid.viscosity(p)),
+        vapour_pressure=fluid.vapour_pressure,
+    )
+
+
+def _line_summaries(network: Network, rows: Sequence[Rows]) -> tuple[LineSummary, ...]:
+    found: Mapping[str, float] = {
+        line.component: line.delay for item in reversed(rows) for line in item.lines
+    }
+    return tuple(
+        LineSummary(
+            name=name,
+            length=(length := float(getattr(network.components[name], "length", np.nan))),
+            sound_speed=length / delay,
+            echo_time=2.0 * delay,
+        )
+        for name, delay in found.items()
+    )

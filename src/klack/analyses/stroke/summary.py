@@ -1,0 +1,252 @@
+"""The few numbers of a stroke study that a script or a terminal wants."""
+
+from collections import Counter
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any, cast
+
+from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.contact_doubts import contact_doubt, contact_to_json
+from klack.analyses.json_results import (
+    PassageJson,
+    StartJson,
+    StrokeJson,
+    TimesJson,
+    VariantJson,
+)
+from klack.analyses.measures import json_of
+from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
+from klack.analyses.stroke.missing import cut_records
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.times import LiftTimes, Passage
+from klack.simulation.network_result import ImpactEvent
+from klack.units import format_si
+
+__all__ = [
+    "IMPACT_COLUMNS",
+    "TIME_COLUMNS",
+    "VARIANT_COLUMNS",
+    "first_impact",
+    "impact_rows",
+    "start_text",
+    "stroke_measured",
+    "stroke_to_json",
+    "stroke_told",
+    "time_rows",
+    "touch_event",
+    "variant_rows",
+]
+
+_TOLD_OF_VARIANT = tuple(measure for measure in VARIANT_MEASURES if measure.column is not None)
+VARIANT_COLUMNS = ("variant", *(measure.head for measure in _TOLD_OF_VARIANT))
+TIME_COLUMNS = (
+    "variant",
+    "body",
+    "way",
+    "lift [um]",
+    "10 % [ms]",
+    "50 % [ms]",
+    "90 % [ms]",
+    "touch [ms]",
+    "of",
+)
+_TOLD_OF_IMPACT = tuple(measure for measure in EVENT_MEASURES if measure.column is not None)
+IMPACT_COLUMNS = ("stop", *(measure.head for measure in _TOLD_OF_IMPACT))
+
+_TOLD = 20
+"""Impacts of a variant on a terminal."""
+_NOTICED = 0.02
+"""Share of the fastest impact on a stop from which an impact counts as the first one."""
+
+
+def stroke_to_json(study: StrokeStudy) -> StrokeJson:
+    """Plain numbers in SI, the unit in the key: see :class:`StrokeJson`."""
+    variants = {name: _numbers(variant) for name, variant in study.variants.items()}
+    reference = study.reference.name
+    return {
+        "schema": "klack-stroke/1",
+        "case": study.case,
+        "klack": study.version,
+        "own_components": dict(study.own_components),
+        "variant": reference,
+        **variants[reference],
+        "variants": variants,
+        "stops": {stop.name: contact_to_json(stop) for stop in study.stops},
+    }
+
+
+def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
+    """What a terminal shows: variants side by side, times at shares of the lift, impacts."""
+    yield TextTable(title=study.title, columns=VARIANT_COLUMNS, rows=variant_rows(study))
+    if times := time_rows(study):
+        title = "times at shares of the lift"
+        yield TextTable(title=title, columns=TIME_COLUMNS, rows=times, left=3)
+    for variant in study.variants.values():
+        if begun := start_text(variant):
+            yield f"{variant.name}: {begun}"
+        title, total = f"{variant.name}: {variant.label}", len(variant.result.events)
+        if not total:
+            yield f"{title}\n  no impacts"
+            continue
+        if total > _TOLD:
+            title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
+        yield TextTable(title=title, columns=IMPACT_COLUMNS, rows=tuple(impact_rows(variant)))
+    for stop in study.stops:
+        if doubt := contact_doubt(stop):
+            yield f"Impacts on '{stop.name}': {doubt}"
+
+
+def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
+    """Every variant and each of its impacts with its measures."""
+    for name, variant in study.variants.items():
+        yield name, variant, VARIANT_MEASURES
+        counts: Counter[str] = Counter()
+        for event in variant.result.events:
+            counts[event.stop] += 1
+            yield f"{name}, {event.stop} {counts[event.stop]}", event, EVENT_MEASURES
+
+
+def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`VARIANT_COLUMNS`, one per variant, as text."""
+    return tuple(
+        (variant.name, *(measure.cell(variant) for measure in _TOLD_OF_VARIANT))
+        for variant in study.variants.values()
+    )
+
+
+def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`TIME_COLUMNS`: both ways of every body between stops, the first one first."""
+    return tuple(
+        (
+            variant.name,
+            times.body,
+            way,
+            _lift(times),
+            _moment(passage.at_10),
+            _moment(passage.at_50),
+            _moment(passage.at_90),
+            _moment(passage.touch) if passage.stop else "no stop",
+            passage.stop or "–",
+        )
+        for variant in study.variants.values()
+        for times in variant.times
+        for way, passage in times.in_order
+    )
+
+
+def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
+    """Impact that ends a way; None if it does not reach its stop."""
+    return next(
+        (
+            event
+            for event in variant.result.events
+            if event.time == passage.touch and passage.stop in ("", event.stop)
+        ),
+        None,
+    )
+
+
+def impact_rows(variant: StrokeVariant, most: int = _TOLD) -> Iterator[tuple[str, ...]]:
+    """Rows of :data:`IMPACT_COLUMNS`, the first ``most`` impacts of a variant, as text."""
+    for event in variant.result.events[:most]:
+        yield (event.stop, *(measure.cell(event) for measure in _TOLD_OF_IMPACT))
+
+
+def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
+    """First impact on a stop that is one.
+
+    A needle that is pressed on its seat may lift by nanometres when the spring or the magnet
+    starts; such touches, slower than 2 % of the fastest impact on that stop, do not count.
+    """
+    events = variant.impacts(stop)
+    fastest = max((event.approach_speed for event in events), default=0.0)
+    return next((event for event in events if event.approach_speed > _NOTICED * fastest), None)
+
+
+def start_text(variant: StrokeVariant) -> str:
+    """Equilibrium from which a variant began, in one line; empty if it began in none."""
+    start = variant.result.start
+    if start is None:
+        return ""
+    places: dict[str, list[float]] = {}
+    for name, y in start.displacement.items():
+        places.setdefault(name.partition(".")[0], []).append(y)
+    parts = [f"{body} {_from_to(ys)}" for body, ys in places.items()]
+    for name, p in start.pressure.items():
+        parts.append(f"{name} {p / 1e5:.5g} bar" + (" (stated)" if start.stated[name] else ""))
+    left = max((abs(force) for force in start.residual.values()), default=0.0)
+    return f"start at rest: {', '.join(parts)}; forces balance to {format_si(left, 'N', 1)}"
+
+
+def _from_to(displacements: list[float]) -> str:
+    """Where the points of a body are: one displacement if it is rigid."""
+    ends = dict.fromkeys((min(displacements), max(displacements)))
+    return " to ".join(format_si(y, "m", 3) for y in ends)
+
+
+def _numbers(variant: StrokeVariant) -> VariantJson:
+    result = variant.result
+    found: Any = {
+        "label": variant.label,
+        "failure": result.failure or None,
+        "fine_record_ends_s": {stop: _number(t) for stop, t in cut_records(result).items()},
+        "events": [
+            {"stop": event.stop, **json_of(EVENT_MEASURES, event)} for event in result.events
+        ],
+        **json_of(VARIANT_MEASURES, variant),
+        **_times(variant.needle_times),
+        "bodies": {times.body: _times(times) for times in variant.times[1:]},
+        "start": _start(variant),
+    }
+    return cast(VariantJson, found)
+
+
+def _start(variant: StrokeVariant) -> StartJson | None:
+    """Static start; None for a run that goes on or began free."""
+    start = variant.result.start
+    if start is None:
+        return None
+    return {
+        "displacement_m": dict(start.displacement),
+        "pressure_Pa": dict(start.pressure),
+        "pressure_stated": dict(start.stated),
+        "mass_flow_kg_s": dict(start.flow),
+        "residual_force_N": dict(start.residual),
+        "notes": list(start.notes),
+    }
+
+
+def _times(times: LiftTimes) -> TimesJson:
+    return {
+        "starts": times.starts,
+        "lift_m": times.lift,
+        "lift_between_stops": times.between_stops,
+        "opening": _passage(times.opening),
+        "closing": _passage(times.closing),
+    }
+
+
+def _passage(passage: Passage) -> PassageJson:
+    return {
+        "at_10_percent_s": passage.at_10,
+        "at_50_percent_s": passage.at_50,
+        "at_90_percent_s": passage.at_90,
+        "stop": passage.stop or None,
+        "touch_s": passage.touch,
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no nan and no infinity."""
+    return float(value) if isfinite(value) else None
+
+
+def _lift(times: LiftTimes) -> str:
+    """What the shares count from: between stops, or the largest lift of the run."""
+    if times.lift is None:
+        return "none"
+    return f"{1e6 * times.lift:.4g}{'' if times.between_stops else ' (largest)'}"
+
+
+def _moment(time: float | None) -> str:
+    return NOT_REACHED if time is None else f"{1e3 * time:.4f}"

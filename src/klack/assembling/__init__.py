@@ -1,0 +1,1 @@
+"""From a case to bodies, contact problems and networks."""

@@ -1,0 +1,304 @@
+"""From a case to meshed, placed and supported elastic bodies."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.assembling.generated_mesh import meshed_profiles, meshed_step
+from klack.assembling.given_shapes import require_given_shapes
+from klack.assembling.held_nodes import held_nodes
+from klack.assembling.mesh_messages import meshed_for_case
+from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.case.bodies import CaseBody, CaseFile, SurfaceName
+from klack.case.geometry import MeshSettings
+from klack.case.schema import Case
+from klack.contact.mortar import contact_space, touching_shift
+from klack.contact.pairing import axial_distance
+from klack.elasticity.body import ElasticBody, elastic_body
+from klack.errors import AccuracyWarning, InputError
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.rigid import Pose
+from klack.mesh.sizing import MeshSizing, Refinement
+from klack.progress import Progress
+from klack.units import format_si
+
+__all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
+
+_SAME_HEIGHT = 5e-4  # of the narrower surface; clearances that differ by less belong to one touch
+_SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of the contact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyPair:
+    """The two bodies of a case, placed for the start of the motion.
+
+    Parameters
+    ----------
+    upper, lower : ElasticBody
+        The moving body and the one that it hits.
+    upper_surface, lower_surface : Surface
+        Where they meet.
+    pose : Pose
+        Where the upper body stands, compared with its drawing.
+    """
+
+    upper: ElasticBody
+    lower: ElasticBody
+    upper_surface: Surface
+    lower_surface: Surface
+    pose: Pose
+
+    @property
+    def shift(self) -> float:
+        """Translation of the upper body along z from where it was drawn [m]."""
+        return float(self.pose.shift[2])
+
+
+def build_bodies(case: Case, progress: Progress) -> BodyPair:
+    """Mesh both bodies, place the upper one and assemble stiffness and mass.
+
+    Raises
+    ------
+    InputError
+        For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
+        drawn.
+    """
+    _require_surfaces(case)
+    progress("mesh", 0.0)
+    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
+    moving, stop = case.contact.moving, case.contact.stop
+    touch = find_touch(case.bodies, moving, stop)
+    upper = mesh_body(case.moving_body, moving.body, _places_of_moving_body(case, touch))
+    lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
+    upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
+    progress("mesh", 0.6)
+    pose = _pose(case, upper, upper_surface, lower, lower_surface, touch)
+    upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)
+    _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose)
+    progress("mesh", 1.0)
+    progress("assemble", 0.0)
+    bodies = []
+    for i, (name, mesh) in enumerate(((moving.body, upper), (stop.body, lower))):
+        bodies.append(assemble_body(case, name, mesh))
+        progress("assemble", (i + 1) / 2)
+    return BodyPair(
+        upper=bodies[0],
+        lower=bodies[1],
+        upper_surface=upper_surface,
+        lower_surface=lower_surface,
+        pose=pose,
+    )
+
+
+def _require_surfaces(case: Case) -> None:
+    for name, body in case.bodies.items():
+        if not body.has_surfaces:
+            raise InputError(
+                f"{case.path or 'case'}: bodies.{name}",
+                got="a reduced model, or nodes without elements",
+                expected="bodies with meshed surfaces",
+                hint="'klack impact', 'klack reduce' and 'klack export' take such bodies.",
+            )
+
+
+def _places_of_moving_body(case: Case, touch: Touch | None) -> tuple[tuple[float, ...], ...]:
+    """Where the moving body first touches either stop, as drawn."""
+    places = touch.upper if touch else ()
+    if case.opposite is not None:
+        above = find_touch(case.bodies, case.opposite.stop, case.opposite.moving)
+        places += above.lower if above else ()
+    return places
+
+
+def find_touch(
+    bodies: Mapping[str, CaseBody], upper: SurfaceName, lower: SurfaceName
+) -> Touch | None:
+    """Find where two surfaces first touch; None when neither body asks for a refinement there."""
+    pair = (bodies[upper.body], bodies[lower.body])
+    extents = [body.mesh.contact.extent for body in pair if body.mesh and body.mesh.contact]
+    if not extents:
+        return None
+    above, below = (body.geometry.profile for body in pair)
+    if above is not None and below is not None:
+        return first_touch_of_profiles(
+            above.profiles().values(), upper.surface, below.profiles().values(), lower.surface
+        )
+    # a first mesh without refinement tells where to refine
+    meshes = [mesh_body(bodies[name], name, ()) for name in (upper.body, lower.body)]
+    return first_touch_of_meshes(
+        meshes[0],
+        meshes[0].surface(upper.surface),
+        meshes[1],
+        meshes[1].surface(lower.surface),
+        tolerance=min(extents) / 5.0,
+    )
+
+
+def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
+    """Stiffness and mass of a body of the case, assembled here or given, with its supports.
+
+    Warns
+    -----
+    AccuracyWarning
+        About materials that no solid has (:attr:`klack.materials.Material.question`).
+    """
+    body = case.bodies[name]
+    if body.matrices is not None:
+        return assembled_from_matrices(case, name, mesh)
+    materials = case.materials_of(name, mesh.solids)
+    for material in materials.values():
+        if material.question is not None:
+            warnings.warn(material.question, AccuracyWarning, stacklevel=2)
+    return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
+
+
+def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
+    """Mesh one body, refined at the given places ((r, z) or (x, y, z))."""
+    geometry = body.geometry
+    if geometry.nodes is not None:
+        return node_mesh(geometry.nodes, geometry.dimension, f"bodies.{name}.geometry.nodes")[0]
+    if geometry.mesh is not None:
+        solids = tuple(body.material) if isinstance(body.material, dict) else None
+        given = geometry.mesh
+        mesh = read_mesh_file(
+            given.file, given.unit, solids=solids, solids_only=given.solids_only
+        ).mesh
+        _require_dimension(geometry.mesh.file, mesh, geometry.dimension)
+        return mesh
+    if body.mesh is None:  # refused by the schema already
+        raise InputError(
+            f"bodies.{name}", got="no element sizes", expected="mesh", hint="add mesh: {size: ...}."
+        )
+    if geometry.step is not None:
+        step = geometry.step
+        return meshed_for_case(name, _sizing(body.mesh, places), lambda s: meshed_step(step, s))
+    if geometry.profile is None:
+        raise InputError(
+            f"bodies.{name}.geometry", got="no shape", expected="a profile", hint="draw one."
+        )
+    sizing = _sizing(body.mesh, tuple(_ring(at) for at in places))
+    profiles = geometry.profile.profiles()
+    model, layers = geometry.model or "axisymmetric", geometry.layers
+    return meshed_for_case(name, sizing, lambda s: meshed_profiles(profiles, s, model, layers))
+
+
+def _ring(place: tuple[float, ...]) -> tuple[float, ...]:
+    """Ring (r, z) through a place."""
+    return (float(np.hypot(place[0], place[1])), place[2]) if len(place) == 3 else place
+
+
+def _require_dimension(file: Path, mesh: Mesh, dimension: int) -> None:
+    if mesh.dimension != dimension:
+        kind = {2: "axisymmetric", 3: "three-dimensional"}
+        raise InputError(
+            str(file),
+            got=f"{kind[mesh.dimension]} elements",
+            expected=f"{kind[dimension]} elements",
+            hint="say 'model: axisymmetric' in the geometry of a mesh of the half section.",
+        )
+
+
+def _sizing(settings: MeshSettings, places: tuple[tuple[float, ...], ...]) -> MeshSizing:
+    refinements: tuple[Refinement, ...] = ()
+    if settings.contact is not None:
+        refinements = tuple(
+            Refinement(position=at, size=settings.contact.size, radius=settings.contact.extent)
+            for at in places
+        )
+    return MeshSizing(
+        size=settings.size,
+        surfaces=settings.surfaces,
+        refinements=refinements,
+        grading=settings.grading,
+    )
+
+
+def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface) -> float:
+    """Find the translation of the upper body along z [m] that gives the gap of the case."""
+    if case.contact.gap is not None:
+        return touching_shift(upper, surface, lower, other) + case.contact.gap
+    distance = axial_distance(upper, surface, lower, other)
+    if distance < 0:
+        raise InputError(
+            f"{case.path or 'case'}: contact",
+            got=f"bodies that penetrate by {-distance * 1e6:.4g} um as drawn",
+            expected="a distance of 0 or more between the two surfaces",
+            hint="give contact.gap (for example 0 um): the upper body is then moved there.",
+        )
+    return 0.0
+
+
+def _pose(
+    case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
+) -> Pose:
+    """Lean the upper body, shift it off the axis, and move it along z to the gap of the case."""
+    placement = case.motion.placement
+    about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
+    if not placement.is_centred:
+        about[2] = _touch_height(upper, surface, lower, other, touch)
+        aside = placement.eccentricity * _towards(placement.direction)
+        # z x d: the upper end leans towards d
+        lean = placement.tilt * np.cross([0.0, 0.0, 1.0], _towards(placement.tilt_direction))
+        upper = upper.placed(Pose(rotation=lean, about=about, shift=aside))
+    shift = _shift(case, upper, surface, lower, other)
+    return Pose(rotation=lean, about=about, shift=aside + np.array([0.0, 0.0, shift]))
+
+
+def _towards(angle: float) -> np.ndarray:
+    return np.array([np.cos(angle), np.sin(angle), 0.0])
+
+
+def _touch_height(
+    upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
+) -> float:
+    """Height z [m] in the drawing of the upper body where it touches first when centred."""
+    if touch is None or not touch.upper:
+        width = min(
+            float(np.max(np.ptp(mesh.points[of.nodes][:, :2], axis=0)))
+            for mesh, of in ((upper, surface), (lower, other))
+        )
+        touch = first_touch_of_meshes(upper, surface, lower, other, tolerance=_SAME_HEIGHT * width)
+    return float(np.mean([place[-1] for place in touch.upper]))
+
+
+def _check_refinement(
+    case: Case,
+    upper: Mesh,
+    surface: Surface,
+    lower: Mesh,
+    other: Surface,
+    touch: Touch | None,
+    pose: Pose,
+) -> None:
+    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    if case.motion.placement.is_centred or touch is None or not touch.upper:
+        return
+    space = contact_space(upper, surface, lower, other)
+    facing = space.axial > 1e-6
+    at = space.points[facing][np.argmin(space.gap[facing] / space.axial[facing])]
+    sides = (
+        (case.contact.moving.body, case.moving_body, touch.upper, pose.drawn(at)),
+        (case.contact.stop.body, case.stop_body, touch.lower, at),
+    )
+    for name, body, places, point in sides:
+        if body.mesh is None or body.mesh.contact is None:
+            continue
+        extent = body.mesh.contact.extent
+        turned = body.geometry.profile is not None
+        first = _ring(tuple(point)) if turned else tuple(point)
+        rings = [_ring(place) if turned else place for place in places]
+        away = min(float(np.linalg.norm(np.subtract(first, ring))) for ring in rings)
+        if away > _SAFE_SHARE * extent:
+            warnings.warn(
+                f"'{name}' touches first {format_si(away, 'm', 2)} away from where its mesh is "
+                f"finest; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
+                f"{format_si(1.2 * away / _SAFE_SHARE, 'm', 2)} in bodies.{name}.mesh.contact, or "
+                "a smaller placement.",
+                AccuracyWarning,
+                stacklevel=2,
+            )

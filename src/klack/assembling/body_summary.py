@@ -1,0 +1,99 @@
+"""One body in numbers and words, for tables."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.modes import elastic_count
+from klack.case.bodies import CaseFile
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.plausible_material import estimate_material
+from klack.materials import Material
+from klack.reduction.reduced_body import ReducedBody
+
+__all__ = ["BodySummary", "summarise_body"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodySummary:
+    """One body in numbers.
+
+    Parameters
+    ----------
+    name, model, source, support, material : str
+        ``model`` is ``"3-D"`` or ``"axisymmetric"``; ``source`` says where the geometry came from.
+    mass : float [kg]
+    nodes, elements, dofs : int
+    frequencies : array [Hz]
+        Elastic eigenfrequencies that the reduction keeps.
+    compliance_share : float [-]
+        Share of the static compliance at the contact that the kept modes carry.
+    """
+
+    name: str
+    model: str
+    source: str
+    support: str
+    material: str
+    mass: float
+    nodes: int
+    elements: int
+    dofs: int
+    frequencies: NDArray[np.float64]
+    compliance_share: float
+
+
+def summarise_body(
+    case: CaseFile, body: ElasticBody, reduced: ReducedBody, *, compliance_share: float
+) -> BodySummary:
+    """Put a body into numbers and words; the share is that of the kept modes at its contact."""
+    given = case.bodies[body.name]
+    geometry = given.geometry
+    if geometry.mesh is not None:
+        source = f"mesh file {geometry.mesh.file.name}"
+    elif geometry.step is not None:
+        source = f"STEP file {geometry.step.file.name}"
+    else:
+        layers = f" in {geometry.layers} layers" if geometry.layers else ""
+        source = f"profile, {geometry.model}{layers}"
+    supports = []
+    for support in given.fixed or ():
+        sectors = support.sectors
+        where = f"surface '{support.surface}'"
+        if sectors is not None:
+            where += f" in {sectors.count} sectors of {np.degrees(sectors.width):.4g} deg"
+        supports.append(where)
+    first, last = reduced.rigid_count, reduced.rigid_count + elastic_count(reduced)
+    return BodySummary(
+        name=body.name,
+        model="axisymmetric" if body.dimension == 2 else "3-D",
+        source=source,
+        support="held at " + " and ".join(supports) if supports else "free",
+        material=_material(case, body),
+        mass=body.mass,
+        nodes=body.mesh.node_count,
+        elements=body.mesh.element_count,
+        dofs=body.dof_count,
+        frequencies=reduced.frequencies[first:last],
+        compliance_share=compliance_share,
+    )
+
+
+def _material(case: CaseFile, body: ElasticBody) -> str:
+    given = case.bodies[body.name].matrices
+    if given is None:
+        materials = case.materials_of(body.name, body.mesh.solids)
+        return "; ".join(dict.fromkeys(_in_words(m) for m in materials.values()))
+    found = estimate_material(body.K, body.mesh, body.mass)
+    return (
+        f"matrices {given.stiffness.name} and {given.mass.name} ({found.density_in_words}, wave "
+        f"speed {found.wave_speed:.4g} m/s)"
+    )
+
+
+def _in_words(material: Material) -> str:
+    return (
+        f"{material.name} (E {material.young / 1e9:.4g} GPa, nu {material.poisson:.3g}, "
+        f"rho {material.density:.5g} kg/m3)"
+    )

@@ -1,0 +1,155 @@
+"""Static contact of two bodies up to more than an impact can need."""
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.bodies import BodyPair
+from klack.case.schema import Case
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.statics import (
+    ReachError,
+    StaticContact,
+    contact_compliance,
+    static_contact,
+)
+from klack.elasticity.statics import Flexibility
+from klack.progress import Progress
+
+__all__ = ["closing_force", "effective_mass", "impact_energy", "static_ladder"]
+
+# The first estimate of the compliance loads the points that touch first.
+_FIRST_POINTS = 48
+# The reach holds the approach of the bound below with this margin.
+_REACH_MARGIN = 1.25
+# The ladder of static loads ends this much above the quasi-static bound of the impact force.
+_LOAD_MARGIN = 1.15
+# Growth of a reach that was too small: between spheres the gap at the border of the contact is half
+# the approach.
+_REACH_GROWTH = 2.0
+# What a reach holds, without the state at its border itself.
+_HELD = 0.98
+
+
+def effective_mass(pair: BodyPair) -> float:
+    """Mass [kg] whose kinetic energy at the closing speed an impact can use."""
+    masses = [body.mass for body in (pair.upper, pair.lower) if not body.is_fixed]
+    return 1.0 / sum(1.0 / m for m in masses)
+
+
+def closing_force(case: Case) -> float:
+    """Outside force that presses the bodies together [N]."""
+    spring = case.motion.spring
+    return max(case.motion.force + (spring.preload if spring else 0.0), 0.0)
+
+
+def impact_energy(case: Case, pair: BodyPair) -> float:
+    """Bound of the energy at first touch [J]: kinetic, and work of closing forces on the way."""
+    kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
+    gap, spring = case.contact.gap or 0.0, case.motion.spring
+    stored = 0.5 * spring.stiffness * gap**2 if spring else 0.0
+    return kinetic + closing_force(case) * gap + stored
+
+
+def static_ladder(
+    pair: BodyPair,
+    upper: Flexibility,
+    lower: Flexibility,
+    *,
+    energy: float,
+    closing: float,
+    reach: float | None,
+    progress: Progress,
+) -> StaticContact:
+    """Static contact on as many candidate points as the impact can reach.
+
+    Parameters
+    ----------
+    pair : BodyPair
+        Only the meshes and surfaces matter; they need not touch.
+    upper, lower : Flexibility
+    energy : float [J]
+        That the contact must be able to store.
+    closing : float [N]
+        Force that goes on working while the bodies approach.
+    reach : float or None [m]
+        Largest gap of candidate points; found when None.
+    progress : callable
+    """
+    surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    progress("static contact", 0.0)
+    given = reach
+    space = contact_space(*surfaces, reach=given)
+    reach = space.reach
+    compliance = _first_compliance(space, upper, lower)
+    # a linear spring stores E + closing * approach at the turning point
+    approach = compliance * closing + sqrt((compliance * closing) ** 2 + 2.0 * energy * compliance)
+    force = approach / compliance
+    if given is None:
+        reach = _REACH_MARGIN * approach
+    while True:
+        candidates = contact_space(*surfaces, reach=reach)
+        progress("static contact", 0.2)
+        C = contact_compliance(candidates, upper, lower)
+        progress("static contact", 0.8)
+        try:
+            static = _ladder(candidates, C, energy, closing, force)
+        except ReachError:
+            if given is not None:
+                raise
+            # ends with the whole surfaces as candidates, which have no border
+            reach *= _REACH_GROWTH
+            continue
+        break
+    progress("static contact", 1.0)
+    return static
+
+
+def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibility) -> float:
+    """Axial compliance [m/N] of both bodies under pressure on the points that touch first."""
+    gap = np.where(space.axial > 1e-6, space.gap, np.inf)
+    first = np.argsort(gap, kind="stable")[:_FIRST_POINTS]
+    lam = np.zeros(space.count)
+    lam[first] = space.area[first]
+    lam /= space.axial @ lam
+    compliance = 0.0
+    for G, flexibility in ((space.G_a, upper), (space.G_b, lower)):
+        load = G.T @ lam
+        compliance += float(load @ flexibility.deflections(load[:, None])[:, 0])
+    return compliance
+
+
+def _ladder(
+    space: ContactSpace, C: NDArray[np.float64], energy: float, closing: float, force: float
+) -> StaticContact:
+    """Static contact up to a force above that of a quasi-static impact of this energy.
+
+    The closing force goes on working while the bodies approach: the turning point is where the
+    stored energy has reached ``energy + closing * approach``.
+    """
+    refused: ReachError | None = None
+    while True:
+        try:
+            static = static_contact(space, C, force)
+        except ReachError as error:
+            # elements as wide as the contact bound the force far too high: less may do
+            if not error.held > 0 or refused is not None:
+                raise
+            refused, force = error, _HELD * error.held
+            continue
+        # energy stored along the ladder, by the trapezoidal rule from first touch
+        approach, load = np.append(0.0, static.approach), np.append(0.0, static.force)
+        stored = np.concatenate(
+            [[0.0], np.cumsum(np.diff(approach) * (load[1:] + load[:-1]) / 2.0)]
+        )
+        surplus = stored - closing * approach
+        if surplus[-1] >= energy:
+            break
+        if refused is not None:
+            raise refused
+        force *= 1.5
+    # falls up to the closing force, rises from there
+    rising = load >= closing
+    needed = _LOAD_MARGIN * float(np.interp(energy, surplus[rising], load[rising]))
+    return static_contact(space, C, needed)

@@ -1,0 +1,123 @@
+"""Which elastic modes a case asks for, and which bodies keep."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+from klack.assembling.problem import ContactProblem
+from klack.case.schema import (
+    ModeChoice,
+)
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.statics import Flexibility
+from klack.progress import Progress
+from klack.reduction.ports import Port
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection, select
+
+__all__ = [
+    "PARTICIPATION_POOL",
+    "elastic_count",
+    "kept_modes",
+    "mode_pool",
+    "mode_pools",
+    "participating",
+    "selection_of",
+]
+
+PARTICIPATION_POOL = 100
+"""Modes of each body from which the level ``reduced-participation`` chooses."""
+
+_PARTICIPATING = (8, 20)  # of the upper and of the lower body
+
+
+def selection_of(choice: ModeChoice) -> ModeSelection:
+    """Selection of modes that a case asks for."""
+    if choice.count is not None:
+        return ByCount(choice.count)
+    if choice.frequency is not None:
+        return ByFrequency(choice.frequency)
+    return ByParticipation(choice.participation or 1, choice.pool or 1)
+
+
+def mode_pools(
+    problem: ContactProblem, *, at_least: int, progress: Progress
+) -> Mapping[str, Modes]:
+    """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``."""
+    bodies = [problem.pair.upper, problem.pair.lower]
+    flexibilities = [problem.flexibility_upper, problem.flexibility_lower]
+    if problem.opposite is not None:
+        bodies.append(problem.opposite.body)
+        flexibilities.append(problem.opposite.flexibility)
+    progress("modes", 0.0)
+    # the triangular solves run outside of the interpreter: two bodies keep two cores busy
+    with ThreadPoolExecutor(max_workers=len(bodies)) as workers:
+        jobs = [
+            workers.submit(
+                mode_pool,
+                selection_of(problem.case.reduction.choice(body.name)),
+                body,
+                flexibility,
+                at_least=at_least,
+            )
+            for body, flexibility in zip(bodies, flexibilities, strict=True)
+        ]
+        pools = [job.result() for job in jobs]
+    progress("modes", 1.0)
+    return {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
+
+
+def mode_pool(
+    choice: ModeSelection, body: ElasticBody, flexibility: Flexibility, *, at_least: int = 1
+) -> Modes:
+    """Elastic modes of a body that a selection can choose from."""
+    count = at_least
+    if isinstance(choice, ByCount):
+        count = max(count, choice.count)
+    elif isinstance(choice, ByParticipation):
+        count = max(count, choice.pool)
+    count = min(count, len(body.free) - body.rigid_modes.shape[1])
+    pool = eigenmodes(body, count=count, flexibility=flexibility)
+    if isinstance(choice, ByFrequency) and pool.frequency[-1] < choice.maximum:
+        return eigenmodes(body, max_frequency=choice.maximum, flexibility=flexibility)
+    return pool
+
+
+def kept_modes(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    ports: tuple[Port, Port] | None = None,
+) -> dict[str, Modes]:
+    """Elastic modes of both bodies that the reduced level keeps.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of body name to Modes
+    ports : pair of Port, optional
+        Contact ports, for modes chosen by participation; near the highest force without.
+    """
+    if ports is None:
+        loads = problem.static.load_patterns(0.7 * problem.static.max_force)
+    else:
+        loads = (ports[0].pattern, ports[1].pattern)
+    kept = {}
+    for body, load in zip((problem.pair.upper, problem.pair.lower), loads, strict=True):
+        pool = pools[body.name]
+        selection = selection_of(problem.case.reduction.choice(body.name))
+        chosen = select(selection, pool.omega, pool.shapes.T @ load[:, None])
+        kept[body.name] = Modes(pool.omega[chosen], pool.shapes[:, chosen])
+    return kept
+
+
+def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
+    """The 8 + 20 modes of 100 that carry most of the compliance at the contact."""
+    return {
+        name: ByParticipation(count, PARTICIPATION_POOL)
+        for name, count in zip(pair_names, _PARTICIPATING, strict=True)
+    }
+
+
+def elastic_count(body: ReducedBody) -> int:
+    """Number of elastic modes without attachment modes."""
+    return body.mode_count - body.rigid_count - body.attachment_count

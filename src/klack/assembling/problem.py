@@ -1,0 +1,122 @@
+"""The contact problem of a case: what every level needs and none should compute twice."""
+
+from dataclasses import dataclass
+
+from klack.assembling.bodies import BodyPair, build_bodies
+from klack.assembling.ladder import closing_force, impact_energy, static_ladder
+from klack.assembling.opposite import OppositeStop, build_opposite
+from klack.cache.setting import result_cache
+from klack.case.schema import Case
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.pairing import axial_distance
+from klack.contact.statics import ReachError, StaticContact
+from klack.elasticity.statics import Flexibility
+from klack.progress import Progress
+
+__all__ = ["ContactProblem", "build_problem"]
+
+_REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactProblem:
+    """Bodies, contact points and static contact of one case.
+
+    Parameters
+    ----------
+    case : Case
+        With its gap, also where that is only drawn.
+    pair : BodyPair
+    space : ContactSpace
+    flexibility_upper, flexibility_lower : Flexibility
+        Static solutions of both bodies; close them with :meth:`close` before a full-order run
+        to give their memory back.
+    static : StaticContact
+        Ladder of static contact states beyond the highest force of the impact.
+    opposite : OppositeStop or None
+        Stop above the moving body.
+    """
+
+    case: Case
+    pair: BodyPair
+    space: ContactSpace
+    flexibility_upper: Flexibility
+    flexibility_lower: Flexibility
+    static: StaticContact
+    opposite: OppositeStop | None = None
+
+    def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
+        """Contact points of the same surfaces that reach twice as far.
+
+        Parameters
+        ----------
+        space : ContactSpace
+            Those that did not reach far enough.
+        error : ReachError
+            Raised again where the case gives the reach, or has a stop above.
+        """
+        if self.case.contact.reach is not None or self.opposite is not None:
+            raise error
+        pair = self.pair
+        return contact_space(
+            pair.upper.mesh,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+            reach=_REACH_GROWTH * space.reach,
+            slave=space.slave,
+        )
+
+    def close(self) -> None:
+        """Free the factorisations."""
+        self.flexibility_upper.close()
+        self.flexibility_lower.close()
+        if self.opposite is not None:
+            self.opposite.close()
+
+
+def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:
+    """Mesh, place, factorise, and solve the static contact.
+
+    The highest force is bounded without knowing the contact: an impact of relative speed v and
+    effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
+    the static curve gives the force and the approach at which that much is stored.  The candidate
+    points reach further than that.
+
+    A case without ``contact.gap`` gets the one that is drawn, so that every level starts there.
+    """
+    pair = build_bodies(case, progress)
+    case = _with_drawn_gap(case, pair)
+    progress("factorise", 0.0)
+    cache = result_cache()
+    upper = Flexibility(pair.upper, threads=threads, cache=cache)
+    progress("factorise", 0.5)
+    lower = Flexibility(pair.lower, threads=threads, cache=cache)
+    progress("factorise", 1.0)
+    static = static_ladder(
+        pair,
+        upper,
+        lower,
+        energy=impact_energy(case, pair),
+        closing=closing_force(case),
+        reach=case.contact.reach,
+        progress=progress,
+    )
+    return ContactProblem(
+        case=case,
+        pair=pair,
+        space=static.space,
+        flexibility_upper=upper,
+        flexibility_lower=lower,
+        static=static,
+        opposite=build_opposite(case, pair, upper, progress, threads=threads),
+    )
+
+
+def _with_drawn_gap(case: Case, pair: BodyPair) -> Case:
+    if case.contact.gap is not None:
+        return case
+    upper, lower = pair.upper.mesh, pair.lower.mesh
+    drawn = axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
+    contact = case.contact.model_copy(update={"gap": drawn})
+    return case.model_copy(update={"contact": contact})

@@ -1,0 +1,331 @@
+"""Both bodies reduced for one contact, and the local law that goes with them."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import elastic_count, selection_of
+from klack.assembling.problem import ContactProblem
+from klack.case.schema import (
+    Case,
+    HertzLocalLaw,
+    LinearLocalLaw,
+    SubmodelLocalLaw,
+)
+from klack.contact.history import ImpactHistory
+from klack.contact.laws import (
+    ContactLaw,
+    HertzLaw,
+    LinearLaw,
+)
+from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
+from klack.contact.submodel import LocalStiffness, local_stiffness
+from klack.elasticity.eigen import Modes
+from klack.errors import AccuracyWarning, InputError
+from klack.reduction.ports import Port
+from klack.reduction.reduce import Correction, reduce_body
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.selection import ByCount, ModeSelection
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.stages import show, trial
+
+__all__ = [
+    "PORT",
+    "ReducedPair",
+    "classical_stiffness",
+    "first_stiffness",
+    "hertz_coefficient",
+    "impact_system",
+    "own_pair",
+    "reduce_pair",
+    "simulate_bodies",
+    "starting_gap",
+    "static_curve",
+]
+
+PORT = "contact"
+"""Name of the contact port of both bodies."""
+
+# The pattern of the port is taken at the peak force, which depends on it weakly.
+_PATTERN_ROUNDS = 3
+_CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedPair:
+    """Both bodies reduced for one contact, and the local law that goes with them.
+
+    Parameters
+    ----------
+    upper, lower : ReducedBody
+    ports : pair of Port
+        Contact ports of the upper and of the lower body, resultant +1 N along z each.
+    law : contact law
+    local : LocalLaw or None
+        The consistent law with its shares; None for another kind.
+    pattern_force : float [N]
+        Force at which the pressure pattern of the port was taken.
+    """
+
+    upper: ReducedBody
+    lower: ReducedBody
+    ports: tuple[Port, Port]
+    law: ContactLaw
+    local: LocalLaw | None
+    pattern_force: float
+
+
+def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
+    """Constant stiffness of the contact zone alone, as the classical recipe takes it."""
+    law = problem.case.contact.local_law
+    width = problem.static.half_width_at(min(peak_force, problem.static.max_force))
+    size = law.size if isinstance(law, SubmodelLocalLaw) else _CLASSICAL_SIZE * width
+    return local_stiffness(
+        problem.static,
+        problem.pair.upper,
+        problem.pair.lower,
+        size=size,
+        cache=problem.flexibility_upper.cache,
+    )
+
+
+def first_stiffness(problem: ContactProblem) -> float:
+    """Secant of the static contact [N/m], good enough to find the order of the peak force."""
+    return problem.static.max_force / float(problem.static.approach[-1])
+
+
+def own_pair(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    stiffness: float,
+    recovery: bool = False,
+) -> ReducedPair:
+    """Reduce both bodies as the case asks for; see :func:`reduce_pair`.
+
+    Warns
+    -----
+    AccuracyWarning
+        When fewer modes than asked for were kept, so that a compliance is left to the local law.
+    """
+    reduction = problem.case.reduction
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    asked = {name: selection_of(reduction.choice(name)) for name in names}
+    selection = asked
+    while True:
+        try:
+            pair = reduce_pair(
+                problem,
+                pools,
+                correction=reduction.correction,
+                selection=selection,
+                stiffness=stiffness,
+                recovery=recovery,
+            )
+        except OverfullModesError:
+            fewer = {name: _fewer(choice) for name, choice in selection.items()}
+            if fewer == selection:
+                raise
+            selection = fewer
+            continue
+        break
+    if selection != asked:
+        counts = [f"{elastic_count(b)} of '{b.name}'" for b in (pair.upper, pair.lower)]
+        warnings.warn(
+            f"contact: only {' and '.join(counts)} of the modes asked for are kept: more of them "
+            "would carry more than the static compliance of this contact and leave none to the "
+            "local law. The interface level keeps them all.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return pair
+
+
+def _fewer(choice: ModeSelection) -> ModeSelection:
+    """About two thirds of so many lowest modes; another choice as it is."""
+    return ByCount(max(1, 2 * choice.count // 3)) if isinstance(choice, ByCount) else choice
+
+
+def reduce_pair(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    *,
+    correction: Correction,
+    selection: Mapping[str, ModeSelection],
+    stiffness: float,
+    recovery: bool = False,
+) -> ReducedPair:
+    """Reduce both bodies at the contact, with the port pattern taken at the peak force.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    pools : mapping of body name to Modes
+    correction : "consistent", "attachment" or "none"
+    selection : mapping of body name to ModeSelection
+    stiffness : float [N/m]
+        Of the local contact, for corrections that do not compute their own law.
+    recovery : bool
+        Keep the displacement of all named surfaces.
+    """
+    force = 0.7 * problem.static.max_force
+    for _ in range(_PATTERN_ROUNDS):
+        with trial() as caught:
+            pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
+            peak = float(
+                np.max(simulate_bodies(problem.case, pair.upper, pair.lower, pair.law).peak_force)
+            )
+        settled = abs(peak - force) <= 0.02 * force
+        force = min(peak, problem.static.max_force)
+        if settled or not force > 0:
+            break
+    show(caught)
+    return pair
+
+
+def _reduce_at(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    force: float,
+    correction: Correction,
+    selection: Mapping[str, ModeSelection],
+    stiffness: float,
+    recovery: bool,
+) -> ReducedPair:
+    load_upper, load_lower = problem.static.load_patterns(force)
+    ports = (Port(PORT, load_upper), Port(PORT, -load_lower))
+    bodies = (problem.pair.upper, problem.pair.lower)
+    flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
+    upper, lower = (
+        reduce_body(
+            body,
+            [port],
+            modes=selection[body.name],
+            correction=correction,
+            damping=damping_of(problem.case.bodies[body.name].damping),
+            modes_pool=pools[body.name],
+            flexibility=flexibility,
+            recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
+        )
+        for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
+    )
+    law, local = _law(problem, correction, upper, lower, stiffness)
+    return ReducedPair(
+        upper=upper, lower=lower, ports=ports, law=law, local=local, pattern_force=force
+    )
+
+
+def _law(
+    problem: ContactProblem,
+    correction: Correction,
+    upper: ReducedBody,
+    lower: ReducedBody,
+    stiffness: float,
+) -> tuple[ContactLaw, LocalLaw | None]:
+    asked = problem.case.contact.local_law
+    if isinstance(asked, LinearLocalLaw):
+        return LinearLaw(asked.stiffness), None
+    if isinstance(asked, HertzLocalLaw):
+        return HertzLaw(hertz_coefficient(problem.case, asked)), None
+    if isinstance(asked, SubmodelLocalLaw) or correction != "consistent":
+        return LinearLaw(stiffness), None
+    modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
+    local = consistent_law(problem.static, modal)
+    return local.law, local
+
+
+def hertz_coefficient(case: Case, law: HertzLocalLaw) -> float:
+    """4/3 E* sqrt(R) [N/m^1.5] with the given modulus, or the materials of the two bodies."""
+    if law.modulus is not None:
+        return 4.0 / 3.0 * law.modulus * float(np.sqrt(law.radius))
+    inverse = 0.0
+    for name, body in case.bodies.items():
+        if not isinstance(body.material, str):
+            raise InputError(
+                f"{case.path or 'case'}: contact.local_law",
+                got=f"a Hertz law on body '{name}' of several materials",
+                expected="bodies of one material",
+                hint="take the consistent law, which needs no such choice.",
+            )
+        inverse += 1.0 / case.materials_of(name, [name])[name].plane_strain_modulus
+    return 4.0 / 3.0 / inverse * float(np.sqrt(law.radius))
+
+
+def impact_system(
+    case: Case,
+    upper: ReducedBody,
+    lower: ReducedBody,
+    law: ContactLaw,
+    *,
+    ports: tuple[str, str] = (PORT, PORT),
+    series_compliance: float = 0.0,
+) -> ReducedSystem:
+    """Both bodies of a case, their contact, and the force and spring that act on the upper one.
+
+    Parameters
+    ----------
+    case : Case
+    upper, lower : ReducedBody
+    law : contact law
+    ports : pair of str
+        Where they meet, on the upper and on the lower body.
+    series_compliance : float [m/N]
+        In series with the law.
+    """
+    contact = ContactPair(
+        body_a=upper.name,
+        port_a=ports[0],
+        body_b=lower.name,
+        port_b=ports[1],
+        law=law,
+        gap=starting_gap(case),
+        series_compliance=series_compliance,
+    )
+    spring = case.motion.spring
+    closing = case.motion.force
+    springs: tuple[ReturnSpring, ...] = ()
+    if spring is not None:
+        # the preload is the force at first touch; a gap above it the spring pushes harder
+        closing += spring.preload + spring.stiffness * starting_gap(case)
+        springs = (ReturnSpring(body=upper.name, port=ports[0], stiffness=spring.stiffness),)
+    forces: tuple[AxialForce, ...] = ()
+    if closing != 0:
+        forces = (AxialForce(body=upper.name, force=-closing),)
+    return ReducedSystem(bodies=(upper, lower), contacts=(contact,), forces=forces, springs=springs)
+
+
+def simulate_bodies(
+    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
+) -> ImpactHistory:
+    """Impact of two reduced bodies, as the case starts it."""
+    return simulate_impact(
+        impact_system(case, upper, lower, law),
+        speed=case.motion.speed,
+        duration=case.run.duration,
+        step=case.run.reduced_step,
+    )
+
+
+def starting_gap(case: Case) -> float:
+    """Gap at the start [m]."""
+    return case.contact.gap or 0.0
+
+
+def static_curve(pair: ReducedPair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (indentation [m], force [N]) of the local law, for a picture."""
+    if pair.local is not None:
+        return np.append(0.0, pair.local.force_indentation), np.append(0.0, pair.local.force)
+    indentation = np.linspace(0.0, _indentation_at(pair.law, 1.2 * pair.pattern_force), 50)
+    return indentation, pair.law.force(indentation)
+
+
+def _indentation_at(law: ContactLaw, force: float) -> float:
+    upper = 1e-9
+    while float(law.force(upper)) < force:
+        upper *= 1.3
+    return upper

@@ -1,0 +1,177 @@
+"""Which bodies of a case sound: their structures, made while modes and statics are at hand."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import selection_of
+from klack.assembling.problem import ContactProblem
+from klack.assembling.reduced_pair import ReducedPair
+from klack.assembling.stops import StopContact
+from klack.case.bodies import CaseBody, SurfaceName
+from klack.case.noise import CaseNoise
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.input.problem import one_of
+from klack.reduction.ports import Port
+from klack.reduction.reduce import kept_modes
+from klack.reduction.structure import Structure
+from klack.reduction.structure_building import StructurePort, build_structure
+
+__all__ = [
+    "IMPACT_STOP",
+    "impact_structures",
+    "radiating_surfaces",
+    "valve_structures",
+]
+
+IMPACT_STOP = "contact"
+"""Name of the stop of ``klack impact``, whose force its histories hold."""
+
+
+def impact_structures(
+    problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair
+) -> tuple[Structure, ...]:
+    """Structures of the held bodies of one impact, with the modes of the level ``reduced``.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        With its factorisations.
+    pools : mapping of body name to Modes
+    own : ReducedPair
+        Its ports push here.
+    """
+    case, pair = problem.case, problem.pair
+    sides = (
+        (pair.upper, problem.flexibility_upper, own.ports[0], 1.0),
+        (pair.lower, problem.flexibility_lower, own.ports[1], -1.0),
+    )
+    held = [body.name for body, *_ in sides if body.is_fixed]
+    return tuple(
+        _structure(
+            case,
+            body,
+            [StructurePort(port=port, stop=IMPACT_STOP, sign=sign)],
+            pools[body.name],
+            flexibility,
+            radiating_surfaces(case.noise, body, held, _contact_names(case, body.name)),
+        )
+        for body, flexibility, port, sign in sides
+        if body.is_fixed
+    )
+
+
+def valve_structures(
+    case: ValveCase,
+    bodies: Mapping[str, ElasticBody],
+    ports: Mapping[str, Sequence[Port]],
+    contacts: Mapping[str, StopContact],
+    pools: Mapping[str, Modes],
+    flexibilities: Mapping[str, Flexibility],
+) -> tuple[Structure, ...]:
+    """Structures of the held bodies of a valve.
+
+    Parameters
+    ----------
+    case : ValveCase
+    bodies, ports, pools, flexibilities : mapping by name of the body
+    contacts : mapping of stop name to StopContact
+    """
+    held = [name for name, body in bodies.items() if body.is_fixed]
+    return tuple(
+        _structure(
+            case,
+            bodies[name],
+            [_pushed(port, name, contacts) for port in ports[name]],
+            pools[name],
+            flexibilities[name],
+            radiating_surfaces(case.noise, bodies[name], held, _stop_names(case, name)),
+        )
+        for name in held
+    )
+
+
+def radiating_surfaces(
+    noise: CaseNoise | None, body: ElasticBody, held: Sequence[str], contacts: Iterable[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Surfaces of a held body that meet the air, and those whose faces never do.
+
+    Parameters
+    ----------
+    noise : CaseNoise or None
+    body : ElasticBody
+    held : sequence of str
+        Names of all held bodies.
+    contacts : names
+        Surfaces of the body that hit or hold something; they count only if they are asked for.
+
+    Raises
+    ------
+    InputError
+        If the case asks for a surface of a body that is not held.
+    """
+    if noise is not None and noise.surfaces is not None:
+        _check_held(noise.surfaces, held)
+        return tuple(item.surface for item in noise.surfaces if item.body == body.name), ()
+    left_out = tuple(dict.fromkeys(contacts))
+    return tuple(name for name in body.mesh.surfaces if name not in left_out), left_out
+
+
+def _check_held(surfaces: Iterable[SurfaceName], held: Sequence[str]) -> None:
+    for surface in surfaces:
+        if surface.body not in held:
+            raise InputError(
+                "noise.surfaces",
+                got=f"'{surface}'",
+                expected=f"surfaces of held bodies ({one_of(held) or 'the case has none'})",
+                hint="a body that moves freely, such as a needle, radiates into the fluid.",
+            )
+
+
+def _structure(
+    case: Case | ValveCase,
+    body: ElasticBody,
+    ports: Sequence[StructurePort],
+    pool: Modes,
+    flexibility: Flexibility,
+    surfaces: tuple[tuple[str, ...], tuple[str, ...]],
+) -> Structure:
+    patterns = np.column_stack([item.port.pattern for item in ports])
+    return build_structure(
+        body,
+        modes=kept_modes(selection_of(case.reduction.choice(body.name)), pool, patterns),
+        damping=damping_of(case.bodies[body.name].damping),
+        ports=ports,
+        deflections=flexibility.deflections(patterns),
+        surfaces=surfaces[0],
+        left_out=surfaces[1],
+    )
+
+
+def _pushed(port: Port, body: str, contacts: Mapping[str, StopContact]) -> StructurePort:
+    for name, contact in contacts.items():
+        sides = (contact.pair.upper.name, contact.pair.lower.name)
+        for side, own, sign in zip(sides, contact.ports, (1.0, -1.0), strict=True):
+            if side == body and own is port:
+                return StructurePort(port=port, stop=name, sign=sign)
+    return StructurePort(port=port)
+
+
+def _contact_names(case: Case, body: str) -> list[str]:
+    names = [item.surface for item in case.contact.between if item.body == body]
+    return names + _supports(case.bodies[body])
+
+
+def _stop_names(case: ValveCase, body: str) -> list[str]:
+    sides = [side for stop in case.stops.values() for side in stop.between if side.body == body]
+    return [side.surface for side in sides] + _supports(case.bodies[body])
+
+
+def _supports(body: CaseBody) -> list[str]:
+    return [support.surface for support in body.fixed or ()]

@@ -1,0 +1,219 @@
+"""From a case of a whole valve to a network that can run: meshes, modes, stops, laws."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from klack.assembling.bodies import assemble_body, find_touch, mesh_body
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.given_shapes import require_given_shapes
+from klack.assembling.modes import mode_pool, selection_of
+from klack.assembling.stops import StopContact, build_stop, split_law, stop_law
+from klack.assembling.structures import valve_structures
+from klack.cache.setting import result_cache
+from klack.case.valve import ValveCase
+from klack.case.valve_consistency import is_consistent
+from klack.case.valve_roles import FLEXIBLE_BODY
+from klack.contact.local_law import LocalLaw
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mesh.mesh import Mesh
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.progress import Progress, silent
+from klack.reduction.ports import Port, pressure_port, surface_port
+from klack.reduction.reduce import reduce_body
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.structure import Structure
+from klack.stages import warnings_of
+
+__all__ = ["Valve", "build_valve", "build_valve_bodies", "filled_network"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Valve:
+    """A valve ready to run.
+
+    Parameters
+    ----------
+    case : ValveCase
+    bodies : mapping of str to ElasticBody
+    reduced : mapping of str to ReducedBody
+        With all their ports.
+    contacts : mapping of str to StopContact
+        By end stop.
+    laws : mapping of str to LocalLaw
+        Consistent laws, of the end stops that have one.
+    network : Network
+        With the bodies and laws filled in: the variant ``wet``.
+    structures : tuple of Structure
+        Held bodies as sources of sound.
+    """
+
+    case: ValveCase
+    bodies: Mapping[str, ElasticBody]
+    reduced: Mapping[str, ReducedBody]
+    contacts: Mapping[str, StopContact]
+    laws: Mapping[str, LocalLaw]
+    network: Network
+    structures: tuple[Structure, ...] = ()
+
+
+def build_valve(
+    case: ValveCase, progress: Progress = silent, *, threads: int | None = None
+) -> Valve:
+    """Mesh and factorise each body once, solve the static contact of each stop, reduce, join.
+
+    Raises
+    ------
+    InputError
+        For geometry, surfaces, supports or connections that cannot be used.
+    """
+    bodies = build_valve_bodies(case, progress)
+    flexibilities: dict[str, Flexibility] = {}
+    for i, (name, body) in enumerate(bodies.items()):
+        progress("factorise", i / len(bodies))
+        flexibilities[name] = Flexibility(body, threads=threads, cache=result_cache())
+    pools = _mode_pools(case, bodies, flexibilities, progress)
+    contacts = {
+        name: build_stop(case, name, bodies, flexibilities, pools, progress) for name in case.stops
+    }
+    ports = {name: _ports(case, body, contacts) for name, body in bodies.items()}
+    reduced = {}
+    for i, (name, body) in enumerate(bodies.items()):
+        progress("reduced", i / len(bodies))
+        reduced[name] = reduce_body(
+            body,
+            ports[name],
+            modes=selection_of(case.reduction.choice(name)),
+            correction=case.reduction.correction,
+            damping=damping_of(case.bodies[name].damping),
+            modes_pool=pools[name],
+            flexibility=flexibilities[name],
+        )
+    progress("radiating surfaces", 0.0)
+    structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
+    for flexibility in flexibilities.values():
+        flexibility.close()
+    laws = {}
+    for name, contact in contacts.items():
+        if is_consistent(case.network.components[name]):
+            upper, lower = (reduced[body.name] for body in (contact.pair.upper, contact.pair.lower))
+            with warnings_of(f"stop '{name}'"):
+                laws[name] = stop_law(contact, upper, lower)
+    network = filled_network(case, reduced, laws)
+    return Valve(
+        case=case,
+        bodies=bodies,
+        reduced=reduced,
+        contacts=contacts,
+        laws=laws,
+        network=network,
+        structures=structures,
+    )
+
+
+def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
+    """Mesh every body, fine at the first touch of each of its stops."""
+    progress("mesh", 0.0)
+    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
+    places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
+    for stop in case.stops.values():
+        touch = find_touch(case.bodies, stop.upper, stop.lower)
+        if touch is not None:
+            places[stop.upper.body] += touch.upper
+            places[stop.lower.body] += touch.lower
+    result = {}
+    for i, (name, given) in enumerate(case.bodies.items()):
+        progress("mesh", i / len(case.bodies))
+        mesh = mesh_body(given, name, tuple(places[name]))
+        result[name] = assemble_body(case, name, mesh)
+    return result
+
+
+def _mode_pools(
+    case: ValveCase,
+    bodies: Mapping[str, ElasticBody],
+    flexibilities: Mapping[str, Flexibility],
+    progress: Progress,
+) -> dict[str, Modes]:
+    progress("modes", 0.0)
+    # the triangular solves run outside of the interpreter: two bodies keep two cores busy
+    with ThreadPoolExecutor(max_workers=2) as workers:
+        jobs = {
+            name: workers.submit(
+                mode_pool, selection_of(case.reduction.choice(name)), body, flexibilities[name]
+            )
+            for name, body in bodies.items()
+        }
+        pools = {name: job.result() for name, job in jobs.items()}
+    progress("modes", 1.0)
+    return pools
+
+
+def _ports(case: ValveCase, body: ElasticBody, contacts: Mapping[str, StopContact]) -> list[Port]:
+    """Ports of a body: its contacts, then the other points that the network uses."""
+    ports = [
+        port
+        for contact in contacts.values()
+        for side, port in zip((contact.pair.upper, contact.pair.lower), contact.ports, strict=True)
+        if side.name == body.name
+    ]
+    known = {port.name for port in ports}
+    for part in case.network.components.values():
+        if isinstance(part, FlexibleBody) and part.body == body.name:
+            missing = [point for point in part.points if point not in known]
+            ports += [_surface_port(case, body.name, body.mesh, point) for point in missing]
+    return ports
+
+
+def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
+    """Port of a point that is no contact; +z is up, whatever the side that is pressed."""
+    given = case.bodies[body].ports.get(point)
+    surface = given.surface if given is not None else point
+    if given is None or given.load == "axial":
+        return surface_port(mesh, surface, "z", name=point)
+    port = pressure_port(mesh, surface, name=point)
+    axial = float(port.pattern[mesh.dimension - 1 :: mesh.dimension].sum())
+    if abs(abs(axial) - 1.0) > 1e-6:
+        raise InputError(
+            f"bodies.{body}.ports.{point}",
+            got=f"a pressure whose resultant is {abs(axial):.3g} N along z for 1 N in all",
+            expected="a resultant along the axis",
+            hint="name a surface all round the axis, or take load: axial.",
+        )
+    return Port(point, np.sign(axial) * port.pattern)
+
+
+def filled_network(
+    case: ValveCase, reduced: Mapping[str, ReducedBody], laws: Mapping[str, LocalLaw]
+) -> Network:
+    """Network of a case with its reduced bodies and computed laws."""
+    network = case.network.network()
+    return network.with_components(_filled_in(network, reduced, laws))
+
+
+def _filled_in(
+    network: Network, reduced: Mapping[str, ReducedBody], laws: Mapping[str, LocalLaw]
+) -> dict[str, Component]:
+    """Components that had to wait for the bodies."""
+    filled: dict[str, Component] = {}
+    for name, part in network.components.items():
+        if part.type == FLEXIBLE_BODY and isinstance(part, FlexibleBody):
+            filled[name] = part.with_reduced(reduced[part.body])
+        elif isinstance(part, EndStop) and name in laws:
+            filled[name] = _with_law(part, laws[name])
+    return filled
+
+
+def _with_law(stop: EndStop, local: LocalLaw) -> EndStop:
+    if stop.film is None:
+        return stop.with_law(local.law)
+    law, compliance = split_law(local)
+    return stop.with_law(law, compliance)

@@ -1,0 +1,85 @@
+"""What a report says, before it is laid out: the same words for screen and paper.
+
+Everything here is plain text; each renderer escapes it in its own way, because titles, names and
+the text of the case come from the user.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from klack.report.chart import BarChart, Chart
+
+__all__ = ["Content", "Picture", "Section", "Sound", "Table"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Header and rows of text; the first column names the row.
+
+    What follows a line break in a cell is printed smaller.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+class Picture(Protocol):
+    """An image (SVG) and what has to be said about it."""
+
+    @property
+    def image(self) -> bytes:
+        """SVG."""
+
+    @property
+    def note(self) -> str:
+        """Caption."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sound:
+    """A sound to listen to (WAV; empty if it is too long for a page), and what to say about it."""
+
+    title: str
+    wav: bytes
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A heading with what belongs under it: text, sounds, picture, charts, tables."""
+
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    sounds: tuple[Sound, ...] = ()
+    picture: Picture | None = None
+    charts: tuple[Chart | BarChart, ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """All of a report.
+
+    Parameters
+    ----------
+    title, subtitle, description, answer : str
+    numbers : Table
+        The key numbers per level.
+    warnings : tuple of str
+    sections : tuple of Section
+    definitions, limits : tuple of (term, text)
+    case_text : str
+    versions : str
+    """
+
+    title: str
+    subtitle: str
+    description: str
+    answer: str
+    numbers: Table
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...]
+    definitions: tuple[tuple[str, str], ...]
+    limits: tuple[tuple[str, str], ...]
+    case_text: str
+    versions: str

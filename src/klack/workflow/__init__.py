@@ -1,1 +1,0 @@
-"""From a case to its results: the steps in order, with progress."""
