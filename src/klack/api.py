@@ -1,0 +1,495 @@
+"""What a notebook imports: cases, runs and results, as :mod:`klack` hands them on.
+
+Every function takes a case as text names it (a file, a shipped case) or as :func:`load_case`
+returned it, and returns a :class:`Result`.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+from klack.analyses.analysis import Analysis
+from klack.analyses.catalogue import analysis_in
+from klack.analyses.measures import Measure
+from klack.case.case_tree import CaseTree, read_case_tree, tree_of
+from klack.case.inserting import with_values
+from klack.case.key_path import kind_at, node_at, quantity_at, split_path
+from klack.case.schema import Case
+from klack.case.shipped import find_case
+from klack.case.valve import ValveCase
+from klack.case.valve_reader import read_any_case
+from klack.errors import InputError
+from klack.input.problem import CaseProblem
+from klack.network.component import Component
+from klack.progress import Progress, silent
+from klack.report.chart import BarChart
+
+__all__ = [
+    "CaseOnHand",
+    "Number",
+    "Result",
+    "calibrate",
+    "compare",
+    "load_case",
+    "load_result",
+    "noise_of",
+    "run_impact",
+    "run_shots",
+    "run_stroke",
+]
+
+Checked = TypeVar("Checked", Case, ValveCase)
+
+
+@dataclass(frozen=True, eq=False)
+class CaseOnHand:
+    """A checked case, with the text that it was read from.
+
+    Parameters
+    ----------
+    checked : Case or ValveCase
+        Typed, all numbers in SI: ``case.checked.motion.speed``.
+    tree : CaseTree
+        The text.
+    """
+
+    checked: Case | ValveCase
+    tree: CaseTree
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return self.checked.name
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return self.checked.title
+
+    @property
+    def text(self) -> str:
+        """The file, with the values that were changed."""
+        return self.tree.text
+
+    def value(self, key: str) -> Any:
+        """What stands at a key, in SI where it is a quantity; None where nothing does.
+
+        Raises
+        ------
+        InputError
+            If there is no such key.
+        """
+        return self._at(key)[0]
+
+    def with_value(self, key: str, value: object) -> "CaseOnHand":
+        """A case with another value at a key, checked as a whole.
+
+        Parameters
+        ----------
+        key : str
+            From the top of the case: ``"network.components.spring.preload"``.
+        value : str or number
+            As the case file would have it: ``"14 N"``.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, or the case does not allow the value.
+
+        Examples
+        --------
+        >>> case = load_case("demo-stroke")
+        >>> changed = case.with_value("network.components.spring.preload", "14 N")
+        >>> changed.value("network.components.spring.preload")
+        14.0
+        """
+        node, field = self._at(key)
+        place = split_path(key)
+        if not isinstance(value, str | int | float):
+            raise InputError(
+                f"with_value('{key}')",
+                got=f"a {type(value).__name__}",
+                expected="one value, as the case file would have it",
+                hint='give a text such as "14 N", or a number; entries of a list one by one.',
+            )
+        if kind_at(node, field) is not None and isinstance(node, float):
+            quantity_at(self.checked, place).parse(value)
+        text = with_values(self.tree, {place: json.dumps(value)})
+        own = tuple(self.tree.components.values())
+        tree = tree_of(text, self.tree.path, own)
+        return CaseOnHand(read_any_case(text, self.tree.path, own), tree)
+
+    def _at(self, key: str) -> tuple[Any, Any]:
+        try:
+            return node_at(self.checked, split_path(key))
+        except CaseProblem as problem:
+            where = f"key of {self.tree.path.name}"
+            raise InputError(
+                where, got=problem.got, expected=problem.expected, hint=problem.hint
+            ) from None
+
+    def _repr_html_(self) -> str:
+        return (
+            f"<b>{escape(self.title or self.name)}</b><br>{escape(self.checked.description)}"
+            f"<details><summary>{escape(str(self.tree.path.name))}</summary>"
+            f"<pre>{escape(self.text)}</pre></details>"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """Value of a measure; a number with a unit and a definition.
+
+    Parameters
+    ----------
+    value : float, int, bool or None
+        In ``unit``; None where the run does not have it.
+    unit : str
+        SI, ``"1"`` for a pure number.
+    measure : Measure
+        Name, symbol, definition, source.
+    """
+
+    value: float | int | bool | None
+    unit: str
+    measure: Measure[Any]
+
+    def __float__(self) -> float:
+        return float("nan") if self.value is None else float(self.value)
+
+    def __repr__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.value!r}{unit}" if self.value is not None else "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What an analysis leaves behind.
+
+    Parameters
+    ----------
+    record : ImpactStudy, StrokeStudy, ShotsStudy, NoiseStudy, ...
+        Everything, as arrays and small records, in SI.
+    analysis : Analysis
+        How it is stored and told.
+    """
+
+    record: Any
+    analysis: Analysis[Any]
+
+    @cached_property
+    def measures(self) -> Mapping[str, Mapping[str, Number]]:
+        """Named numbers, by level, variant, impact, shot or design, then by key."""
+        return {
+            name: {item.key: Number(_known(item, of), item.unit, item) for item in measures}
+            for name, of, measures in self.analysis.measured(self.record)
+        }
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """What ``--json`` of the command writes."""
+        return dict(self.analysis.to_json(self.record))
+
+    def save(self, folder: str | Path, *, report: bool = False) -> Path:
+        """Store the record in a folder, and its report if wanted; return the folder."""
+        place = Path(folder)
+        self.analysis.save(self.record, place)
+        if report:
+            from klack.report.html import write_report
+            from klack.report.pdf import write_pdf
+
+            content = self.analysis.content(self.record)
+            write_report(content, place / "report.html")
+            write_pdf(content, place / "report.pdf")
+        return place
+
+    def to_xarray(self, run: str | None = None) -> Any:
+        """Curves and numbers of one level or variant as an ``xarray.Dataset``.
+
+        Parameters
+        ----------
+        run : str, optional
+            Level or variant; the one that is the answer by default.
+
+        Returns
+        -------
+        xarray.Dataset
+            Coordinates are the axes of the run; ``units``, ``long_name`` and ``comment`` are
+            attributes of every variable.
+
+        Raises
+        ------
+        MissingExtraError
+            Without the package xarray.
+        InputError
+            For a record without curves, or a run that it does not have.
+        """
+        from klack.exchange.results.dataset import dataset_of
+
+        return dataset_of(self.record, run)
+
+    def __repr__(self) -> str:
+        lines = [f"{self.analysis.form.command}: {self.record.title or self.record.case}"]
+        lines += [f"  {name}: {_short(numbers)}" for name, numbers in self.measures.items()]
+        return "\n".join(lines[:20])
+
+    def _repr_html_(self) -> str:
+        """Key numbers, warnings and the first figure, as a notebook shows them."""
+        content = self.analysis.content(self.record)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{_lines(cell)}</td>" for cell in row) + "</tr>"
+            for row in content.numbers.rows
+        )
+        heads = "".join(f"<th>{_lines(head)}</th>" for head in content.numbers.columns)
+        warnings = "".join(f"<li>{escape(text)}</li>" for text in content.warnings)
+        charts = [chart for section in content.sections for chart in section.charts]
+        figure = ""
+        if charts:
+            from klack.report.printed import svg_bars, svg_chart
+
+            first = charts[0]
+            drawn = svg_bars(first) if isinstance(first, BarChart) else svg_chart(first)
+            figure = drawn.decode()[drawn.decode().index("<svg") :]
+        return (
+            f"<b>{escape(content.title)}</b><br>{escape(content.subtitle)}"
+            f"<p>{escape(content.answer)}</p>"
+            + (f"<ul>{warnings}</ul>" if warnings else "")
+            + f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{figure}"
+        )
+
+
+def _known(measure: Measure[Any], of: Any) -> float | int | bool | None:
+    value = measure.read(of) if measure.given(of) else None
+    return value if value is not None and isfinite(value) else None
+
+
+def _short(numbers: Mapping[str, Number]) -> str:
+    shown = [item for item in numbers.values() if item.measure.page and item.value is not None]
+    parts = [
+        f"{n.measure.name} {n.measure.printed(n.value)}" for n in shown[:4] if n.value is not None
+    ]
+    return ", ".join(parts)
+
+
+def _lines(cell: str) -> str:
+    return escape(cell).replace("\n", "<br>")
+
+
+# --------------------------------------------------------------------------- doing
+
+
+Given = str | Path | CaseOnHand
+
+
+def load_case(case: str | Path, components: Iterable[type[Component]] = ()) -> CaseOnHand:
+    """Read and check a case: a file, or the name of a shipped one.
+
+    Parameters
+    ----------
+    case : str or Path
+    components : iterable of type
+        Components of the user's own that the case may name.
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    own = tuple(components)
+    path = find_case(Path(case))
+    tree = read_case_tree(path, own)
+    return CaseOnHand(read_any_case(tree.text, path, own), tree)
+
+
+def load_result(folder: str | Path) -> Result:
+    """Read what a command, or :meth:`Result.save`, wrote.
+
+    Raises
+    ------
+    InputError
+        If there is no result, or a part of it is missing.
+    """
+    analysis = analysis_in(Path(folder))
+    return Result(analysis.load(Path(folder)), analysis)
+
+
+def run_impact(
+    case: Given,
+    levels: Sequence[str] | None = None,
+    *,
+    certify: bool = True,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Result:
+    """Compute one dry impact; see :func:`klack.analyses.impact.run.run_impact`."""
+    from klack.analyses.impact.analysis import IMPACT
+    from klack.analyses.impact.run import run_impact as run
+
+    checked = _of_kind(case, Case, "an impact")
+    wanted = checked.require_levels(list(levels) if levels else checked.run.levels)
+    record = run(checked, levels=wanted, certify=certify, progress=progress, threads=threads)
+    return Result(record, IMPACT)
+
+
+def run_stroke(
+    case: Given,
+    variants: Sequence[str] | None = None,
+    *,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Result:
+    """Compute one actuation of a valve; see :func:`klack.analyses.stroke.run.run_stroke`."""
+    from klack.analyses.stroke.analysis import STROKE
+    from klack.analyses.stroke.run import run_stroke as run
+
+    checked = _of_kind(case, ValveCase, "a whole valve")
+    wanted = checked.require_variants(tuple(variants) if variants else checked.run.variants)
+    return Result(run(checked, variants=wanted, progress=progress, threads=threads), STROKE)
+
+
+def run_shots(
+    case: Given,
+    count: int | None = None,
+    *,
+    seed: int | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Result:
+    """Drop a valve many times; see :func:`klack.analyses.shots.run.run_shots`."""
+    from klack.analyses.shots.analysis import SHOTS
+    from klack.analyses.shots.run import run_shots as run
+
+    checked = _of_kind(case, Case, "an impact")
+    record = run(
+        checked, count=count, seed=seed, workers=workers, progress=progress, threads=threads
+    )
+    return Result(record, SHOTS)
+
+
+def noise_of(*results: Result, names: Sequence[str] = (), progress: Progress = silent) -> Result:
+    """Estimate what is heard of impacts and strokes, side by side.
+
+    Parameters
+    ----------
+    *results : Result
+        Of impacts and strokes; the first one is the one to compare with.
+    names : sequence of str
+        Of the designs.
+    """
+    from klack.analyses.noise.analysis import NOISE
+    from klack.analyses.noise.run import run_noise
+    from klack.analyses.noise.source import sources_of
+
+    sources = [source for result in results for source in sources_of(result.record)]
+    return Result(run_noise(sources, names=names, progress=progress), NOISE)
+
+
+def calibrate(
+    case: Given,
+    measurement: str | Path | Sequence[str | Path],
+    *,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Fit the parameters of a valve to measured strokes, as ``klack calibrate`` does.
+
+    Parameters
+    ----------
+    case : str, Path or CaseOnHand
+        With a section ``calibration``.
+    measurement : path or sequence of paths
+        Recordings.
+    folder : path, optional
+        Where finished trials are kept, so that an interrupted fit resumes.
+    """
+    from klack.analyses.calibration.analysis import CALIBRATION
+    from klack.analyses.calibration.run import calibration_of, run_calibration
+    from klack.measurement.loading import load_stroke_set
+
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    checked = _of_kind(given, ValveCase, "a whole valve")
+    roles = ("lift", *calibration_of(checked).channels)
+    strokes = load_stroke_set(_paths(measurement), checked.measurement, roles=roles)
+    record = run_calibration(
+        given.tree,
+        strokes,
+        folder=None if folder is None else Path(folder),
+        workers=workers,
+        progress=progress,
+    )
+    return Result(record, CALIBRATION)
+
+
+def compare(
+    result: Result,
+    measurement: str | Path | Sequence[str | Path] | Mapping[str, str | Path],
+    *,
+    case: Given | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Lay a stroke or shots beside a measurement, as ``klack compare --measurement`` does.
+
+    Parameters
+    ----------
+    result : Result
+        Of :func:`run_stroke` or :func:`run_shots`.
+    measurement : path, sequence of paths, or mapping of variant to path
+    case : str, Path or CaseOnHand, optional
+        Whose section ``measurement`` is used; that of the result by default.
+    """
+    from klack.analyses.comparison.analysis import MEASURED_SHOTS, MEASURED_STROKES
+    from klack.analyses.comparison.shots import compare_shots
+    from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.shots.record import ShotsStudy
+    from klack.analyses.stroke.record import StrokeStudy
+
+    record = result.record
+    if case is None:
+        section = read_any_case(record.case_text, Path("case.yaml")).measurement
+        text = None
+    else:
+        other = case if isinstance(case, CaseOnHand) else load_case(case)
+        section, text = other.checked.measurement, other.text
+    if isinstance(record, StrokeStudy):
+        files = (
+            {name: _paths(path) for name, path in measurement.items()}
+            if isinstance(measurement, Mapping)
+            else {record.reference.name: _paths(measurement)}
+        )
+        strokes = compare_strokes(record, files, section, case_text=text, progress=progress)
+        return Result(strokes, MEASURED_STROKES)
+    if isinstance(record, ShotsStudy) and not isinstance(measurement, Mapping):
+        drops = compare_shots(
+            record, _paths(measurement), section, case_text=text, progress=progress
+        )
+        return Result(drops, MEASURED_SHOTS)
+    raise InputError(
+        "compare",
+        got=f"a result of '{result.analysis.form.command}'",
+        expected="one of run_stroke, or one of run_shots with a list of files",
+        hint="run the stroke first: klack.run_stroke(case).",
+    )
+
+
+def _of_kind(case: Given, kind: type[Checked], words: str) -> Checked:
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    if isinstance(given.checked, kind):
+        return given.checked
+    raise InputError(
+        f"case {given.name}",
+        got="a case of another kind",
+        expected=f"a case of {words}",
+        hint="a case with a section 'network' is a valve: run_stroke; with 'contact' it is an "
+        "impact: run_impact, run_shots.",
+    )
+
+
+def _paths(given: str | Path | Sequence[str | Path]) -> list[Path]:
+    return [Path(item) for item in ([given] if isinstance(given, str | Path) else given)]

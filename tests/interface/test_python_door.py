@@ -1,0 +1,108 @@
+"""What a notebook imports: cases with other values, runs, results, datasets."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import klack
+from klack.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def rods() -> klack.Result:
+    return klack.run_impact("two-rods", levels=["reduced"], certify=False)
+
+
+def test_import_of_klack_loads_nothing_else():
+    """Truth = the modules that Python has loaded, counted."""
+    code = "import sys, klack; print([m for m in sys.modules if m in ('numpy', 'pydantic')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_name_of_the_door_is_there():
+    assert {name for name in klack.__all__ if getattr(klack, name) is None} == set()
+    assert set(klack.__all__) <= set(dir(klack))
+    with pytest.raises(AttributeError, match="no attribute 'run_imapct'"):
+        _ = klack.run_imapct
+
+
+class TestValues:
+    def test_a_value_is_exchanged_in_text_and_case(self):
+        case = klack.load_case("demo-stroke")
+        key = "network.components.spring.preload"
+        other = case.with_value(key, "14 N")
+        assert other.value(key) == 14.0 != case.value(key)
+        assert other.text != case.text
+        same = [line for line in case.text.splitlines() if line in other.text.splitlines()]
+        assert len(same) == len(case.text.splitlines()) - 1
+
+    def test_a_default_is_written_where_it_was_not(self):
+        case = klack.load_case("two-rods")
+        assert "interface_step" not in case.text
+        other = case.with_value("run.interface_step", "3 ns")
+        assert other.value("run.interface_step") == 3e-9
+
+    @pytest.mark.parametrize(
+        ("key", "value", "words"),
+        [
+            ("motion.sped", "1 m/s", "did you mean 'speed'"),
+            ("motion.speed", "1 N", "a force"),
+            ("motion.speed", "5", "without unit"),
+            ("motion.speed", -1, "without unit"),
+            ("motion.speed", None, "one value"),
+            ("motion.speed", ["1 m/s"], "one value"),
+            ("motion", "1 m/s", "motion"),
+            ("", "1 m/s", "keys joined"),
+        ],
+    )
+    def test_what_a_case_does_not_allow_is_one_error(self, key: str, value: object, words: str):
+        case = klack.load_case("two-rods")
+        with pytest.raises(InputError, match=words):
+            case.with_value(key, value)
+
+    def test_a_case_of_another_kind_is_refused(self):
+        with pytest.raises(InputError, match="run_stroke"):
+            klack.run_impact("demo-stroke")
+        with pytest.raises(InputError, match="run_impact"):
+            klack.run_stroke("two-rods")
+
+
+class TestResults:
+    def test_measures_are_those_of_the_record(self, rods: klack.Result):
+        numbers = rods.measures["reduced"]
+        measures = rods.record.levels["reduced"].measures
+        assert numbers["peak_force"].value == measures.peak_force
+        assert numbers["peak_force"].unit == "N"
+        assert float(numbers["contact_time"]) == measures.contact_time
+        assert repr(numbers["restitution"]) == repr(measures.restitution)
+        assert "peak force" in repr(rods)
+
+    def test_json_has_the_keys_of_the_measures(self, rods: klack.Result):
+        level = rods.json["levels"]["reduced"]
+        for number in rods.measures["reduced"].values():
+            assert level[number.measure.json_key] == number.value
+
+    def test_curves_carry_units(self, rods: klack.Result):
+        data = rods.to_xarray()
+        history = rods.record.levels["reduced"].history
+        assert data.contact_force.attrs["units"] == "N"
+        assert data.time.attrs["units"] == "s"
+        np.testing.assert_array_equal(data.contact_force.values, history.force)
+        assert float(data.peak_force) == rods.record.levels["reduced"].measures.peak_force
+        with pytest.raises(InputError, match="one of: reduced"):
+            rods.to_xarray("full")
+
+    def test_a_notebook_shows_numbers_warnings_and_a_figure(self, rods: klack.Result):
+        page = rods._repr_html_()
+        assert "<table>" in page
+        assert "<svg" in page
+        assert "peak force" in page
+
+    def test_a_stored_result_is_the_same(self, rods: klack.Result, tmp_path: Path):
+        again = klack.load_result(rods.save(tmp_path))
+        assert again.json == rods.json
+        assert again.analysis is rods.analysis
