@@ -116,6 +116,14 @@ def test_the_page_carries_the_whole_library_packed(page: str) -> None:
     assert len(page) < 5e6
 
 
+def test_the_heading_says_each_thing_once(lonely_study: ImpactStudy) -> None:
+    parts = report_content(lonely_study).subtitle.split(" · ")
+
+    assert parts[:2] == ["Dry impact", f"case {lonely_study.case}"]
+    assert parts[-1] == f"klack {lonely_study.version}"
+    assert len(parts) == 4
+
+
 def test_writing_leaves_one_complete_file(lonely_study: ImpactStudy, tmp_path: Path) -> None:
     write_report(report_content(lonely_study), tmp_path / "new" / "report.html")
 

@@ -38,15 +38,13 @@ def page_of(
     definitions, limits : tuple of (term, text)
     """
     made = f"klack {record.version}"
-    subtitle = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)
+    heading = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)
     libraries = [f"{name} {version}" for name, version in record.versions.items()]
     computing = stage_table(record.stage_times, record.wall_time)
     every = (*sections, Section(title="Computing time", tables=(computing,)))
     return Content(
         title=record.title or record.case,
-        subtitle=" · ".join(
-            (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)
-        ),
+        subtitle=" · ".join(heading),
         description=record.description,
         answer=answer,
         numbers=numbers,

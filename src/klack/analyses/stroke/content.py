@@ -359,7 +359,11 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "first impact.",
     ),
     *glossary(measure for measure in EVENT_MEASURES if measure.page),
-    *glossary(measure for measure in VARIANT_MEASURES if measure.page),
+    *glossary(
+        measure
+        for measure in VARIANT_MEASURES
+        if measure.page and measure.key not in ("opening_time", "closing_time")  # above
+    ),
     (
         "echo time 2L/a",
         "Time of a pressure wave to the far end of a line and back.",
