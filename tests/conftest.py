@@ -22,7 +22,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 sys.path.append(str(Path(__file__).parent))  # worker processes look there as well
 from c_compiler import untested
-from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy books)
+from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy balance)
 
 # the search for examples in docstrings would run these modules a second time, under another name
 collect_ignore_glob = [

@@ -1,4 +1,4 @@
-"""Every run of every test keeps its energy books, or the test fails (conservation).
+"""Every run of every test keeps its energy balance, or the test fails (conservation).
 
 All four solvers hand the residual of their books to ``klack.energy_balance`` when they finish.  The
 product warns there; in the suite the same call raises, with tighter limits, and names the run.

@@ -1,4 +1,4 @@
-"""Judge the energy books of a finished run: what does not close is told, not hidden."""
+"""Judge the energy balance of a finished run: what does not close is told, not hidden."""
 
 import warnings
 from math import isfinite

@@ -1,4 +1,4 @@
-"""Truth: the energy books of a whole run, and the same film stepped alone."""
+"""Truth: the energy balance of a whole run, and the same film stepped alone."""
 
 import numpy as np
 import pytest

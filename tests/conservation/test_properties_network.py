@@ -1,4 +1,4 @@
-"""Truth: the energy books. Small valves put together at random keep them and never leave numbers.
+"""Truth: the energy balance. Small valves put together at random keep them and never leave numbers.
 
 A mass between two stops, with springs, friction, films, forces, a coil and a hydraulic side: each
 of them there or not, soft or stiff, at steps from 20 ns to 0.5 us.

@@ -1,4 +1,4 @@
-"""Models that would make energy are refused, and what passes keeps its energy books.
+"""Models that would make energy are refused, and what passes keeps its energy balance.
 
 Truth: reciprocity and passivity of elastic bodies; a rod whose outputs are disturbed breaks them.
 """

@@ -1,7 +1,7 @@
 """A valve between two stops, from its case: momentum, energy, and the same impact elsewhere.
 
-Truth: the change of momentum, the energy books, the impact workflow with its own time loop for the
-seat, and the mirror image for the opening stop.
+Truth: the change of momentum, the energy balance, the impact workflow with its own time loop for
+the seat, and the mirror image for the opening stop.
 """
 
 from pathlib import Path

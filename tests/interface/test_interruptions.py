@@ -224,7 +224,7 @@ def test_a_stopped_run_says_so_and_takes_its_workers_with_it(number, code, tmp_p
 
     assert process.returncode == code, err
     assert err.count("\n") == 1, err
-    assert "the same command goes on" in err
+    assert "the same command resumes" in err
     assert wait_until(lambda: not members(process.pid), BUSY)
     assert names(tmp_path / "out") == [LOG]
 

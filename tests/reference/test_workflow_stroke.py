@@ -1,6 +1,6 @@
 """The shipped stroke in its four variants.
 
-Truth: the energy books, Newton's law for the first flight, the driver's numbers, Joukowsky's
+Truth: the energy balance, Newton's law for the first flight, the driver's numbers, Joukowsky's
 pressure rise and the echo time of the feed line.
 """
 

@@ -113,6 +113,6 @@ def calibrate(
         except KeyboardInterrupt as stop:
             count = TRIAL_LOG.count(folder)
             kept = f"{count} computed strokes are kept in {folder / TRIAL_LOG.file}"
-            stop.add_note(f"{kept}, the same command goes on.")
+            stop.add_note(f"{kept}, the same command resumes.")
             raise
     return ending.end(CALIBRATION, study, beside=calibrated, unfinished=TRIAL_LOG)

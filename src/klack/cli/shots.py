@@ -85,6 +85,6 @@ def shots(
             )
         except KeyboardInterrupt as stop:
             kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
-            stop.add_note(f"{kept}, the same command goes on.")
+            stop.add_note(f"{kept}, the same command resumes.")
             raise
     return ending.end(SHOTS, study, unfinished=SHOT_LOG)

@@ -32,7 +32,7 @@ _Variants = Annotated[
         name="--variant",
         consume_multiple=True,
         negative="",
-        help="wet, dry, wet-lumped, dry-lumped; several (a,b,c) are laid over each other. "
+        help="wet, dry, wet-lumped, dry-lumped; several (a,b,c) are overlaid. "
         "[default: as in the case]",
     ),
 ]

@@ -60,7 +60,7 @@ def load_stroke_set(
     *,
     roles: Collection[Role] = tuple(ROLES),
 ) -> StrokeSet:
-    """Read recordings, cut them into strokes, align these, and put aside what cannot be used.
+    """Read recordings, cut them into strokes, align these, and discard what cannot be used.
 
     Long recordings are read in windows; only the strokes themselves are kept.
 

@@ -1,6 +1,6 @@
 """Strokes that cannot be used, each with its reason.
 
-Only what is beyond doubt is put aside: scatter from shot to shot is the matter to be measured.
+Only what is beyond doubt is discarded: scatter from shot to shot is the matter to be measured.
 
 ========== ==================================================================================
 no motion  lift moves by less than 20 % of the median way

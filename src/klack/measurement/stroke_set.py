@@ -1,4 +1,4 @@
-"""Measured strokes of one valve, aligned, and those that were put aside."""
+"""Measured strokes of one valve, aligned, and those that were discarded."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class MeasuredStroke:
 
 @dataclass(frozen=True, kw_only=True)
 class Rejection:
-    """A stroke that was put aside, and why."""
+    """A stroke that was discarded, and why."""
 
     name: str
     reason: str

@@ -1,4 +1,4 @@
-"""Integrate a system of reduced bodies and keep the books of its energy."""
+"""Integrate a system of reduced bodies and keep its energy balance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The time loop: exact modes, discrete-gradient contacts, decimated records, energy books.
+"""The time loop: exact modes, discrete-gradient contacts, decimated records, energy balance.
 
 Everything is a flat array; :mod:`klack.simulation.system` builds them.  One step is one pass over
 the modes (free motion, with the contact force of the step before folded in) and a scalar equation

@@ -1,4 +1,4 @@
-"""Energy books of a run: what is held at a moment, what came in and was lost between two."""
+"""Energy balance of a run: what is held at a moment, what came in and was lost between two."""
 
 from collections.abc import Mapping
 

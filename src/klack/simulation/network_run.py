@@ -1,4 +1,4 @@
-"""Run a network: static start, time loop, channels, impacts, energy books."""
+"""Run a network: static start, time loop, channels, impacts, energy balance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

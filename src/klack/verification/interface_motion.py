@@ -85,7 +85,7 @@ def interface_motion(
     Parameters
     ----------
     upper, lower : ReducedBody
-        Undamped, so that the energy books close without the modes.
+        Undamped, so that the energy balance close without the modes.
     law : ContactLaw or None
     film : FilmRow or None
     series : float [m/N]

@@ -31,7 +31,7 @@ _check = partial(compare, GROUP)
 
 
 def checks() -> list[Check]:
-    """Motion under each component against its closed solution, and the energy books."""
+    """Motion under each component against its closed solution, and the energy balance."""
     return [
         *_falls(),
         *_oscillates(),
@@ -218,6 +218,6 @@ def _balances() -> list[Check]:
             0.0,
             books.relative_residual,
             2e-13,
-            "energy books: every element balances to round-off",
+            "energy balance: every element balances to round-off",
         )
     ]

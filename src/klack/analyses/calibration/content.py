@@ -141,7 +141,7 @@ def _fact_table(study: CalibrationStudy) -> Table:
     rows = [
         ("measured", study.source),
         ("strokes", count(len(study.strokes))),
-        ("put aside", "; ".join(study.rejected) or "none"),
+        ("discarded", "; ".join(study.rejected) or "none"),
         ("variant", study.variant),
         ("channels", ", ".join(c.role for c in study.channels if c.weight.any())),
         ("windows", window),

@@ -58,7 +58,7 @@ class TrialPool(Closing):
         except WorkerDied as error:
             raise ConvergenceError(
                 f"calibration: {error}; the trials so far are kept.\n"
-                "Try: fewer --workers if the memory was full; the same command goes on from here."
+                "Try: fewer --workers if the memory was full; the same command resumes from here."
             ) from None
 
     def _keep(self, key: TrialKey, found: Motion | Failure) -> None:

@@ -152,7 +152,7 @@ class CalibrationStudy(CaseRecord):
     strokes : tuple of str
         Names of the strokes that were fitted.
     rejected : tuple of str
-        Strokes that were put aside, with the reason.
+        Strokes that were discarded, with the reason.
     variant : str
     parameters : tuple of CalibratedParameter
     correlation, design_correlation : array, shape (p, p)

@@ -104,7 +104,7 @@ def run_calibration(
         Case of the whole valve, as it was written.
     strokes : StrokeSet
     folder : Path, optional
-        Keeps computed trials there until it is finished; the same call goes on from them.
+        Keeps computed trials there until it is finished; the same call resumes from them.
     workers : int, optional
         Processes; all cores by default.
     progress : callable

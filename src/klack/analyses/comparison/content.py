@@ -67,7 +67,7 @@ def measured_shots_content(study: MeasuredShotsStudy) -> Content:
     """Put shots beside measured drops into words, tables and figures."""
     facts = [
         ("files", study.source),
-        ("drops", f"{len(study.names)} used, {len(study.rejected)} put aside"),
+        ("drops", f"{len(study.names)} used, {len(study.rejected)} discarded"),
         ("sensor", study.sensor),
         (
             "approach speed",
@@ -80,7 +80,7 @@ def measured_shots_content(study: MeasuredShotsStudy) -> Content:
     aside = tuple((item.name, item.reason) for item in study.rejected)
     tables = [Table(columns=("measured", ""), rows=tuple(facts))]
     if aside:
-        tables.append(Table(columns=("put aside", "why"), rows=aside))
+        tables.append(Table(columns=("discarded", "why"), rows=aside))
     return page_of(
         study,
         "Shots beside measured drops",
@@ -175,7 +175,7 @@ def _measured(study: MeasuredStrokeStudy) -> Section:
             (
                 f"{variant.variant}",
                 f"{variant.source}: {count(variant.count)} strokes used, "
-                f"{count(len(variant.rejected))} put aside",
+                f"{count(len(variant.rejected))} discarded",
             )
         )
         facts += [(f"{variant.variant}, note", note) for note in variant.notes]
@@ -191,7 +191,7 @@ def _rejected(study: MeasuredStrokeStudy) -> Section:
         for item in variant.rejected
     )
     tables = (Table(columns=("stroke", "why"), rows=rows),) if rows else ()
-    return Section(title="Strokes put aside", tables=tables)
+    return Section(title="Discarded strokes", tables=tables)
 
 
 # --------------------------------------------------------------------------- words

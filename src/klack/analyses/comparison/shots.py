@@ -134,7 +134,7 @@ def mean_of_highest(values: Floats, heights: Floats, count: int) -> float:
 def _first_impacts(
     drops: StrokeSet, section: CaseMeasurement
 ) -> tuple[tuple[str, ...], tuple[MeasuredImpact, ...], tuple[Rejection, ...]]:
-    """First impact of each drop; those without a rebound are put aside."""
+    """First impact of each drop; those without a rebound are discarded."""
     names, impacts, unread = [], [], []
     sensor = section.sensor
     if section.zero == "start":

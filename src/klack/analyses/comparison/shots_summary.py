@@ -31,7 +31,7 @@ def measured_shots_told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes
     title = f"{study.title}: beside {len(study.names)} measured drops"
     yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
     for item in study.rejected:
-        yield f"Put aside: {item.name}: {item.reason}"
+        yield f"Discarded: {item.name}: {item.reason}"
     yield from (drop_verdict(study), bias_sentence(study), drop_rule(study))
     yield Notes(study.notes)
 

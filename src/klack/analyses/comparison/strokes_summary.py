@@ -73,7 +73,7 @@ _KEYS = {
 def measured_strokes_told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
     """What a terminal shows: curves and impacts of each variant, and the verdicts."""
     for variant in study.variants.values():
-        aside = f", {len(variant.rejected)} put aside" if variant.rejected else ""
+        aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
         title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
         yield TextTable(title=title, columns=CURVE_COLUMNS, rows=curve_rows(variant))
         impacts = impact_rows(variant)
@@ -82,7 +82,7 @@ def measured_strokes_told(study: MeasuredStrokeStudy) -> Iterator[TextTable | No
             rows = highest_rows(variant)
             yield TextTable(title="Measured", columns=HIGHEST_COLUMNS, rows=rows, left=2)
         for item in variant.rejected:
-            yield f"Put aside: {item.name}: {item.reason}"
+            yield f"Discarded: {item.name}: {item.reason}"
         yield Notes(variant.notes)
     for variant in study.variants.values():
         yield verdict(study, variant)

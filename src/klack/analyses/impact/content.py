@@ -253,7 +253,7 @@ def _energy_table(study: ImpactStudy) -> Table:
             cells.append(text)
         rows.append((name, *cells))
     residual = [f"{result.energy_residual:.1e}".replace("-", "−") for result in results]
-    rows.append(("residual of the ledger", *residual))
+    rows.append(("residual of the energy balance", *residual))
     return Table(columns=("", *(result.label for result in results)), rows=tuple(rows))
 
 

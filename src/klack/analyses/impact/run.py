@@ -1,4 +1,4 @@
-"""``klack impact``: one dry impact at the levels asked for, laid over each other."""
+"""``klack impact``: one dry impact at the levels asked for, overlaid."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

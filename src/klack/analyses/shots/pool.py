@@ -44,7 +44,7 @@ def run_shots_on(
     except WorkerDied as error:
         raise ConvergenceError(
             f"shots: {error}; {len(log.done)} of {total} shots are finished.\n"
-            "Try: fewer --workers if the memory was full; the same command goes on from here."
+            "Try: fewer --workers if the memory was full; the same command resumes from here."
         ) from None
 
 

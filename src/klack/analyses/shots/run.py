@@ -57,7 +57,7 @@ def run_shots(
     workers : int, optional
         Processes; as many as there are cores without.
     folder : Path, optional
-        Where finished shots are kept until all are there: an interrupted run goes on from them.
+        Where finished shots are kept until all are there: an interrupted run resumes from them.
         See :class:`klack.analyses.unfinished.UnfinishedLog`.
     progress : callable
         Called with stage and fraction.

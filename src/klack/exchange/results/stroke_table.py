@@ -21,7 +21,7 @@ __all__ = ["stroke_table"]
 
 
 def stroke_table(study: StrokeStudy) -> ResultTable:
-    """All channels of all variants, the fine record of every end stop, impacts and energy books.
+    """All channels of all variants, the fine record of every end stop, impacts and energy balance.
 
     Parameters
     ----------
