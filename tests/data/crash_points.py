@@ -279,7 +279,7 @@ def warm() -> None:
     stored = ("impact", "stroke", "shots", "noise")
     for analysis in (*stored, "reduction", "calibration"):
         modules += [f"klack.analyses.{analysis}.run"]
-    modules += [f"klack.analyses.{analysis}.store" for analysis in stored]
+    modules += [f"klack.analyses.{analysis}.analysis" for analysis in stored]
     for name in modules:
         importlib.import_module(name)
 
