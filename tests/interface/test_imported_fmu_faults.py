@@ -3,6 +3,7 @@
 Truth: what the FMU was compiled to do, and the processes that the system knows afterwards.
 """
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -63,7 +64,8 @@ def children() -> set[int]:
     """Processes of this one that live, and those that nobody buried."""
     found = set()
     for task in Path("/proc/self/task").iterdir():
-        found |= set(map(int, (task / "children").read_text().split()))
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended
+            found |= set(map(int, (task / "children").read_text().split()))
     return found
 
 

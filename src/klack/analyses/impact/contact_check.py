@@ -125,7 +125,8 @@ def check_contact(
         doubts.append("its elements are too coarse")
         _warn(_coarse(case, pair, static, force, ratio, expected))
     if across < FEWEST_POINTS:
-        doubts.append(f"{across} contact points across are too few")
+        few = "1 contact point across is" if across == 1 else f"{across} contact points across are"
+        doubts.append(f"{few} too few")
     if _tell_ends(edges, space.points, space.size, lam, surfaces):
         doubts.append(_OVER_THE_END)
     return ContactCheck(
