@@ -85,6 +85,12 @@ def test_five_lines_of_python():
     assert float(time) == pytest.approx(float(written[2]), rel=5e-3)
 
 
+def test_the_page_of_measures_is_fresh():
+    stored = (DOCS / "reference" / "measures.md").read_text(encoding="utf-8")
+
+    assert load("measures_page").page() == stored, "run: python docs/measures_page.py"
+
+
 def test_the_page_of_results_is_fresh():
     stored = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
 

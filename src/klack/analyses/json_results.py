@@ -13,11 +13,12 @@ from pydantic import Field, TypeAdapter
 from typing_extensions import TypedDict
 
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
-from klack.analyses.measures import json_type
+from klack.analyses.measures import Measure, described, json_type
 from klack.analyses.shots.measures import SHOT_MEASURES
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 
 __all__ = [
+    "MEASURES",
     "AdviceJson",
     "CacheJson",
     "CalculixJson",
@@ -33,6 +34,7 @@ __all__ = [
     "StrokeJson",
     "StrokesJson",
     "VerificationJson",
+    "measures_catalogue",
     "result_schema",
 ]
 
@@ -594,10 +596,29 @@ _RESULTS = (
 )
 
 
+MEASURES: dict[str, tuple[Measure[Any], ...]] = {
+    "impact level": LEVEL_MEASURES,
+    "difference of two levels": DEVIATION_MEASURES,
+    "stroke variant": VARIANT_MEASURES,
+    "impact of a stroke": EVENT_MEASURES,
+    "shot": SHOT_MEASURES,
+}
+"""The catalogue of measures, by what they are of."""
+
+
+def measures_catalogue() -> dict[str, Any]:
+    """What every measure is: key, name, symbol, unit, definition and source, versioned."""
+    return {
+        "schema": "klack-measures/1",
+        **{of: described(measures) for of, measures in MEASURES.items()},
+    }
+
+
 def result_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of what every command writes with ``--json``.
 
-    The key ``schema`` of a result tells which of the choices it is.
+    The key ``schema`` of a result tells which of the choices it is.  ``x-measures`` is the
+    catalogue of measures.
     """
     inputs: list[tuple[int, Any, TypeAdapter[Any]]] = [
         (index, "serialization", TypeAdapter(kind)) for index, kind in enumerate(_RESULTS)
@@ -608,4 +629,5 @@ def result_schema() -> dict[str, Any]:
         "title": "Results of klack",
         "oneOf": [references[index, "serialization"] for index in range(len(_RESULTS))],
         "$defs": definitions["$defs"],
+        "x-measures": measures_catalogue(),
     }

@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
 
-__all__ = ["Column", "Measure", "glossary", "json_of", "json_type"]
+__all__ = ["Column", "Measure", "described", "glossary", "json_of", "json_type"]
 
 Of = TypeVar("Of", contravariant=True)
 
@@ -205,6 +205,21 @@ def json_type(
     found: Any = TypedDict(name, {**keys, **(more or {})})  # type: ignore[misc]
     found.__doc__ = words
     return found
+
+
+def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
+    """What each measure is, in plain words, for schema and reference."""
+    return [
+        {
+            "key": item.json_key,
+            "name": item.name,
+            "symbol": item.symbol,
+            "unit": item.unit,
+            "definition": item.definition,
+            "source": item.source,
+        }
+        for item in measures
+    ]
 
 
 def glossary(measures: Iterable[Measure[Any]]) -> tuple[tuple[str, str], ...]:
