@@ -17,6 +17,7 @@ from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigvalsh_tridiagonal
 
 from klack.errors import InputError
 
@@ -34,6 +35,8 @@ Precision = Literal["double", "single"]
 
 _LARGEST_CONDITION = 1e14
 _LARGEST_RESIDUAL = {"double": 1e-10, "single": 1e-4}
+_DEFINITE_STEPS = 16
+_ROUNDING = 1e-11
 
 
 class Factorization(Protocol):
@@ -138,6 +141,8 @@ def factorize(
     factor = _load(name)(A, threads, "single") if single else _load(name)(A, threads)
     try:
         _check_condition(A, factor, _LARGEST_RESIDUAL["single" if single else "double"])
+        if name != "pardiso":  # which notices a negative pivot itself
+            _check_definite(factor)
     except BaseException:
         factor.close()
         raise
@@ -204,3 +209,30 @@ def _check_condition(A: Any, factor: Factorization, largest_residual: float) -> 
     residual = np.linalg.norm(A @ x - b) / (scale * np.linalg.norm(x))
     if not residual < largest_residual:
         raise not_positive_definite(f"solutions leave a residual of {residual:.1e}")
+
+
+def _check_definite(factor: Factorization) -> None:
+    """Lanczos steps with the inverse: a factor of any sign solves an indefinite matrix as well.
+
+    Eigenvalues of the tridiagonal matrix lie within those of the inverse (Parlett 1998, chapter
+    10), so that a negative one is proof.  One that is far from zero among many may stay unseen.
+    """
+    rng = np.random.default_rng(2)
+    size = min(_DEFINITE_STEPS, factor.size)
+    basis = np.zeros((size, factor.size))
+    diagonal, beside = np.zeros(size), np.zeros(max(size - 1, 0))
+    v = rng.standard_normal(factor.size)
+    for k in range(size):
+        basis[k] = v / np.linalg.norm(v)
+        v = factor.solve(basis[k])
+        diagonal[k] = basis[k] @ v
+        for _ in range(2):  # twice is enough (Kahan and Parlett)
+            v = v - basis[: k + 1].T @ (basis[: k + 1] @ v)
+        if k < size - 1:
+            beside[k] = np.linalg.norm(v)
+            if not beside[k] > _ROUNDING * abs(diagonal[: k + 1]).max():
+                diagonal, beside = diagonal[: k + 1], beside[:k]
+                break
+    values = eigvalsh_tridiagonal(diagonal, beside)
+    if values[0] < -_ROUNDING * abs(values).max():
+        raise not_positive_definite("it has a negative eigenvalue")
