@@ -9,13 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 from klack.analyses.analysis import Analysis
 from klack.analyses.catalogue import analysis_in
-from klack.analyses.measures import Measure
+from klack.analyses.measures import Measure, json_of
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
 from klack.case.inserting import with_values
 from klack.case.key_path import kind_at, node_at, quantity_at, split_path
@@ -185,10 +184,13 @@ class Result:
     @cached_property
     def measures(self) -> Mapping[str, Mapping[str, Number]]:
         """Named numbers, by level, variant, impact, shot or design, then by key."""
-        return {
-            name: {item.key: Number(_known(item, of), item.unit, item) for item in measures}
-            for name, of, measures in self.analysis.measured(self.record)
-        }
+        found: dict[str, dict[str, Number]] = {}
+        for name, of, measures in self.analysis.measured(self.record):
+            values = json_of(measures, of)
+            found[name] = {
+                item.key: Number(values[item.json_key], item.unit, item) for item in measures
+            }
+        return found
 
     @property
     def json(self) -> dict[str, Any]:
@@ -261,11 +263,6 @@ class Result:
             + (f"<ul>{warnings}</ul>" if warnings else "")
             + f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{figure}"
         )
-
-
-def _known(measure: Measure[Any], of: Any) -> float | int | bool | None:
-    value = measure.read(of) if measure.given(of) else None
-    return value if value is not None and isfinite(value) else None
 
 
 def _short(numbers: Mapping[str, Number]) -> str:

@@ -1,9 +1,9 @@
 """How a contact is meshed, and what makes its numbers doubtful: of an impact or of an end stop."""
 
-from math import isfinite
 from typing import Protocol
 
 from klack.analyses.json_results import ContactJson
+from klack.analyses.measures import number_or_none
 
 __all__ = ["MeshedContact", "contact_doubt", "contact_to_json"]
 
@@ -36,8 +36,8 @@ def contact_to_json(contact: MeshedContact) -> ContactJson:
     """Mesh of a contact in plain numbers, SI, the unit in the key."""
     return {
         "surfaces": contact.surfaces,
-        "half_width_m": contact.half_width if isfinite(contact.half_width) else None,
-        "size_over_half_width": contact.size_ratio if isfinite(contact.size_ratio) else None,
+        "half_width_m": number_or_none(contact.half_width),
+        "size_over_half_width": number_or_none(contact.size_ratio),
         "points_across": contact.points_across or None,
         "doubts": list(contact.doubts),
     }

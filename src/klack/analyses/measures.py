@@ -14,7 +14,15 @@ from typing_extensions import TypedDict
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
 
-__all__ = ["Column", "Measure", "described", "glossary", "json_of", "json_type"]
+__all__ = [
+    "Column",
+    "Measure",
+    "described",
+    "glossary",
+    "json_of",
+    "json_type",
+    "number_or_none",
+]
 
 Of = TypeVar("Of", contravariant=True)
 
@@ -186,6 +194,11 @@ def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
         measure.json_key: _plain(measure.read(of), measure.kind) if measure.given(of) else None
         for measure in measures
     }
+
+
+def number_or_none(value: float) -> float | None:
+    """A number as JSON takes it, which knows no nan and no infinity."""
+    return float(value) if isfinite(value) else None
 
 
 def _plain(value: Value, kind: str) -> Value:

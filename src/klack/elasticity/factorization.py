@@ -215,7 +215,8 @@ def _check_definite(factor: Factorization) -> None:
     """Lanczos steps with the inverse: a factor of any sign solves an indefinite matrix as well.
 
     Eigenvalues of the tridiagonal matrix lie within those of the inverse (Parlett 1998, chapter
-    10), so that a negative one is proof.  One that is far from zero among many may stay unseen.
+    10), so that a negative one is proof.  One that is far from zero among many may stay unseen.  So
+    many steps and no more: ARPACK would look for the end of the cluster at zero of a sound matrix.
     """
     rng = np.random.default_rng(2)
     size = min(_DEFINITE_STEPS, factor.size)

@@ -6,6 +6,7 @@ from math import isfinite
 from klack.analyses.analysis import TextTable
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy
 from klack.analyses.json_results import CalibratedJson, CalibrationJson
+from klack.analyses.measures import number_or_none
 from klack.units import format_si
 
 __all__ = ["PARAMETER_COLUMNS", "calibration_to_json", "calibration_told", "parameter_rows"]
@@ -29,16 +30,16 @@ def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
     for item in study.parameters:
         numbers: CalibratedJson = {
             "value": item.value,
-            "standard_error": _number(item.standard_error),
+            "standard_error": number_or_none(item.standard_error),
             "unit": item.unit,
-            "lower_95": _number(item.lower_95),
-            "upper_95": _number(item.upper_95),
+            "lower_95": number_or_none(item.lower_95),
+            "upper_95": number_or_none(item.upper_95),
             "start": item.start,
-            "scatter": _number(item.scatter),
+            "scatter": number_or_none(item.scatter),
         }
         if item.name in profiles:
-            numbers["profile_lower_95"] = _number(profiles[item.name].lower)
-            numbers["profile_upper_95"] = _number(profiles[item.name].upper)
+            numbers["profile_lower_95"] = number_or_none(profiles[item.name].lower)
+            numbers["profile_upper_95"] = number_or_none(profiles[item.name].upper)
         parameters[item.name] = numbers
     return {
         "schema": "klack-calibrate/1",
@@ -50,12 +51,12 @@ def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
         "parameters": parameters,
         "residual_rms_um": 1e6 * study.residual_rms,
         "residual_rms_before_um": 1e6 * study.residual_rms_before,
-        "misfit": _number(study.misfit),
+        "misfit": number_or_none(study.misfit),
         "evaluations": study.evaluations,
         "resumed": study.resumed,
         "wall_time_s": study.wall_time,
         "profile_time_s": study.profile_time,
-        "correlation": [[_number(x) for x in row] for row in study.correlation.tolist()],
+        "correlation": [[number_or_none(x) for x in row] for row in study.correlation.tolist()],
         "converged": study.converged,
         "warnings": list(study.warnings),
     }
@@ -89,8 +90,3 @@ def _row(item: CalibratedParameter) -> tuple[str, ...]:
         text(item.start, 4),
         f"{text(item.lower, 3)} to {text(item.upper, 3)}",
     )
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if isfinite(value) else None

@@ -6,6 +6,7 @@ from math import isfinite
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.json_results import CalculixJson, ProgramJson
+from klack.analyses.measures import number_or_none
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
@@ -235,13 +236,13 @@ def comparison_to_json(comparison: Comparison) -> CalculixJson:
             "energy_swing": other.energy_swing,
         },
         "deviation": {
-            "peak_force": _finite(d.peak_force),
-            "contact_time": _finite(d.contact_time),
-            "impulse": _finite(d.impulse),
-            "restitution": _finite(d.restitution),
-            "history_l2": _finite(d.history_l2),
-            "third_octave_max_dB": _finite(d.third_octave_max_dB),
-            "third_octave_up_to_Hz": _finite(d.third_octave_up_to_Hz),
+            "peak_force": number_or_none(d.peak_force),
+            "contact_time": number_or_none(d.contact_time),
+            "impulse": number_or_none(d.impulse),
+            "restitution": number_or_none(d.restitution),
+            "history_l2": number_or_none(d.history_l2),
+            "third_octave_max_dB": number_or_none(d.third_octave_max_dB),
+            "third_octave_up_to_Hz": number_or_none(d.third_octave_up_to_Hz),
         },
         "wall_time_ratio": comparison.wall_time_ratio,
     }
@@ -251,16 +252,12 @@ def _numbers(
     measures: ImpactMeasures, history: ImpactHistory, steps: int, wall_time: float | None
 ) -> ProgramJson:
     return {
-        "peak_force_N": _finite(measures.peak_force),
-        "contact_time_s": _finite(measures.contact_time),
-        "impulse_Ns": _finite(measures.impulse),
-        "restitution": _finite(measures.restitution),
+        "peak_force_N": number_or_none(measures.peak_force),
+        "contact_time_s": number_or_none(measures.contact_time),
+        "impulse_Ns": number_or_none(measures.impulse),
+        "restitution": number_or_none(measures.restitution),
         "energy_balance": energy_balance(history.ledger),
         "steps": steps,
         "step_s": history.step,
         "wall_time_s": wall_time,
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if abs(value) < float("inf") else None

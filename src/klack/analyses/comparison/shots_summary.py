@@ -9,6 +9,7 @@ import numpy as np
 from klack.analyses.analysis import Notes, TextTable
 from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
 from klack.analyses.json_results import DropsJson
+from klack.analyses.measures import number_or_none
 from klack.units import format_si
 
 __all__ = [
@@ -103,9 +104,9 @@ def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
         "klack": study.version,
         "drops": len(study.names),
         "rejected": [{"name": item.name, "reason": item.reason} for item in study.rejected],
-        "approach_speed_m_s": _number(study.approach_speed.computed),
-        "approach_speed_measured_m_s": _number(study.approach_speed.measured),
-        "approach_speed_scatter_m_s": _number(study.approach_speed.scatter),
+        "approach_speed_m_s": number_or_none(study.approach_speed.computed),
+        "approach_speed_measured_m_s": number_or_none(study.approach_speed.measured),
+        "approach_speed_scatter_m_s": number_or_none(study.approach_speed.scatter),
         "distribution": {_KEYS.get(d.name, d.name): _distribution(d) for d in study.distributions},
         "verdict": drop_verdict(study),
         "bias": bias_sentence(study),
@@ -115,26 +116,26 @@ def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
 
 def _distribution(d: MeasuredDistribution) -> dict[str, Any]:
     return {
-        "computed": _moments(d.computed) | {"highest": _number(d.computed_highest)},
-        "measured": _moments(d.measured) | {"highest": _number(d.measured_highest)},
-        "reading_error": _number(d.error),
-        "centred": _number(d.centred),
-        "expected_highest": _number(d.expected_highest),
-        "highest_bias": _number(d.highest_bias),
-        "statistic": _number(d.statistic),
-        "significance": _number(d.significance),
+        "computed": _moments(d.computed) | {"highest": number_or_none(d.computed_highest)},
+        "measured": _moments(d.measured) | {"highest": number_or_none(d.measured_highest)},
+        "reading_error": number_or_none(d.error),
+        "centred": number_or_none(d.centred),
+        "expected_highest": number_or_none(d.expected_highest),
+        "highest_bias": number_or_none(d.highest_bias),
+        "statistic": number_or_none(d.statistic),
+        "significance": number_or_none(d.significance),
     }
 
 
 def _moments(values: np.ndarray) -> dict[str, float | None]:
     known = values[np.isfinite(values)]
     quantiles = {
-        f"quantile_{q:g}": _number(float(np.quantile(known, q))) for q in (0.05, 0.5, 0.95)
+        f"quantile_{q:g}": number_or_none(float(np.quantile(known, q))) for q in (0.05, 0.5, 0.95)
     }
     return {
         "count": int(known.size),
-        "mean": _number(float(np.mean(known))),
-        "standard_deviation": _number(float(np.std(known))),
+        "mean": number_or_none(float(np.mean(known))),
+        "standard_deviation": number_or_none(float(np.std(known))),
         **quantiles,
     }
 
@@ -145,8 +146,3 @@ def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) 
         return "–"
     plus = "+" if sign and value > 0.0 else ""
     return plus + (format_si(value, unit, 3) if unit else f"{value:.4f}")
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if isfinite(value) else None

@@ -16,6 +16,7 @@ from klack.analyses.comparison.strokes_record import (
     stop_words,
 )
 from klack.analyses.json_results import ComparedVariantJson, HighestStrokeJson, StrokesJson
+from klack.analyses.measures import number_or_none
 
 __all__ = [
     "CURVE_COLUMNS",
@@ -224,11 +225,11 @@ def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> ComparedVa
         "verdict": verdict(study, variant),
         "strokes": variant.count,
         "rejected": [{"name": item.name, "reason": item.reason} for item in variant.rejected],
-        "lift_rms_m": _number(variant.lift_rms),
-        "lift_rms_scatter_m": _number(variant.lift_scatter),
-        "velocity_rms_m_s": _number(variant.velocity_rms),
-        "velocity_rms_scatter_m_s": _number(variant.velocity_scatter),
-        "velocity_bandwidth_Hz": _number(variant.velocity_bandwidth),
+        "lift_rms_m": number_or_none(variant.lift_rms),
+        "lift_rms_scatter_m": number_or_none(variant.lift_scatter),
+        "velocity_rms_m_s": number_or_none(variant.velocity_rms),
+        "velocity_rms_scatter_m_s": number_or_none(variant.velocity_scatter),
+        "velocity_bandwidth_Hz": number_or_none(variant.velocity_bandwidth),
         **_compared(variant.way, "lift{}_m"),
         "impacts": [_impact(impact) for impact in variant.impacts],
         "highest_rebound": [_highest(shot) for shot in variant.highest],
@@ -241,13 +242,13 @@ def _highest(shot: HighestShot) -> HighestStrokeJson:
         "stop": shot.stop,
         "stroke": shot.stroke,
         "strokes": shot.count,
-        "rebound_height_m": _number(shot.rebound_height),
-        "rebound_height_error_m": _number(shot.rebound_height_error),
-        "restitution": _number(shot.restitution),
-        "restitution_error": _number(shot.restitution_error),
-        "too_high_by_reading_m": _number(shot.by_reading),
-        "above_median_m": _number(shot.above_median),
-        "bounces": _number(shot.bounces),
+        "rebound_height_m": number_or_none(shot.rebound_height),
+        "rebound_height_error_m": number_or_none(shot.rebound_height_error),
+        "restitution": number_or_none(shot.restitution),
+        "restitution_error": number_or_none(shot.restitution_error),
+        "too_high_by_reading_m": number_or_none(shot.by_reading),
+        "above_median_m": number_or_none(shot.above_median),
+        "bounces": number_or_none(shot.bounces),
     }
 
 
@@ -260,15 +261,10 @@ def _impact(impact: ComparedImpact) -> dict[str, Any]:
 
 def _compared(number: Compared, key: str) -> dict[str, float | None]:
     return {
-        key.format(""): _number(number.computed),
-        key.format("_measured"): _number(number.measured),
-        key.format("_scatter"): _number(number.scatter),
-        key.format("_reading_error"): _number(number.error),
-        key.format("_difference"): _number(number.difference),
-        key.split("{}")[0] + "_difference_in_scatter": _number(number.in_scatter),
+        key.format(""): number_or_none(number.computed),
+        key.format("_measured"): number_or_none(number.measured),
+        key.format("_scatter"): number_or_none(number.scatter),
+        key.format("_reading_error"): number_or_none(number.error),
+        key.format("_difference"): number_or_none(number.difference),
+        key.split("{}")[0] + "_difference_in_scatter": number_or_none(number.in_scatter),
     }
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if isfinite(value) else None

@@ -14,6 +14,7 @@ from klack.analyses.json_results import (
     DesignNoiseJson,
     NoiseJson,
 )
+from klack.analyses.measures import number_or_none
 from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
 
 __all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json", "noise_told"]
@@ -153,19 +154,19 @@ def _design(design: NoiseDesign) -> DesignNoiseJson:
         "run": design.run,
         "own_components": dict(design.own_components),
         "third_octave": _bands(bands, design.band_energy),
-        "injected_energy_J": _finite(design.injected_energy),
-        "support_energy_J": _finite(design.support_energy),
-        "radiated_energy_J": _finite(design.radiated_energy),
-        "radiated_energy_upper_bound_J": _finite(design.upper_bound),
-        "valid_from_Hz": _finite(design.valid_from),
-        "balanced_below_Hz": _finite(design.balanced_below),
-        "valid_up_to_Hz": _finite(design.valid_up_to),
+        "injected_energy_J": number_or_none(design.injected_energy),
+        "support_energy_J": number_or_none(design.support_energy),
+        "radiated_energy_J": number_or_none(design.radiated_energy),
+        "radiated_energy_upper_bound_J": number_or_none(design.upper_bound),
+        "valid_from_Hz": number_or_none(design.valid_from),
+        "balanced_below_Hz": number_or_none(design.balanced_below),
+        "valid_up_to_Hz": number_or_none(design.valid_up_to),
         **_sound(design.sound),
         "stops": {
             stop.stop: {
                 "impacts": stop.impacts,
-                "peak_force_N": _finite(stop.peak_force),
-                "impulse_Ns": _finite(stop.impulse),
+                "peak_force_N": number_or_none(stop.peak_force),
+                "impulse_Ns": number_or_none(stop.impulse),
                 "third_octave": _bands(stop.bands, stop.bands.energy),
             }
             for stop in design.stops
@@ -188,11 +189,11 @@ def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[Ba
 def _body(body: BodyNoise) -> BodyNoiseJson:
     radiated = body.radiated.sum(axis=1)
     return {
-        "highest_mode_Hz": _finite(body.highest_frequency),
-        "injected_energy_J": dict(zip(body.ports, map(_finite, body.injected), strict=True)),
-        "vibration_energy_J": _finite(body.vibration_energy),
-        "vibration_energy_by_mobility_J": _finite(body.vibration_spectral),
-        "radiated_energy_J": dict(zip(body.groups, map(_finite, radiated), strict=True)),
+        "highest_mode_Hz": number_or_none(body.highest_frequency),
+        "injected_energy_J": dict(zip(body.ports, map(number_or_none, body.injected), strict=True)),
+        "vibration_energy_J": number_or_none(body.vibration_energy),
+        "vibration_energy_by_mobility_J": number_or_none(body.vibration_spectral),
+        "radiated_energy_J": dict(zip(body.groups, map(number_or_none, radiated), strict=True)),
     }
 
 
@@ -211,7 +212,7 @@ def _sound(sound: ClickSound | None) -> ClickJson:
         one.peak_level,
         pattern.equivalent_level_A,
     )
-    numbers = {key: _finite(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
+    numbers = {key: number_or_none(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
     return cast(ClickJson, numbers)
 
 
@@ -226,8 +227,3 @@ _SOUND_KEYS = (
     "peak_level_dB",
     "pattern_level_dBA",
 )
-
-
-def _finite(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if abs(value) < float("inf") else None

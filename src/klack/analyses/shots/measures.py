@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from klack.analyses.measures import Measure
 
-__all__ = ["DRAWN", "FIRST_IMPACT", "ROCKING", "SHOT_MEASURES", "Shot", "measure_of"]
+__all__ = ["DRAWN", "FIRST_IMPACT", "ROCKING", "SHOT_MEASURES", "Shot"]
 
 Shot = Mapping[str, float]
 """Numbers of one shot by the name of their column; see :class:`ShotColumns`."""
@@ -206,8 +206,3 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = (
     ),
 )
 """All columns of a shot, in their order."""
-
-
-def measure_of(column: str) -> Measure[Shot]:
-    """Measure of one column."""
-    return next(measure for measure in SHOT_MEASURES if measure.key == column)

@@ -8,7 +8,7 @@ import numpy as np
 
 from klack.analyses.analysis import Measured, TextTable
 from klack.analyses.json_results import ShotsJson
-from klack.analyses.measures import json_of
+from klack.analyses.measures import json_of, number_or_none
 from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
 from klack.units import format_si
@@ -63,15 +63,15 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         },
         "rule": {
             "holds": rule.holds,
-            "restitution_bias": _number(rule.restitution_bias),
-            "rebound_height_bias": _number(rule.rebound_height_bias),
-            "relative_restitution_bias": _number(rule.relative_restitution_bias),
-            "relative_rebound_height_bias": _number(rule.relative_rebound_height_bias),
+            "restitution_bias": number_or_none(rule.restitution_bias),
+            "rebound_height_bias": number_or_none(rule.rebound_height_bias),
+            "relative_restitution_bias": number_or_none(rule.relative_restitution_bias),
+            "relative_rebound_height_bias": number_or_none(rule.relative_rebound_height_bias),
             "shots_at_least_as_high_as_centric": rule.rank,
             "sentence": rule.sentence,
         },
-        "wall_time_s": _number(study.wall_time),
-        "shot_time_s": _number(study.shot_time),
+        "wall_time_s": number_or_none(study.wall_time),
+        "shot_time_s": number_or_none(study.shot_time),
         "workers": study.workers,
         "resumed": study.resumed,
     }
@@ -122,11 +122,6 @@ def _distribution(values: np.ndarray) -> dict[str, float | None]:
         "standard_deviation": float(np.std(known)),
         **quantiles,
     }
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if isfinite(value) else None
 
 
 def _text(value: float, unit: str) -> str:

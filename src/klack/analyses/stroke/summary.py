@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from math import isfinite
 from typing import Any, cast
 
 from klack.analyses.analysis import Measured, TextTable
@@ -14,7 +13,7 @@ from klack.analyses.json_results import (
     TimesJson,
     VariantJson,
 )
-from klack.analyses.measures import json_of
+from klack.analyses.measures import json_of, number_or_none
 from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
@@ -189,7 +188,7 @@ def _numbers(variant: StrokeVariant) -> VariantJson:
     found: Any = {
         "label": variant.label,
         "failure": result.failure or None,
-        "fine_record_ends_s": {stop: _number(t) for stop, t in cut_records(result).items()},
+        "fine_record_ends_s": {stop: number_or_none(t) for stop, t in cut_records(result).items()},
         "events": [
             {"stop": event.stop, **json_of(EVENT_MEASURES, event)} for event in result.events
         ],
@@ -234,11 +233,6 @@ def _passage(passage: Passage) -> PassageJson:
         "stop": passage.stop or None,
         "touch_s": passage.touch,
     }
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if isfinite(value) else None
 
 
 def _lift(times: LiftTimes) -> str:
