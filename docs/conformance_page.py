@@ -28,16 +28,15 @@ Made by `docs/conformance_page.py` from a run of `klack verify`; do not edit. {s
 
 {conditions}
 
-Each check compares one number that klack computes with one that is known: from a closed formula, a
-published table, a standard, or another program. *Deviation* is computed less expected, relative to
-the expected number; where that is zero, or where a unit stands behind it, it is absolute. It is
-rounded to one digit, and what is mere round-off to a bound. *Headroom* is the tolerance over the
-deviation: how many times larger the error could become unnoticed; above {largest:g} a reason stands
-behind the source.
+Each check compares one number that klack computes with a known one: from a closed formula, a
+published table, a standard, or another program. *Deviation* is computed minus expected, relative to
+the expected number; where that is zero, or where a unit is given, it is absolute. It is rounded to
+one digit, and mere round-off to a bound. *Headroom* is the tolerance over the deviation: the factor
+by which the error could grow unnoticed; above {largest:g} a reason is given with the source.
 
 `klack verify --html FILE` writes the same as a page that can be searched and sorted, with the
 curves; `klack verify --group NAME` runs one group. Checks of programs that are not installed
-(CalculiX, fmpy, a C compiler, a second direct solver) are passed over.
+(CalculiX, fmpy, a C compiler, a second direct solver) are skipped.
 
 """
 _MANY = f"> {LARGEST_HEADROOM:g}"

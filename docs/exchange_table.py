@@ -15,7 +15,7 @@ START, END = "<!-- table -->\n", "<!-- end of table -->"
 
 def table(checks: Iterable[Check]) -> str:
     """Markdown table of what was compared, how far off it is, and what is allowed."""
-    rows = ["| what goes out and comes back | deviation | allowed |", "|---|---|---|"]
+    rows = ["| round trip | deviation | allowed |", "|---|---|---|"]
     rows += [
         f"| {check.name} | {abs(check.deviation):.0e} | {check.tolerance:.0e} |" for check in checks
     ]

@@ -19,13 +19,13 @@ _HEAD = """\
 
 <!-- written by docs/json_page.py -->
 
-Every command knows `--json FILE`: plain numbers in SI, the unit in the key (`peak_force_N`); what
-does not exist (nan, infinite) is `null`. `--json -` writes to the terminal; the tables go to the
-other output then, so that `klack impact CASE --json - | jq .levels.reduced` works.
+Every command has `--json FILE`: plain numbers in SI, with the unit in the key (`peak_force_N`); a
+value that does not exist (nan, infinite) is `null`. `--json -` writes to the terminal and sends the
+tables to the error output, so that `klack impact CASE --json - | jq .levels.reduced` works.
 
-The key `schema` names command and version: `klack-impact/1`. The number goes up when a key goes or
-changes its meaning. New keys may come at any time and leave it as it is: a reader takes what it
-knows. The whole as a JSON schema (draft 2020-12), to check files or to generate readers from:
+The key `schema` names command and version: `klack-impact/1`. The version increases when a key is
+removed or changes its meaning. New keys may be added without a new version: readers should ignore
+unknown keys. The JSON schema (draft 2020-12), for checking files or generating readers:
 
 ```
 klack schema --kind result --json klack-results.schema.json
