@@ -39,7 +39,7 @@ def judge(run: str, residual: float, least_loss: float, *, limit: float, advice:
         where = os.environ.get("PYTEST_CURRENT_TEST", "a worker process")
         raise AssertionError(
             f"{where}: a run of {run} leaves an energy residual of {residual:.3e} and has a least "
-            f"loss of {least_loss:.3e}; {allowed:.0e} of the energy turned over is allowed"
+            f"loss of {least_loss:.3e}; {allowed:.0e} of the energy throughput is allowed"
         )
 
 

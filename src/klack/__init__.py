@@ -49,7 +49,7 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    """Load what a notebook imports, with the libraries below it, when it is asked for."""
+    """Load the names for notebooks, with their libraries, on first use."""
     if name not in __all__:
         raise AttributeError(f"module 'klack' has no attribute {name!r}")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""What a notebook imports: cases, runs and results, as :mod:`klack` hands them on.
+"""Interface for notebooks: cases, runs and results, exported by :mod:`klack`.
 
 Every function takes a case as text names it (a file, a shipped case) or as :func:`load_case`
 returned it, and returns a :class:`Result`.
@@ -67,7 +67,7 @@ class CaseOnHand:
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the case."""
         return self.checked.title
 
     @property
@@ -76,7 +76,7 @@ class CaseOnHand:
         return self.tree.text
 
     def value(self, key: str) -> Any:
-        """What stands at a key, in SI where it is a quantity; None where nothing does.
+        """Value at a key, in SI where it is a quantity; None if there is none.
 
         Raises
         ------
@@ -113,8 +113,8 @@ class CaseOnHand:
             raise InputError(
                 f"with_value('{key}')",
                 got=f"a {type(value).__name__}",
-                expected="one value, as the case file would have it",
-                hint='give a text such as "14 N", or a number; entries of a list one by one.',
+                expected="one value, as in the case file",
+                hint='give a text such as "14 N", or a number; set entries of a list one by one.',
             )
         if kind_at(node, field) is not None and isinstance(node, float):
             quantity_at(self.checked, place).parse(value)
@@ -168,7 +168,7 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What an analysis leaves behind.
+    """Result of an analysis.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class Result:
 
     @property
     def json(self) -> dict[str, Any]:
-        """What ``--json`` of the command writes."""
+        """Output of ``--json`` of the command."""
         return dict(self.analysis.to_json(self.record))
 
     def save(self, folder: str | Path, *, report: bool = False) -> Path:
@@ -370,7 +370,7 @@ def run_shots(
 
 
 def noise_of(*results: Result, names: Sequence[str] = (), progress: Progress = silent) -> Result:
-    """Estimate what is heard of impacts and strokes, side by side.
+    """Estimate the sound of impacts and strokes, side by side.
 
     Parameters
     ----------
@@ -431,7 +431,7 @@ def compare(
     case: Given | None = None,
     progress: Progress = silent,
 ) -> Result:
-    """Lay a stroke or shots beside a measurement, as ``klack compare --measurement`` does.
+    """Compare a stroke or shots with a measurement, like ``klack compare --measurement``.
 
     Parameters
     ----------

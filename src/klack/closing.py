@@ -1,4 +1,4 @@
-"""Holders of memory, files, locks or processes that let go of them after a ``with`` block."""
+"""Objects that release memory, files, locks or processes after a ``with`` block."""
 
 from abc import ABC, abstractmethod
 from types import TracebackType
@@ -12,7 +12,7 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of what is held."""
+        """Release the resources."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,4 +1,4 @@
-"""Processor cores that this process may use."""
+"""Processor cores available to this process."""
 
 import os
 
@@ -6,7 +6,7 @@ __all__ = ["available_cores"]
 
 
 def available_cores() -> int:
-    """Cores that the scheduler lets this process have; all of the machine where it does not say.
+    """Cores that the scheduler allows this process; all of the machine if unknown.
 
     Fewer than the machine has inside of a container or batch job that is bound to some of them.
     """

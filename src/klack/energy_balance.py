@@ -1,4 +1,4 @@
-"""Judge the energy balance of a finished run: what does not close is told, not hidden."""
+"""Check of the energy balance of a finished run."""
 
 import warnings
 from math import isfinite
@@ -11,7 +11,7 @@ __all__ = ["check_energy_balance"]
 def check_energy_balance(
     run: str, residual: float, least_loss: float, *, limit: float, advice: str
 ) -> None:
-    """Warn when energy appeared from nowhere, went nowhere, or a loss gave energy back.
+    """Warn when the energy balance does not close, or a loss is negative.
 
     Every solver calls it once at the end of each run.
 
@@ -20,7 +20,7 @@ def check_energy_balance(
     run : str
         What was run, start of the text.
     residual : float [-]
-        Energy that the books do not explain, over the energy turned over.
+        Residual of the energy balance, over the energy throughput.
     least_loss : float [-]
         Smallest entry of the losses, over the energy turned over; below zero it is a source.
     limit : float [-]
@@ -49,13 +49,13 @@ def check_energy_balance(
         )
     faults = []
     if abs(residual) > limit:
-        faults.append(f"does not close by {abs(residual):.1e} of the energy turned over")
+        faults.append(f"does not close by {abs(residual):.1e} of the energy throughput")
     if least_loss < -limit:
-        faults.append(f"has a loss that gave back {abs(least_loss):.1e} of it")
+        faults.append(f"has a loss that returned {abs(least_loss):.1e} of it")
     if faults:
         warnings.warn(
-            f"{run}: the energy balance {' and '.join(faults)}, more than the {limit:.0e} that "
-            f"this solver keeps. Try: {advice}.",
+            f"{run}: the energy balance {' and '.join(faults)}, more than the {limit:.0e} to "
+            f"which this solver keeps it. Try: {advice}.",
             AccuracyWarning,
             stacklevel=3,
         )

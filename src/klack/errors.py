@@ -1,4 +1,4 @@
-"""The kinds of trouble a user can meet, each with a text that says what to do."""
+"""Errors and warnings for users, each with advice."""
 
 __all__ = [
     "AccuracyWarning",
@@ -45,11 +45,11 @@ def _shortened(text: str) -> str:
 
 
 class ConvergenceError(KlackError, RuntimeError):
-    """An iteration did not settle; the text names it, its state and a way out."""
+    """An iteration did not converge; the text names it, its state and a remedy."""
 
 
 class AccuracyWarning(UserWarning):
-    """A result is less accurate than it could be; the text says why and what to refine."""
+    """A result is less accurate than possible; the text gives the reason and what to refine."""
 
 
 class CacheWarning(UserWarning):

@@ -1,4 +1,4 @@
-"""Numbers that are none: a run whose record holds one has failed, whatever else it says."""
+"""Values that are not finite: a run with one in its record has failed."""
 
 from collections.abc import Mapping
 

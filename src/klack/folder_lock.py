@@ -1,4 +1,4 @@
-"""Locks that no other user can hold, and that the system gives back however a process ends.
+"""Locks that no other user can hold, released by the system however a process ends.
 
 Whoever may read a file can lock it.  So nothing is locked but files and folders that klack has made
 for its user alone: of a folder of results, a hidden file in it that goes when the lock is given
@@ -67,9 +67,7 @@ def locked(folder: HeldFolder, patience: float = _PATIENCE) -> Iterator[None]:
     end = time.monotonic() + patience
     while (lock := _lock_file(folder, own_lock_name())) is None:
         if time.monotonic() > end:
-            raise OSError(
-                errno.EBUSY, "another process writes to it and does not end", str(folder.path)
-            )
+            raise OSError(errno.EBUSY, "another process keeps writing to it", str(folder.path))
         time.sleep(_PAUSE)
     try:
         yield

@@ -1,4 +1,4 @@
-"""A folder that is held open: its entries are its own, whatever others do to its name meanwhile.
+"""A folder held open, so that renaming or replacing it does not affect its entries.
 
 Between a look at a path and the use of it, another user who may write to a folder above can put a
 link in its place.  So the folder is opened once, and everything in it is reached from there by a
@@ -45,7 +45,7 @@ class HeldFolder(Closing):
         self.handle = os.open(path, _FOLDER) if _BY_HANDLE else None
 
     def close(self) -> None:
-        """Let go of the folder; locks on it go as well."""
+        """Release the folder and its locks."""
         if self.handle is not None:
             os.close(self.handle)
             self.handle = None
@@ -61,7 +61,7 @@ class HeldFolder(Closing):
 
     @property
     def steady_path(self) -> Path:
-        """Path by which this process reaches this very folder, also if somebody renames it."""
+        """Path by which this process reaches this folder even if it is renamed."""
         if self.handle is not None:
             path = Path(f"/proc/self/fd/{self.handle}")
             with suppress(OSError):
@@ -81,7 +81,7 @@ class HeldFolder(Closing):
             return None
 
     def mark(self, name: str) -> Mark | None:
-        """What tells an entry from others that had this name before."""
+        """Identity of an entry, distinct from earlier ones of the same name."""
         state = self.state(name)
         return None if state is None else (state.st_ino, state.st_mtime_ns)
 
@@ -90,7 +90,7 @@ class HeldFolder(Closing):
         return sorted(os.listdir(self.path if self.handle is None else self.handle))
 
     def has_folder(self, name: str) -> bool:
-        """Tell whether there is a folder of this name, not a link to one."""
+        """Whether there is a folder of this name, not a link to one."""
         state = self.state(name)
         return state is not None and stat.S_ISDIR(state.st_mode)
 
@@ -107,7 +107,7 @@ class HeldFolder(Closing):
         os.rename(self._at(name), self._at(new), src_dir_fd=self.handle, dst_dir_fd=self.handle)
 
     def link(self, name: str, to: "HeldFolder") -> None:
-        """Let a file be in another folder as well; that of a link, not what it leads to."""
+        """Hard-link a file into another folder; of a link itself, not of its target."""
         os.link(
             self._at(name),
             to._at(name),

@@ -1,4 +1,4 @@
-"""Memory that this process can still have, and refusals of what would not fit.
+"""Available memory, and rejection of what would not fit.
 
 The operating system kills a process that takes too much, or lets the machine crawl.  What is known
 to be large is therefore estimated first and refused with numbers and a way out.
@@ -21,7 +21,7 @@ _OWN_CGROUPS = Path("/proc/self/cgroup")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvailableMemory:
-    """How much can still be taken [byte], and what sets the bound."""
+    """Available memory [byte], and the origin of the limit."""
 
     size: float
     bound: str
@@ -82,7 +82,7 @@ def in_words(size: float) -> str:
 
 
 def _control_groups() -> list[AvailableMemory]:
-    """What the control groups of a container or a batch system leave (Linux, version 1 and 2)."""
+    """Memory left by the control groups of a container or batch system (Linux, version 1 and 2)."""
     try:
         lines = _OWN_CGROUPS.read_text(encoding="utf-8").splitlines()
     except OSError:

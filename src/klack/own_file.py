@@ -1,4 +1,4 @@
-"""Files that klack opens again: regular files of the caller, never a link, a pipe or a planted one.
+"""Files that klack reopens: regular files of the caller, never links, pipes or planted files.
 
 In a folder that others may write to, a name that klack expects may be a symbolic link to a file of
 the caller, a named pipe that waits for ever, or a second name (hard link) of something else.
@@ -18,7 +18,7 @@ SAFELY = (
     | getattr(os, "O_CLOEXEC", 0)
     | getattr(os, "O_BINARY", 0)
 )
-"""Flags that follow no link and wait for no pipe."""
+"""Flags for opening without following links or waiting for pipes."""
 _PRIVATE = 0o600
 
 
@@ -85,13 +85,13 @@ def require_own_file(path: Path | str, state: os.stat_result) -> None:
             os.fspath(path),
             got=got,
             expected="a regular file of your own, or none",
-            hint="somebody else may have put it there: look at it, then remove it, or give another "
-            "folder.",
+            hint="another user may have put it there: check it, then remove it, or choose "
+            "another folder.",
         )
 
 
 def planted(path: Path) -> str | None:
-    """What another user has put at a name for others to go through, in words; None if it is not so.
+    """Description of an entry planted at a name by another user; None if there is none.
 
     A link or a pipe in a folder that others may write to, neither of the caller nor of the owner of
     the folder: the rule by which Linux protects links (``protected_symlinks``), for all systems.
@@ -110,7 +110,7 @@ def planted(path: Path) -> str | None:
 
 
 def kind_of(state: os.stat_result) -> str:
-    """What stands at a name, in words."""
+    """Description of the entry at a name."""
     kinds = {
         stat.S_IFLNK: "a symbolic link",
         stat.S_IFIFO: "a named pipe",

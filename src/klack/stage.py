@@ -1,4 +1,4 @@
-"""Hidden folders in which new files grow up, and the step from there to their place.
+"""Hidden folders for new files, and the move to their destination.
 
 A stage is a folder of the caller alone (mode 0700) with a random name::
 
@@ -45,13 +45,13 @@ _TRIES, _PAUSE = 100, 0.01  # [-], [s]: threads that still write end soon
 
 @dataclass(frozen=True, kw_only=True)
 class _Moves:
-    """What was in the place of each file, and what is to come there."""
+    """Former and new file of each move."""
 
     put: Mapping[str, tuple[Mark, Mark | None]]
-    """New and former one by name."""
+    """New and former name."""
     gone: Mapping[str, Mark]
     beside: Mapping[str, Mark]
-    """What must still stand there, or nothing moves."""
+    """Former content required for the exchange."""
 
 
 class Stage(Closing):
@@ -86,7 +86,7 @@ class Stage(Closing):
 
     @property
     def content(self) -> Path:
-        """Where new files are written; nobody else can put another folder there."""
+        """Folder of the new files; no other user can replace it."""
         return self.held.steady_path / NEW
 
     # ------------------------------------------------------------------ making and removing
@@ -139,7 +139,7 @@ class Stage(Closing):
         if state.st_uid != caller():
             return f"of another user (number {state.st_uid})"
         if state.st_mode & 0o022:
-            return "others may write into it"
+            return "others may write to it"
         names = self.held.names()
         if unknown := [name for name in names if name not in _KNOWN]:
             return f"with the unknown entry {unknown[0]!r}"
@@ -158,7 +158,7 @@ class Stage(Closing):
         )
 
     def _barely_begun(self, names: list[str]) -> bool:
-        """Tell whether its process was killed before the seal was whole: it is as good as empty."""
+        """Whether its process was killed before the seal was complete: it counts as empty."""
         found = {name: self.held.state(name) for name in names}
         return found.keys() <= {_SEAL, _MANIFEST} and all(
             state is not None and stat.S_ISREG(state.st_mode) and state.st_size <= 200
@@ -233,7 +233,7 @@ class Stage(Closing):
                 raise
 
     def _as_expected(self, moves: _Moves, old: HeldFolder) -> bool:
-        """Tell whether everything is there as it was when the new files were made ready."""
+        """Whether everything is as it was when the new files were made ready."""
         there = self.folder.mark
         if any(there(name) != mark for name, mark in moves.beside.items()):
             return False
@@ -286,7 +286,7 @@ class Stage(Closing):
         return [str(name) for name in self._read(_GONE) or []]
 
     def _read_moves(self) -> _Moves | None:
-        """What was to be moved; None if that is not known or names another folder."""
+        """Planned moves; None if unknown or for another folder."""
         try:
             put, gone, beside = self._read(_MOVES)
             moves = _Moves(
@@ -333,19 +333,19 @@ def dead_stage(folder: HeldFolder, name: str) -> Stage | str | None:
 
 
 def is_stage_content(folder: Path) -> bool:
-    """Tell whether files written to this folder are in a stage already."""
+    """Whether files written to this folder are already in a stage."""
     return folder.name == NEW and (folder.parent / _SEAL).is_file()
 
 
 def name_outdated(content: Path, names: Iterable[str]) -> None:
-    """Note files that go when the content of a stage comes to its place."""
+    """Note files to delete when the content of a stage is moved."""
     handle = os.open(content.parent / _GONE, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump(list(names), file)
 
 
 def _of_one_user(folder: os.stat_result, file: os.stat_result) -> bool:
-    """Tell whether a folder is of the user who made a file in it, who alone may write to it.
+    """Whether a folder belongs to, and is only writable by, the user who made a file in it.
 
     Compared with the file, since some file systems show one user and one mode for everything.
     """
@@ -354,7 +354,7 @@ def _of_one_user(folder: os.stat_result, file: os.stat_result) -> bool:
 
 
 def _swapped() -> PermissionError:
-    return PermissionError(errno.EPERM, "somebody put another folder in the place of klack's own")
+    return PermissionError(errno.EPERM, "another folder was put in the place of klack's own")
 
 
 def _seal_of(state: os.stat_result) -> list[int]:
@@ -364,7 +364,7 @@ def _seal_of(state: os.stat_result) -> list[int]:
 def _mark(folder: HeldFolder, name: str) -> Mark:
     mark = folder.mark(name)
     if mark is None:
-        raise FileNotFoundError(errno.ENOENT, "it went while klack wrote it", name)
+        raise FileNotFoundError(errno.ENOENT, "it disappeared while klack wrote it", name)
     return mark
 
 

@@ -1,4 +1,4 @@
-"""Watching a long run: how long each stage takes, and what it warns of."""
+"""Stages of a long run: times and warnings."""
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,10 +27,10 @@ __all__ = [
 ]
 
 FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
-"""What a calculation may end with that is no internal error."""
+"""Errors that a calculation may end with that are not internal errors."""
 
 WITH_CACHED = ", with cached results"
-"""Ends the name of a stage that took results of earlier runs."""
+"""Suffix of the name of a stage that used results of earlier runs."""
 
 
 def stages_with_cached(stage_times: Mapping[str, float]) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class StageClock:
         self._times: dict[str, float] = {}
 
     def __call__(self, stage: str, fraction: float) -> None:
-        """Pass on how far a stage is."""
+        """Report the progress of a stage."""
         if stage != self._stage:
             self._book()
             self._stage = stage
@@ -81,7 +81,7 @@ class StageClock:
         return sum(self._times.get(stage, 0.0) for stage in stages)
 
     def times(self) -> dict[str, float]:
-        """Seconds per stage; its name tells when it took results of earlier runs."""
+        """Seconds per stage; the name shows the use of cached results."""
         self._book()
         return {
             f"{stage}{WITH_CACHED if stage in self._helped else ''}": time
@@ -120,7 +120,7 @@ def show(caught: Iterable[warnings.WarningMessage]) -> None:
 
 
 def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
-    """Compute what nobody asked for but to compare with: its failure warns and gives None.
+    """Compute something used only for comparison: a failure warns and returns None.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Two names that change places in one step, where the system can do that."""
+"""Exchange of two names in one step, where the system supports it."""
 
 import ctypes
 import errno

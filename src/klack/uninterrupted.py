@@ -1,4 +1,4 @@
-"""Short work that Ctrl-C and SIGTERM let come to its end, before they stop the program."""
+"""Short work that is completed before Ctrl-C or SIGTERM stops the program."""
 
 import signal
 import threading

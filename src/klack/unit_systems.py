@@ -1,4 +1,4 @@
-"""Consistent units of finite-element models, which their files do not name.
+"""Consistent unit systems of finite-element models, which their files do not state.
 
 A model is consistent when one unit each of length, mass and time gives all others: with mm, t and
 s a force is in N and a pressure in MPa.
@@ -68,7 +68,7 @@ UNIT_SYSTEMS = {
         UnitSystem("ft slug s", 0.3048, 4.4482216152605 / 0.3048, 1.0),
     )
 }
-"""Systems that are in use, by name."""
+"""Unit systems by name."""
 
 
 def unit_system(name: str, where: str = "units") -> UnitSystem:
@@ -90,7 +90,7 @@ def unit_system(name: str, where: str = "units") -> UnitSystem:
             where,
             got=f"'{name}'",
             expected=f"one of: {', '.join(UNIT_SYSTEMS)}",
-            hint="take 'mm t s' for a model in mm, N and MPa, 'm kg s' for one in SI.",
+            hint="use 'mm t s' for a model in mm, N and MPa, 'm kg s' for one in SI.",
         )
     return UNIT_SYSTEMS[words]
 
@@ -111,4 +111,4 @@ UnitSystemName = Annotated[
     BeforeValidator(_read),
     WithJsonSchema({"type": "string", "enum": list(UNIT_SYSTEMS)}),
 ]
-"""Field of a case that takes the name of a unit system."""
+"""Field of a case with the name of a unit system."""

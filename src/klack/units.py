@@ -1,4 +1,4 @@
-"""Quantities with units at the door: text such as ``80 um`` in, SI numbers inside.
+"""Quantities with units on input: text such as ``80 um`` in, SI numbers inside.
 
 Inside klack every number is SI; only case files and tables meet units.  A number without a unit is
 refused where a unit matters, because a wrong guess there is a factor of a thousand that nobody
@@ -291,7 +291,7 @@ def _number(value: float) -> float:
 
 
 def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
-    """Give the value back, or say between which sizes its kind lies."""
+    """Return the value, or raise with the range of its kind."""
     if kind.holds(result):
         return result
     unit = "" if kind.unit == "-" else f" {kind.unit}"

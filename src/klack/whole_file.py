@@ -1,4 +1,4 @@
-"""Files and folders of files that are either complete or as they were before.
+"""Files and folders that are either complete or unchanged.
 
 New files are written into a hidden folder beside their place (:mod:`klack.stage`):
 
@@ -39,7 +39,7 @@ _MOST_NAMED = 3
 
 @contextmanager
 def whole_file(path: Path, refuse: Refusal | None = None) -> Iterator[Path]:
-    """Give a path of the same name that takes the place of ``path`` when all went well.
+    """Temporary path of the same name that replaces ``path`` on success.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def whole_files(
 
 
 def outdated(stage: Path, names: Iterable[str]) -> None:
-    """Let files of these names go from the folder when the contents of the stage come into it."""
+    """Delete files of these names from the folder when the stage is moved."""
     gone = tuple(names)
     for name in gone:
         (stage / name).unlink(missing_ok=True)
@@ -137,7 +137,7 @@ def completed(folder: Path) -> Path:
 
 
 def mark_of(path: Path) -> Mark | None:
-    """What tells a file or folder from others that have or had its name; None if there is none."""
+    """Identity of a file or folder, distinct from others of its name; None if there is none."""
     try:
         state = path.lstat()
     except OSError:
@@ -146,7 +146,7 @@ def mark_of(path: Path) -> Mark | None:
 
 
 def in_exchange(folder: Path) -> bool:
-    """Tell whether somebody writes into a folder at this moment, or was killed while he did."""
+    """Whether a process writes to a folder at this moment, or was killed while doing so."""
     try:
         return any(True for _ in folder.glob(f"{PREFIX}*"))
     except OSError:
@@ -163,8 +163,8 @@ def _complete(folder: HeldFolder) -> None:
     if left:
         more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
         warnings.warn(
-            f"{str(folder.path)!r} holds what no klack of yours has made there; it is left alone: "
-            f"{', '.join(left[:_MOST_NAMED])}{more}. Remove it if you know it.",
+            f"{str(folder.path)!r} has an entry that was not made by your klack; it is left "
+            f"unchanged: {', '.join(left[:_MOST_NAMED])}{more}. Remove it if you know its origin.",
             LeftAloneWarning,
             stacklevel=4,
         )
@@ -210,6 +210,6 @@ def _refuse(path: Path, error: OSError) -> InputError:
     return InputError(
         str(path),
         got=f"an error: {error.strerror or error}",
-        expected="a place to write to",
-        hint="check the path and the space that is left.",
+        expected="a writable path",
+        hint="check the path and the free space.",
     )

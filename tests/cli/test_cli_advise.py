@@ -107,7 +107,7 @@ def test_advice_can_be_pasted_and_written(path, tmp_path, capsys):
     assert contact.endswith("um")  # in the unit that stood there
     assert advised.bodies["sphere"].mesh.contact.size < 30e-6
 
-    pasted = out.split("In place of the same keys of the case:\n")[1].split("The case with")[0]
+    pasted = out.split("Replace these keys of the case:\n")[1].split("The case with")[0]
     safe = YAML(typ="safe")
     merged = _merged(safe.load(CASE), safe.load(pasted))
     stream = tmp_path / "pasted.yaml"

@@ -134,14 +134,14 @@ def test_bad_arguments_give_one_message_and_exit_2(name, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "where", "word"),
     [
-        ("motion: {", "motion: ", ":44", "no YAML"),  # a hole in the file
+        ("motion: {", "motion: ", ":44", "not YAML"),  # a hole in the file
         ("size: 1.2 mm", "size: 1.2 bar", ":23: bodies.needle.mesh.size", "a pressure"),
         ("density:", "densty:", ":6: materials.steel.densty", "did you mean 'density'"),
         ("needle.tip", "needle.tipp", ":42: contact.between[0]", "did you mean 'tip'"),
         ("count: 20", "count: 0", ":45: reduction.modes.needle.count", "0 modes"),
-        ("gap: 0", "gap: -2 um", ":43: contact.gap", "penetrate already"),
+        ("gap: 0", "gap: -2 um", ":43: contact.gap", "already penetrate"),
         ("title:", "title: a\ntitle:", ":3: title", "a second time"),
-        ("klack: 1", "hello", ":2", "no YAML"),
+        ("klack: 1", "hello", ":2", "not YAML"),
     ],
 )
 @pytest.mark.parametrize("command", ["impact", "reduce"])
@@ -212,7 +212,7 @@ def test_several_levels_in_one_option(words, monkeypatch):
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
-        (KeyboardInterrupt(), 130, "klack impact: stopped; nothing half written is left."),
+        (KeyboardInterrupt(), 130, "klack impact: stopped; no partial files are left."),
         (ConvergenceError("the contact did not settle in 50 rounds"), 1, "50 rounds"),
         (InputError("mesh", got="a", expected="b", hint="c"), 2, "mesh: got a, expected b."),
         (MemoryError(), 2, "memory"),

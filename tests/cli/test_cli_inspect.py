@@ -155,7 +155,7 @@ def test_a_unit_beside_a_step_file_is_refused(tmp_path: Path, capsys):
     pin.write_text("ISO-10303-21;")
 
     assert main(["inspect", str(pin), "--unit", "inch"]) == 2
-    assert "--unit: got 'inch' for a STEP file, which says its own unit" in capsys.readouterr().err
+    assert "--unit: got 'inch' for a STEP file, which has its own unit" in capsys.readouterr().err
 
 
 def test_a_mesh_without_unit_is_refused(capsys):

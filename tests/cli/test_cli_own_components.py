@@ -107,7 +107,7 @@ def test_the_folder_of_a_case_is_no_place_of_modules(evil):
 @pytest.mark.parametrize(
     ("word", "words"),
     [
-        ("evil:X", "got something that is no component"),
+        ("evil:X", "got something that is not a component"),
         ("no_such_module:X", "cannot be imported"),
         ("eddy_brake:NoClass", "cannot be imported"),
         ("eddy_brake", "expected package.module:Class"),

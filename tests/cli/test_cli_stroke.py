@@ -221,7 +221,9 @@ def test_a_run_goes_on_only_with_its_own_step_and_variants(run, capsys, tmp_path
     text = CASE.read_text(encoding="utf-8") + "lumped: {stiffness: 1e9 N/m}\n"
     Path("small_valve.yaml").write_text(text, encoding="utf-8")
     assert main(["stroke", "small_valve.yaml", "--continue", "r", "--variant=dry-lumped"]) == 2
-    assert "'dry-lumped', which the result to go on from does not hold" in capsys.readouterr().err
+    assert (
+        "'dry-lumped', which the result to continue from does not have" in capsys.readouterr().err
+    )
 
 
 def test_an_impact_case_is_no_stroke(capsys):

@@ -99,8 +99,8 @@ def test_a_user_is_not_warned_without_a_leak():
 @pytest.mark.parametrize(
     ("residual", "least_loss", "words"),
     [
-        (0.0, -1e-3, r"has a loss that gave back 1\.0e-03 of it"),
-        (-2e-9, 0.0, r"does not close by 2\.0e-09 of the energy turned over, more than the 1e-09"),
+        (0.0, -1e-3, r"has a loss that returned 1\.0e-03 of it"),
+        (-2e-9, 0.0, r"does not close by 2\.0e-09 of the energy throughput, more than the 1e-09"),
     ],
 )
 def test_what_a_user_is_told(residual, least_loss, words):

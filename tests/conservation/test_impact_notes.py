@@ -62,7 +62,7 @@ def test_a_note_says_which_run_it_is_about(monkeypatch):
     notes = [note for note in study.warnings if "energy balance" in note]
     begins = sorted({note.split(": simulate_interface")[0] for note in notes})
     assert begins == [
-        "estimate of the error, 15 modes",
-        "estimate of the error, 30 modes",
+        "error estimate, 15 modes",
+        "error estimate, 30 modes",
         "level 'interface'",
     ]

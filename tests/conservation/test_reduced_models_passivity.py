@@ -114,7 +114,7 @@ def test_turned_port_is_refused():
     given = model(with_residual=False)
     C = given.C.copy()
     C[1] *= -1.0
-    assert "point the same way" in refusal(replace(given, C=C)).expected
+    assert "have the same direction" in refusal(replace(given, C=C)).expected
     both = replace(given, C=C, B=given.B * [1.0, -1.0])
     assert "move together along z" in refusal(both).got
 

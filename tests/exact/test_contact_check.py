@@ -138,7 +138,7 @@ def test_a_sharp_edge_is_told_whatever_the_mesh(size):
     assert np.isnan(found.expected)
     assert len(said) == 1  # and no size of elements
     assert "sharp edge of 'housing' (housing.seat, at (0.5, 0) mm, 90 deg)" in said[0]
-    assert "give the edge the radius that it really has" in said[0]
+    assert "give the edge its real radius" in said[0]
 
 
 def test_a_flat_face_with_edges_is_no_sharp_edge():
@@ -166,9 +166,9 @@ def test_a_contact_over_the_end_of_the_named_surface_names_the_next_one():
 
     assert whole.doubts == ()
     assert none == []
-    assert "it runs over the end of a named surface" in half.doubts
+    assert "it reaches the edge of a named surface" in half.doubts
     assert len(said) == 1
-    assert "end of 'needle.tip'" in said[0]
+    assert "edge of 'needle.tip'" in said[0]
     assert "add 'needle.flank' to 'tip'" in said[0]
 
 
@@ -189,7 +189,7 @@ def test_levels_with_contact_points_tell_the_end_as_well(level):
     with pytest.warns(AccuracyWarning, match=rf"level '{level}': .*add 'needle\.flank'"):
         seen = ends_reached(unseen, problem.pair, problem.space, study.levels, "tip on seat")
 
-    assert seen.doubts == ("it runs over the end of a named surface",)
+    assert seen.doubts == ("it reaches the edge of a named surface",)
     blind = {level: replace(study.levels[level], pressure=None)}
     assert ends_reached(unseen, problem.pair, problem.space, blind, "") is unseen
     assert any("add 'needle.flank'" in note for note in study.warnings)

@@ -77,7 +77,7 @@ def test_contradicting_force_is_reported_and_not_used():
     linkage = CURRENT[:, None] * inductance(GAP)
     force = 0.5 * np.array([[-(i**2) * 1e-8 / (x + 50e-6) ** 2 for x in GAP] for i in CURRENT])
 
-    with pytest.warns(AccuracyWarning, match="only one of both can keep the energy"):
+    with pytest.warns(AccuracyWarning, match="only one of them can conserve energy"):
         made = FluxMap.of(current=CURRENT, gap=GAP, linkage=linkage, force=1.3 * force)
 
     assert made.force_at(10 * inductance(60e-6), 60e-6) == pytest.approx(

@@ -167,7 +167,7 @@ def test_solids_that_do_not_fit_are_refused(shift, text):
 def test_point_off_the_axis_cannot_refine_a_meridian():
     sizing = MeshSizing(size=MM, refinements=(Refinement(position=(MM, 0, 0), size=0.1 * MM),))
 
-    with pytest.raises(InputError, match=r"(?s)off the axis.*give \(r, z\)"):
+    with pytest.raises(InputError, match=r"(?s)not on the axis.*give \(r, z\)"):
         mesh_meridian({"needle": needle()}, sizing)
 
 

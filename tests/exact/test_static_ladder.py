@@ -49,5 +49,5 @@ def test_given_reach_is_judged_by_the_force_that_is_needed():
 
     again = _problem(0.25, found.space.reach).static
     assert again.max_force == pytest.approx(found.max_force, rel=0.01)
-    with pytest.raises(ReachError, match="rim of the candidate points"):
+    with pytest.raises(ReachError, match="edge of the candidate points"):
         _problem(0.25, 0.1 * found.space.reach)

@@ -184,7 +184,7 @@ def test_half_a_letter_is_no_text():
     """A lone surrogate, which JSON and YAML can write and no file name or terminal can take."""
     text = CASES[0].read_text(encoding="utf-8")
     for put in ('"\\ud800"', '"a\\0b"'):
-        with pytest.raises(InputError, match="without such signs"):
+        with pytest.raises(InputError, match="without such characters"):
             read_any_case(text.replace("klack: 1", f"klack: {put}", 1), Path("valve.yaml"))
 
 

@@ -72,7 +72,7 @@ def test_overlap_beyond_one_percent_of_the_approach(shells):
 def test_contact_that_grows_to_the_rim():
     problem = sphere(reach_in_widths=0.6)
 
-    with pytest.raises(InputError, match=r"rim of the candidate points above .* N") as caught:
+    with pytest.raises(InputError, match=r"edge of the candidate points above .* N") as caught:
         problem.solve(4.0)
     hint = re.search(r"'reach: (\S+) um', under contact", str(caught.value))
     assert hint
@@ -115,7 +115,7 @@ def test_restricted_space_gives_the_same_contact():
     np.testing.assert_allclose(part.force, full.force, rtol=1e-9)
     carrying = full.pressures[-1] > 0
     cut, C = problem.space.restricted(carrying), C[np.ix_(carrying, carrying)]
-    with pytest.raises(InputError, match="rim"):
+    with pytest.raises(InputError, match="edge of the candidate"):
         static_contact(cut, C, 2.5)
 
 

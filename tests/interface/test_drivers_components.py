@@ -61,8 +61,8 @@ PEAK_HOLD = {
         (lambda: PeakHold(**{**PEAK_HOLD, "hold_band": 12.0}), "less than twice the hold current"),
         (lambda: PeakHold(**PEAK_HOLD, peak_until=2e-3), "between start and end"),
         (lambda: VoltageTable(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 voltages"),
-        (lambda: VoltageTable(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "times that fall"),
-        (lambda: VoltageCourse([0.0, -1.0], [0.0, 0.0]), "times that fall"),
+        (lambda: VoltageTable(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "decreasing times"),
+        (lambda: VoltageCourse([0.0, -1.0], [0.0, 0.0]), "decreasing times"),
         (lambda: DriveProgram(()), "at least one state"),
         (
             lambda: DriveProgram((DriveState("on", 1.0, (Switch(When.TIME, 1.0, "of"),)),)),

@@ -86,7 +86,7 @@ def test_consistent_law_is_filled_in_and_kept_by_variants():
     stop = EndStop(gap=0.0, law={"kind": "consistent"}, film=RING)
     law = TableLaw([1e-6, 2e-6], [100.0, 250.0])
 
-    with pytest.raises(InputError, match="not computed yet"):
+    with pytest.raises(InputError, match="has not been computed"):
         stop.contact_law()
     filled = stop.with_law(law, series_compliance=1e-10)
 
@@ -94,7 +94,7 @@ def test_consistent_law_is_filled_in_and_kept_by_variants():
     assert filled.series_compliance == 1e-10
     assert filled.dry().contact_law() is law
     assert filled.dry().film is None
-    with pytest.raises(InputError, match="not computed yet"):
+    with pytest.raises(InputError, match="has not been computed"):
         stop.contact_law()
 
 

@@ -93,7 +93,7 @@ def test_a_table_makes_a_fluid():
                     "density": ["800 kg/m^3", "799 kg/m^3"],
                 },
             },
-            "both increase strictly",
+            "both strictly increasing",
         ),
     ],
 )
@@ -148,7 +148,7 @@ def test_a_table_that_never_settles_says_where():
         base_viscosity=1e-3,
         vapour=Vapour(pressure=10.0, density=4e-4),
     )
-    with pytest.raises(ConvergenceError, match=r"'stairs' is not settled .* Pa"):
+    with pytest.raises(ConvergenceError, match=r"'stairs' has not converged .* Pa"):
         fluid_table(fluid, 101_325.0)
 
 

@@ -141,7 +141,7 @@ def test_a_run_cannot_go_on_from_a_stored_state(spring_damper_fmu: Build):
     options = {"duration": 2e-5, "step": 5e-7, "coarse": 1, "record": 1e-6}
     first = simulate_network(rows_of(part), start="free", **options)
 
-    with pytest.raises(InputError, match="goes on from a stored state"):
+    with pytest.raises(InputError, match="continued from a stored state"):
         simulate_network(rows_of(part), state=first.state, **options)
 
 
@@ -198,7 +198,7 @@ def test_no_file_leaves_the_folder(name: str, spring_damper_fmu: Build, tmp_path
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr(name, "x")
 
-    with pytest.raises(InputError, match="wants out of its folder"):
+    with pytest.raises(InputError, match="leads out of its folder"):
         ImportedFmu(file=path, **GIVEN)
 
 

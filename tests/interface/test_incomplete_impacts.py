@@ -22,7 +22,7 @@ from klack.errors import ConvergenceError, InputError
 from klack.transient import full_order, interface_run
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
-SAID = "level 'full' failed, there are no numbers of it: simulate_full_order: step"
+SAID = "level 'full' failed and has no results: simulate_full_order: step"
 
 
 class Impatient(ComplementaritySolver):
@@ -93,8 +93,8 @@ def test_report_of_an_incomplete_result(stored, tmp_path, capsys):
 
     assert f"Note: {SAID}" in capsys.readouterr().err
     page = (tmp_path / "report.html").read_text()
-    assert "failed, there are no numbers of it: simulate_full_order" in page
-    assert "known at the level &#39;full&#39; only, which failed" in page.replace("'", "&#39;")
+    assert "failed and has no results: simulate_full_order" in page
+    assert "only available at level &#39;full&#39;, which failed" in page.replace("'", "&#39;")
 
 
 def test_export_of_an_incomplete_result(stored, tmp_path, capsys):

@@ -459,7 +459,7 @@ def test_rival_writers_and_a_reader(tmp_path: Path):
     assert found["codes"] == [0, 0]
     assert found["read"] > 3
     assert found["mixed"] == 0
-    late = "a result that is written again and again while it is read"
+    late = "a result that keeps changing while it is read"
     assert set(found["errors"]) <= {late, "no klack result"}  # the last: before the first one
     assert len(found["errors"]) < 0.2 * found["read"] + 200
     assert found["left"] == ["result.zarr"]
@@ -469,7 +469,7 @@ def test_a_lock_is_waited_for_and_not_for_ever(tmp_path: Path):
     with HeldFolder(tmp_path) as folder:
         with (
             locked(folder),
-            pytest.raises(OSError, match="another process writes"),
+            pytest.raises(OSError, match="another process keeps writing"),
             locked(folder, patience=0.05),
         ):
             pass

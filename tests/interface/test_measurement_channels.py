@@ -147,7 +147,7 @@ def test_a_pattern_gives_one_stroke_per_match_in_the_order_of_the_file(tmp_path)
     [
         (("hub_a [um]", "hub_b [um]"), {}, r"several that could be the lift: hub_a, hub_b"),
         (("T [K]", "level"), {}, r"none that could be the lift: T \[K\], level"),
-        (("lift [V]",), {"lift": "lift"}, r"'scale' is how many m one 'V' of a sensor stands for"),
+        (("lift [V]",), {"lift": "lift"}, r"'scale' is the number of m per 'V' of a sensor"),
         (("lift [um]",), {"lift": "hub"}, r"channels.lift: got no channel 'hub', expected one of"),
         (("lift",), {"lift": "lift"}, "got no unit, expected the unit of a length"),
         (("lift [A]",), {"lift": "lift"}, r"the unit 'A' \(a current\)"),
@@ -210,7 +210,7 @@ def test_slower_channels_come_onto_the_time_of_the_fastest(tmp_path):
     # twelve digits were written; a straight line is met by straight lines
     np.testing.assert_allclose(series["lift"].values, 1e-6 * lift_of(time), rtol=1e-9)
     np.testing.assert_allclose(series["pressure"].values, 1e5 * 3e3 * time, rtol=1e-9)
-    assert any("'p' (step 1e-05 s) brought onto steps of 1e-06 s" in n for n in clock.notes)
+    assert any("'p' (step 1e-05 s) resampled to steps of 1e-06 s" in n for n in clock.notes)
 
 
 def test_a_rounded_time_is_taken_as_uniform(tmp_path):
@@ -260,7 +260,7 @@ def test_a_few_missing_values_are_bridged_and_many_refused(tmp_path):
     lift = lift_of(time)
     lift[100:104] = np.nan
     path = table(tmp_path / "a.csv", ["t [s]", "lift [um]"], [time, lift])
-    with pytest.warns(AccuracyWarning, match="4 missing values of 'lift' bridged"):
+    with pytest.warns(AccuracyWarning, match="4 missing values of 'lift' filled"):
         series, _ = read(path)
     np.testing.assert_allclose(series["lift"].values, 1e-6 * lift_of(time), atol=1e-9)
     lift[100:110] = np.nan

@@ -206,7 +206,7 @@ def test_mdf_channels_outside_their_record_are_refused(tmp_path):
     (place,) = (p for p in places if content[p : p + 4] == b"\x08\0\0\0")
     content[place + 3] = 0x48
     (tmp_path / "a.mf4").write_bytes(content)
-    with pytest.raises(InputError, match="'lift': got a place outside its record"):
+    with pytest.raises(InputError, match="'lift': got a position outside its record"):
         open_recording(tmp_path / "a.mf4")
 
 

@@ -284,7 +284,7 @@ def test_a_size_by_mistake_is_refused_at_once(small_machine, sizing, blamed, fit
         mesher({"bar": bar()}, sizing)
 
     text = str(caught.value)
-    assert f"{mesher.__name__}: {blamed}: got {fits}, which makes some" in text
+    assert f"{mesher.__name__}: {blamed}: got {fits}, which gives some " in text
     assert f"Try: a 'mesh: {blamed}' of " in text
 
 
@@ -306,7 +306,7 @@ def test_too_many_layers_are_refused(small_machine):
     meridian = mesh_meridian({"bar": bar()}, MeshSizing(size=0.5e-3))
     small_machine(100e6)
 
-    with pytest.raises(InputError, match="100000 layers, which make"):
+    with pytest.raises(InputError, match="100000 layers, which give "):
         sweep(meridian, 100_000)
 
 
@@ -361,6 +361,6 @@ def test_klack_impact_refuses_and_leaves_nothing(tmp_path):
 
     assert done.returncode == 2, done.stderr
     key = "bodies.needle.mesh.contact.size"
-    assert f"{key}: got 4 nm, which makes some" in done.stderr
+    assert f"{key}: got 4 nm, which gives some " in done.stderr
     assert f"Try: a {key} of" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]

@@ -29,7 +29,7 @@ FAULTS = {
     ),
     "cut off": (
         NODES + "*ELEMENT, TYPE=C3D10\n1, 1, 2, 3, 4, 1, 2\n",
-        r"x.inp:7: got 7 numbers, expected an element number and 10 nodes \(C3D10\).*cut off",
+        r"x.inp:7: got 7 numbers, expected an element number and 10 nodes \(C3D10\).*truncated",
     ),
     "too long": (
         NODES + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4, 4\n",
@@ -78,7 +78,7 @@ FAULTS = {
         "x.inp:2: .PART: got .PART of x.inp:1 without its end",
     ),
     "open part": (PART + "*PART, NAME=b\n", "x.inp:10: .PART: got the end of the file"),
-    "end only": (TET + "*END PART\n", "x.inp:8: .END PART: got an end without a beginning"),
+    "end only": (TET + "*END PART\n", "x.inp:8: .END PART: got an end without a start"),
     "parts without assembly": (
         PART + PART.replace("NAME=a", "NAME=b"),
         "got 2 parts and no .INSTANCE",
@@ -101,7 +101,7 @@ FAULTS = {
     ),
     "ring off its axis": (
         RING + "*INSTANCE, NAME=i, PART=r\n1., 0., 0.\n*END INSTANCE\n",
-        "x.inp:9: .INSTANCE: got an axisymmetric part that is turned, or moved away",
+        "x.inp:9: .INSTANCE: got an axisymmetric part that is rotated, or moved away",
     ),
     "offset": (NODES + "*ELEMENT, TYPE=C3D4, OFFSET=10\n1,1,2,3,4\n", "the parameter OFFSET"),
     "edge of a shell": (
@@ -232,5 +232,7 @@ def test_a_set_of_nodes_is_no_surface(tmp_path):
 def test_a_lost_include_says_where_it_is_looked_for(tmp_path):
     path = tmp_path / "x.inp"
     path.write_text("*INCLUDE, INPUT=lost.inp\n" + TET)
-    with pytest.raises(InputError, match=r"(?s)lost.inp: got no such file.*the file it stands in"):
+    with pytest.raises(
+        InputError, match=r"(?s)lost.inp: got no such file.*the file that contains it"
+    ):
         read_abaqus(path, 1.0)

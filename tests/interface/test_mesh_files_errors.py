@@ -81,7 +81,7 @@ ANSYS = {
     "shell": (cdb([[1, 2, 5, 3]], kind=181), "element 1: got SHELL181"),
     "no type": (cdb([TET]).replace("ET,1,185", ""), "got type 1 without an ET command"),
     "repeated": (cdb([[1, 2, 2, 3, 4, 4, 4, 4]]), "got a pyramid"),
-    "repeated pair": (cdb([[1, 1, 2, 3, 4, 4, 5, 5]]), "corner nodes that repeat in no known"),
+    "repeated pair": (cdb([[1, 1, 2, 3, 4, 4, 5, 5]]), "corner nodes with an unknown repetition"),
     "unblocked": ("/PREP7\nN,1,0.,0.,0.\n", "a.cdb:2: got 'N,1,0.,0.,0.', expected nodes and el"),
     "count": (cdb([TET]).replace("3,,5,5", "3,,5,6"), "NBLOCK: got 5 lines of items, expected 6"),
     "no end": (cdb([TET]).partition("      -1")[0], "the end of the file, expected the end mark"),
@@ -153,7 +153,7 @@ VTK = {
     "lagrange": (vtk(["4 0 1 2 3"], "71"), "cell 1: got cell type 71"),
     "surface": (vtk(["3 0 1 3"], "5"), "got surface cells only"),
     "dataset": (vtk(["4 0 1 2 3"], "10", "POLYDATA"), "got DATASET POLYDATA"),
-    "point": (vtk(["4 0 1 2 9"], "10"), "got a cell with a point that is not there"),
+    "point": (vtk(["4 0 1 2 9"], "10"), "got a cell with a point that does not exist"),
     "count": (vtk(["4 0 1 2 3"], "10").replace("POINTS 5", "POINTS 6"), "got 15 numbers, expec"),
     "shape": (vtk(["3 0 1 2"], "10"), "cell 1: got 3 points, expected 4"),
 }

@@ -316,7 +316,7 @@ def test_a_pointer_of_git_is_no_file(ending, tmp_path, capsys):
     assert main(["inspect", str(path)]) == 2
 
     told = capsys.readouterr().err
-    assert "a pointer of git-LFS" in told
+    assert "a git-LFS pointer" in told
     assert "git lfs pull" in told
 
 
@@ -328,14 +328,14 @@ def test_a_case_that_names_a_pointer(tmp_path, capsys):
     assert main(["inspect", str(case)]) == 2
 
     told = capsys.readouterr().err
-    assert "bodies.pin.geometry.mesh.file: got a pointer of git-LFS" in told
+    assert "bodies.pin.geometry.mesh.file: got a git-LFS pointer" in told
 
 
 def test_a_recording_that_is_a_pointer(tmp_path):
     path = tmp_path / "strokes.csv"
     path.write_text(POINTER)
 
-    with pytest.raises(InputError, match="a pointer of git-LFS"):
+    with pytest.raises(InputError, match="a git-LFS pointer"):
         open_recording(path)
 
 

@@ -87,7 +87,7 @@ WRONG = {
         {**VALVE, "force": ConstantForce(force=1.0)},
         [*JOINED, ["needle.body", "force.end"]],
         "needle.body a second time (first in connections[0])",
-        "one list",
+        "list all ports that meet there together",
     ),
     "alone": (VALVE, [*JOINED, ["spring.base"]], "only spring.base", "all ports"),
     "empty": (VALVE, [*JOINED, []], "an empty connection", "all ports"),
@@ -125,7 +125,7 @@ WRONG = {
     "body and ground": (
         VALVE,
         [["needle.body", "spring.end", "ground"]],
-        "needle.body joined to the ground",
+        "needle.body connected to the ground",
         "stiff spring",
     ),
     "no body": (
@@ -161,13 +161,13 @@ WRONG = {
     "no reference pressure": (
         {**VALVE, "p": Pipe(), "q": Pipe()},
         [*JOINED, ["p.a", "q.b"], ["p.b", "q.a"]],
-        "nothing there stores fluid or gives the pressure",
+        "nothing there stores fluid or prescribes the pressure",
         "pressure source",
     ),
     "flow into a rigid node": (
         {**VALVE, "pump": Pump(), "pipe": Pipe()},
         [*JOINED, ["pump.b", "pipe.a"], ["pipe.b", "ambient"]],
-        "a flow is forced into a node that stores nothing",
+        "a flow is forced into a node without volume",
         "chamber",
     ),
     "flow at a rail": (
@@ -211,7 +211,7 @@ WRONG = {
         {**VALVE, "weight": Gravity()},
         [*JOINED, ["weight.body", "ground"]],
         "no body with a mass",
-        "whose weight",
+        "connect it to its body",
     ),
     "two start pressures": (
         {**VALVE, "a": Chamber(volume=1e-9, pressure=1e5), "b": Chamber(volume=1e-9, pressure=2e5)},

@@ -174,7 +174,7 @@ def test_a_flexible_body_names_the_ports_it_has():
 
 
 def test_a_held_body_cannot_start_with_a_speed():
-    with pytest.raises(InputError, match="which is held"):
+    with pytest.raises(InputError, match="which is supported"):
         FlexibleBody.of(body("housing", 0, ("seat",)), speed=0.1)
 
 

@@ -165,7 +165,7 @@ def dead_stage_in(folder: Path, content: str = "new") -> Path:
     ("change", "reason"),
     [
         (lambda stage: (stage / "more").write_text(""), "unknown entry 'more'"),
-        (lambda stage: stage.chmod(0o777), "others may write into it"),
+        (lambda stage: stage.chmod(0o777), "others may write to it"),
         (lambda stage: (stage / "seal").chmod(0o644), "without the seal"),  # its time of change
         (lambda stage: (stage / "manifest").write_text("[" * 100_000), "without the seal"),
         (lambda stage: os.link(stage / "seal", stage.parent / "seal"), "without the seal"),

@@ -303,7 +303,7 @@ def test_universal_file_without_modal_mass_or_modes(tmp_path):
         read_modal_data(written_by_pyuff(tmp_path / "rod.uff", modal_m=0.0))
     path = tmp_path / "response.uff"
     path.write_text("    -1\n    58\n" + "x\n" * 12 + "    -1\n")
-    with pytest.raises(InputError, match="frequency responses \\(dataset 58\\) are no modes"):
+    with pytest.raises(InputError, match="frequency responses \\(dataset 58\\) are not modes"):
         read_modal_data(path)
 
 

@@ -84,7 +84,7 @@ def test_nothing_is_good_while_the_contact_is_in_doubt(impact_study: ImpactStudy
 def test_the_report_answers_first(impact_study: ImpactStudy) -> None:
     content = report_content(certified(impact_study, deviation(0.0031)))
 
-    assert content.sections[0].title == "How good is the reduced level?"
+    assert content.sections[0].title == "Accuracy of the reduced level"
     assert "estimated error" in dict(content.definitions)
     titles = [section.title for section in report_content(impact_study).sections]
-    assert "How good is the reduced level?" not in titles
+    assert "Accuracy of the reduced level" not in titles

@@ -257,5 +257,5 @@ def test_without_a_full_run_the_report_says_why_it_has_no_picture(
     )
 
     assert section.picture is None
-    assert "the level 'full' only" in section.paragraphs[0]
+    assert "only available at level 'full'" in section.paragraphs[0]
     assert "--level reduced,full" in section.paragraphs[0]

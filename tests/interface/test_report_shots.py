@@ -162,7 +162,9 @@ def test_the_answer_comes_first(content: Content) -> None:
     assert content.subtitle.startswith("40 shots")
     rule = plain(content.sections[0].paragraphs[0])
     assert "No shot rebounds as high as the centred impact." in rule
-    assert "goes most with the eccentricity: it falls with it (rank correlation −1.00)" in rule
+    assert (
+        "correlates most with the eccentricity: it falls with it (rank correlation −1.00)" in rule
+    )
 
 
 def test_key_numbers_stand_beside_the_centred_ones(content: Content) -> None:

@@ -329,7 +329,7 @@ def test_a_speed_before_the_film_is_not_told_as_that_of_the_touch(study: StrokeS
     """By definition: with a film the speed of an impact is the highest since it began to press."""
     bare = replace(study, stops=tuple(replace(stop, film=False) for stop in study.stops))
 
-    assert "m/s (the highest since its film began to press) and a peak" in stroke_answer(study)
+    assert "m/s (the highest since its film force set in) and a peak" in stroke_answer(study)
     assert "film began" not in stroke_answer(bare)
 
 

@@ -69,10 +69,10 @@ def test_summary_in_plain_numbers(impact_study: ImpactStudy, lonely_study: Impac
 def test_a_doubtful_contact_goes_with_every_number(impact_study: ImpactStudy) -> None:
     assert study_to_json(impact_study)["contact"]["doubts"] == []
     assert contact_doubt(impact_study.contact) == ""
-    doubts = ("its elements are too coarse", "2 contact points across are too few")
+    doubts = ("its mesh is too coarse", "2 contact points across are too few")
     contact = replace(impact_study.contact, points_across=2, doubts=doubts)
     study = replace(impact_study, contact=contact)
-    words = "cannot be relied on: its elements are too coarse and 2 contact points across are too"
+    words = "cannot be relied on: its mesh is too coarse and 2 contact points across are too"
 
     said = study_to_json(study)["contact"]
     assert (said["doubts"], said["points_across"]) == (list(doubts), 2)

@@ -502,5 +502,5 @@ def test_a_folder_that_is_a_file_is_refused(tables: dict[str, ResultTable], tmp_
     (tmp_path / "file").write_text("")
 
     for write in (write_csv, write_netcdf, write_mat, write_mdf):
-        with pytest.raises(InputError, match="a place to write to"):
+        with pytest.raises(InputError, match="a writable path"):
             write(tables["stroke"], tmp_path / "file" / "result")

@@ -63,7 +63,7 @@ def test_sizes_that_differ_a_hundredfold(short, long, asked):
     if asked is None:
         require_usual_sizes(rods(), sizes)
         return
-    with pytest.raises(InputError, match=f"a body '{asked}' of .* bodies of like size"):
+    with pytest.raises(InputError, match=f"a body '{asked}' of .* bodies of similar size"):
         require_usual_sizes(rods(), sizes)
 
 

@@ -69,7 +69,7 @@ def test_a_break_of_the_reader_is_an_error(whole: bytes, tmp_path: Path, monkeyp
     path = tmp_path / "part.step"
     path.write_bytes(whole)
     monkeypatch.setattr(step_trial, "_PROGRAM", "import os\nos.abort()")
-    with pytest.raises(InputError, match="breaks on it"):
+    with pytest.raises(InputError, match="crashes on it"):
         read_step(path)
 
 
@@ -108,7 +108,7 @@ def test_a_file_is_tried_once_until_it_changes(whole: bytes, tmp_path: Path, mon
     monkeypatch.setattr(step_trial, "_PROGRAM", "import os\nos.abort()")
     path.write_bytes(whole + b"\n")
     for _ in range(2):  # refused files are not remembered
-        with pytest.raises(InputError, match="breaks on it"):
+        with pytest.raises(InputError, match="crashes on it"):
             read_step(path)
     assert len(starts) == 5
 

@@ -185,7 +185,7 @@ def test_refused_models(tmp_path, write):
     with pytest.raises(InputError, match="dissipation"):
         write([_pair(HuntCrossley(LinearLaw(1e9), 0.2))], tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="a place to write to"):
+    with pytest.raises(InputError, match="a writable path"):
         write([_body()], tmp_path / "file" / "below")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 

@@ -235,7 +235,7 @@ def test_bad_numbers_are_named(options, message):
 
 
 def test_needle_fixed_along_the_axis_is_refused():
-    with pytest.raises(InputError, match="free to fly"):
+    with pytest.raises(InputError, match="free to move"):
         drop(rod(fixed=np.array([20])))
 
 

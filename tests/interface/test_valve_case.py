@@ -111,7 +111,7 @@ MISTAKES = {
     "stop within a body": (
         changed("[needle.tip, housing.seat]", "[needle.tip, needle.shaft]"),
         "stops.seat.between",
-        "a body of its own",
+        "a separate body",
     ),
     "consistent law without surfaces": (
         changed("  seat: {between: [needle.tip, housing.seat], speed: 1.2 m/s, force: 20 N}\n", ""),

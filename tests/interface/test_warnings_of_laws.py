@@ -26,7 +26,7 @@ def test_an_impact_says_it_once_for_each_model():
     told = [note.partition(": contact: only")[0] for note in notes if "static compliance" in note]
     assert told[0] == "modes of the case"
     assert len(set(told)) == len(told)
-    assert all(name.startswith(("modes of the case", "estimate of the error")) for name in told)
+    assert all(name.startswith(("modes of the case", "error estimate")) for name in told)
 
 
 def test_a_valve_says_it_once_for_each_stop():

@@ -85,7 +85,7 @@ def test_without_disagreement_the_answer_stays_the_level_asked_for():
 def test_a_run_that_ends_in_contact_has_no_estimate():
     study = run_impact(changed(duration=4e-6), levels=("reduced",))
     assert study.estimates == {}
-    assert estimate_lines(study)[0].startswith("No estimate of the error: ")
+    assert estimate_lines(study)[0].startswith("No error estimate: ")
     assert "cut off" in estimate_lines(study)[0]
 
 

@@ -1,4 +1,4 @@
-"""The interface level, and the estimate of the error that it gives, against the full order.
+"""The interface level, and the error estimate that it gives, against the full order.
 
 Truth: the full order on the same mesh, to the tolerances that the project promises.  An estimate
 counts as right within a factor of two, or within what both runs resolve (steps of 40 and 80 ns:
@@ -95,5 +95,5 @@ def test_no_estimate_where_the_interface_level_itself_does_not_settle():
     """Flat rods: a discontinuous pulse on truncated modes."""
     study = run_impact(shipped("two-rods"), levels=("reduced",))
     assert not study.estimates_settled
-    assert estimate_lines(study)[0].startswith("No estimate")
+    assert estimate_lines(study)[0].startswith("No error estimate")
     assert study_to_json(study)["estimated_error"] == {"reduced": None}

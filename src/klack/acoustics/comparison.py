@@ -57,9 +57,9 @@ def impact_third_octaves(history: ImpactHistory, *, high: float | None = None) -
 
 
 def compare_histories(reference: ImpactHistory, candidate: ImpactHistory) -> Deviation:
-    """How far the first impact of ``candidate`` is from that of ``reference``.
+    """Deviation of the first impact of ``candidate`` from that of ``reference``.
 
-    Both are laid together at first touch and averaged over the coarser of the two record steps.
+    Both are aligned at first touch and averaged over the coarser of the two record steps.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where over frequency the energy of a transient lies, added up."""
+"""Cumulative energy of a transient over frequency."""
 
 from dataclasses import dataclass
 

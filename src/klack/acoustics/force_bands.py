@@ -1,6 +1,6 @@
 """One-third-octave energies of a force from 20 Hz to 200 kHz.
 
-A needle that sits on its seat presses before and after the stroke, so the spectrum is that of a
+A seated needle presses before and after the stroke, so the spectrum is that of a
 force that is held at both ends (:func:`klack.acoustics.spectrum.force_spectrum`).  Four decades of
 bands ask for fine frequencies at the low end and for short steps at the high end; each decade has a
 spectrum of its own.

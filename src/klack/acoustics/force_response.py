@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalResponse:
-    """What forces did to a structure.
+    """Response of a structure to forces.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ class ModalResponse:
 
     @property
     def vibration_energy(self) -> float:
-        """Energy that went into vibration [J]: lost so far, or still ringing."""
+        """Energy put into vibration [J]: lost so far, or still ringing."""
         return float(self.dissipated.sum() + self.ringing.sum())
 
     @property
     def residual(self) -> float:
-        """What does not balance, over the energy turned over [-]."""
+        """Residual of the energy balance, over the energy throughput [-]."""
         held = float(self.modal_energy.sum()) - self.energy_before
         lost = float(self.dissipated.sum())
         scale = max(float(np.abs(self.injected).sum()), self.energy_before, float(self.stored[-1]))

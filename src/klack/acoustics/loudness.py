@@ -1,4 +1,4 @@
-r"""How loud and how sharp a sound is: ISO 532-1 (Zwicker), time varying, and DIN 45692.
+r"""Loudness and sharpness of a sound: ISO 532-1 (Zwicker), time varying, and DIN 45692.
 
 The loudness follows one-third-octave levels every 0.5 ms through the ear's masking and its slow
 decay after a click; one value every 2 ms is given.  The method is that of the package MoSQITo.
@@ -25,7 +25,7 @@ _FAINT = "fainter than 0.1 sone at its loudest: no sharpness is given"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loudness:
-    """Loudness over time and what is said of it in single numbers.
+    """Loudness over time and its single-number measures.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-r"""How slowly the ear lets go of a sound: the diode network of ISO 532-1:2017, clause 6.
+r"""Decay of loudness in the ear after a sound: the diode network of ISO 532-1:2017, clause 6.
 
 Per critical band the core loudness ``u`` charges a capacitor at once, and through a diode and a
 resistor a second one, slowly.  When it falls, the voltage ``v`` of the first follows a linear

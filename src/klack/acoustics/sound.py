@@ -56,7 +56,7 @@ def click_pressure(
     force : TimeSeries [N]
         Means over its steps; no longer than those of the sound.
     frequency : array, shape (k,) [Hz]
-        Increasing; a value at 0 is passed over.
+        Increasing; a value at 0 is ignored.
     transfer : array, shape (k,) [W/N^2]
         Radiated power per mean square force ``T``, zero or more.  In between it is interpolated
         monotonically in logarithms; below the first frequency it falls with ``f^4`` (surface held

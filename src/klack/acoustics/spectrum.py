@@ -160,7 +160,7 @@ def change_spectrum(
             f"spectrum of '{series.name}' up to {high:g} Hz",
             got=f"a step of {series.step * 1e6:.3g} us",
             expected=f"at most {1e6 / (_COARSE * high):.3g} us",
-            hint="record in finer steps, or ask for less.",
+            hint="record in finer steps, or request less.",
         )
     many = max(int(1.0 / (_FINE * high * series.step)), 1)
     # both ends are held for one mean more, which then has the value that holds outside

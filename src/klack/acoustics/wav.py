@@ -1,4 +1,4 @@
-"""Sound files that say how loud they are."""
+"""Sound files with their full-scale level."""
 
 from io import BytesIO
 from math import log10
@@ -35,7 +35,7 @@ def full_scale_of(*pressures: TimeSeries, headroom: float = 6.0) -> float:
 
 
 def level_statement(full_scale: float) -> str:
-    """Say what full scale means, in pascal and as level.
+    """Full scale in pascal and as a level.
 
     A sine of full scale has ``20 lg(full scale / (sqrt(2) 20 uPa))`` dB.
 
@@ -72,7 +72,7 @@ def write_wav(path: Path, pressure: TimeSeries, *, full_scale: float) -> None:
 
 
 def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
-    """Content of the file that :func:`write_wav` writes, to be put into a report.
+    """Content of the file that :func:`write_wav` writes, for a report.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Kinds of question that a case can be asked, each with one answer."""
+"""Analyses of a case, one folder each."""

@@ -1,4 +1,4 @@
-"""What every analysis has: how its record is stored, told, and put on a page."""
+"""Interface of every analysis: storage, summary and report of its record."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Kept = TypeVar("Kept")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
-    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
+    """A table for a terminal; the first ``left`` columns are texts, the others numbers."""
 
     title: str
     columns: Sequence[str]
@@ -26,7 +26,7 @@ class TextTable:
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """Notes on what stands above them."""
+    """Notes on the tables above them."""
 
     notes: Sequence[str]
 

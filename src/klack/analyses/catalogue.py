@@ -1,4 +1,4 @@
-"""All analyses that leave a record, by the name of its format; loaded when one is asked for."""
+"""All analyses with a record, by the name of its format; loaded on first use."""
 
 from importlib import import_module
 from pathlib import Path
@@ -35,8 +35,8 @@ def analysis_in(folder: Path) -> Analysis[Any]:
             f"result {folder}",
             got=f"a Zarr store with format {name!r}",
             expected="a result of klack",
-            hint="give the folder that a command of klack wrote its result to; a later klack may "
-            "know other kinds.",
+            hint="give the result folder of a klack command; a later version of "
+            "klack may have other kinds.",
         )
     module, _, attribute = _ANALYSES[name].partition(":")
     found: Analysis[Any] = getattr(import_module(f"klack.analyses.{module}"), attribute)

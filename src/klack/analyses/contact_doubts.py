@@ -1,4 +1,4 @@
-"""How a contact is meshed, and what makes its numbers doubtful: of an impact or of an end stop."""
+"""Mesh of a contact, and reasons to doubt its numbers: of an impact or of an end stop."""
 
 from typing import Protocol
 
@@ -9,7 +9,7 @@ __all__ = ["MeshedContact", "contact_doubt", "contact_to_json"]
 
 
 class MeshedContact(Protocol):
-    """What is known of the mesh of a contact."""
+    """Mesh of a contact."""
 
     @property
     def surfaces(self) -> str:
@@ -25,11 +25,11 @@ class MeshedContact(Protocol):
 
     @property
     def points_across(self) -> int:
-        """Contact points that carry across the whole width; 0 where nobody knows."""
+        """Loaded contact points across the whole width; 0 if unknown."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Why no error can be judged there, each in a few words."""
+        """Reasons why no error can be estimated there."""
 
 
 def contact_to_json(contact: MeshedContact) -> ContactJson:
@@ -44,6 +44,6 @@ def contact_to_json(contact: MeshedContact) -> ContactJson:
 
 
 def contact_doubt(contact: MeshedContact) -> str:
-    """Say in one sentence why the numbers of a contact are doubtful; empty if they are not."""
+    """Sentence on why the numbers of a contact are doubtful; empty if they are not."""
     doubts = " and ".join(contact.doubts)
     return f"The contact {contact.surfaces} cannot be relied on: {doubts}." if doubts else ""

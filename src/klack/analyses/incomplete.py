@@ -1,4 +1,4 @@
-"""Results that are not whole: levels of an impact that failed beside those that did not."""
+"""Incomplete results: failed levels of an impact next to those that ran."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ class Attempts:
 
     @contextmanager
     def at(self, name: str) -> Iterator[None]:
-        """Keep the error of a level, to go on without it."""
+        """Keep the error of a level and continue without it."""
         try:
             yield
         except FAILURES as error:
@@ -55,15 +55,15 @@ class Attempts:
 
 
 def failure_notes(failures: Mapping[str, str]) -> tuple[str, ...]:
-    """Say which levels of an impact are missing, and why; empty if none is."""
+    """Notes on missing levels of an impact, with reasons; empty if none is missing."""
     return tuple(
-        f"level '{name}' failed, there are no numbers of it: {' '.join(text.split())}"
+        f"level '{name}' failed and has no results: {' '.join(text.split())}"
         for name, text in failures.items()
     )
 
 
 def missing_in(study: object) -> tuple[str, ...]:
-    """Say what is missing in a stored result, for commands that go on with it."""
+    """Report what is missing in a stored result, for commands that use it."""
     if isinstance(study, ImpactStudy):
         return failure_notes(study.failures)
     if isinstance(study, StrokeStudy):

@@ -1,4 +1,4 @@
-"""What is in a file of another program, before a case is written for it."""
+"""Content of a file of another program, before a case is written for it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +37,7 @@ INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
 def inspect_file(
     path: Path, unit_length: float | None = None, matrix: str | None = None
 ) -> tuple[Row, ...]:
-    """What a STEP file, a mesh, a matrix or an FMU holds.
+    """Content of a STEP file, a mesh, a matrix or an FMU.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def inspect_file(
 
 
 def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
-    """What other programs gave for the bodies of a case, checked as a run checks it.
+    """Files of other programs for the bodies of a case, checked as in a run.
 
     Yields the name of each body and its rows.
 

@@ -1,4 +1,4 @@
-"""What ``--json`` writes, command by command: one type for the code, the schema and the docs.
+"""Output of ``--json`` of each command: one type for the code, the schema and the docs.
 
 The functions that make the JSON are annotated with these types, so that the type checker compares
 each of their keys; the schema that ``klack schema --kind result`` prints and the page of the
@@ -56,7 +56,7 @@ if TYPE_CHECKING:  # made from the catalogues of measures
 
 else:
     DeviationJson = json_type(
-        "DeviationJson", "How far one result is from another one.", DEVIATION_MEASURES
+        "DeviationJson", "Deviation of one result from another.", DEVIATION_MEASURES
     )
     LevelJson = json_type(
         "LevelJson",
@@ -84,7 +84,8 @@ class ContactJson(TypedDict):
     size_over_half_width: Annotated[Real, Field(description="Good up to 1, doubtful above 1.5.")]
     points_across: Annotated[int | None, Field(description="Too few below 5.")]
     doubts: Annotated[
-        list[str], Field(description="Why no error of impacts there can be judged; empty if none.")
+        list[str],
+        Field(description="Reasons why no error of impacts there can be estimated; empty if none."),
     ]
 
 
@@ -143,7 +144,7 @@ class ReductionJson(TypedDict):
 
 
 class PassageJson(TypedDict):
-    """One way between two stops; null for what the run does not reach."""
+    """One passage between two stops; null for what the run does not reach."""
 
     at_10_percent_s: Annotated[Real, Field(description="Of the lift.")]
     at_50_percent_s: Real
@@ -155,9 +156,9 @@ class PassageJson(TypedDict):
 class TimesJson(TypedDict):
     """Opening and closing of one body."""
 
-    starts: Annotated[str, Field(description="closed or open: which way comes first.")]
+    starts: Annotated[str, Field(description="closed or open: opening or closing comes first.")]
     lift_m: Real
-    lift_between_stops: Annotated[bool, Field(description="False: largest less smallest lift.")]
+    lift_between_stops: Annotated[bool, Field(description="False: largest minus smallest lift.")]
     opening: PassageJson
     closing: PassageJson
 
@@ -172,20 +173,18 @@ class StartJson(TypedDict):
     ]
     mass_flow_kg_s: Annotated[dict[str, float], Field(description="By restriction.")]
     residual_force_N: Annotated[dict[str, float], Field(description="What is left, by body.")]
-    notes: Annotated[list[str], Field(description="What has no steady state.")]
+    notes: Annotated[list[str], Field(description="Quantities without a steady state.")]
 
 
 class VariantJson(TimesJson, VariantNumbersJson):
     """One variant of a stroke; opening and closing are those of the needle."""
 
     label: str
-    start: Annotated[
-        StartJson | None, Field(description="Null for a run that goes on or began free.")
-    ]
+    start: Annotated[StartJson | None, Field(description="Null for a continued or free start.")]
     failure: Annotated[str | None, Field(description="Why the run ended early.")]
     fine_record_ends_s: Annotated[
         dict[str, Real],
-        Field(description="Stops whose force in fine steps is known up to there only."),
+        Field(description="Stops whose force in fine steps ends there."),
     ]
     events: Annotated[list[EventJson], Field(description="Impacts in the order of time.")]
     bodies: Annotated[
@@ -238,7 +237,7 @@ class ShotsJson(TypedDict):
     wall_time_s: Real
     shot_time_s: Real
     workers: int
-    resumed: Annotated[int, Field(description="Shots taken over from an interrupted run.")]
+    resumed: Annotated[int, Field(description="Shots resumed from an interrupted run.")]
 
 
 class BandJson(TypedDict):
@@ -269,7 +268,7 @@ class BodyNoiseJson(TypedDict):
 
 
 class ClickJson(TypedDict):
-    """What is heard of one click; null where nothing radiates."""
+    """Sound of one click; null where nothing radiates."""
 
     loudness_max_sone: Real
     loudness_level_phon: Real
@@ -369,7 +368,7 @@ class HighestStrokeJson(TypedDict):
 
 
 class ComparedVariantJson(TypedDict):
-    """A variant beside its recording."""
+    """A variant compared with its recording."""
 
     agreement: Literal["excellent", "fair", "none", "unknown"]
     verdict: str
@@ -607,7 +606,7 @@ MEASURES: dict[str, tuple[Measure[Any], ...]] = {
 
 
 def measures_catalogue() -> dict[str, Any]:
-    """What every measure is: key, name, symbol, unit, definition and source, versioned."""
+    """Description of every measure: key, name, symbol, unit, definition and source, versioned."""
     return {
         "schema": "klack-measures/1",
         **{of: described(measures) for of, measures in MEASURES.items()},

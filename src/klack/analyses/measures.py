@@ -50,7 +50,7 @@ _KINDS: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": bool
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """How a measure is printed in a column of a terminal.
+    """Column of a terminal table with a measure.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Measure(Generic[Of]):
         return f"{scaled:{self.column.form}}{self.remark(of)}"
 
     def told(self, of: Of) -> str:
-        """Value with its unit, as a sentence on a terminal says it."""
+        """Value with its unit, for a sentence on a terminal."""
         value = self.read(of)
         if self.column is None or value is None or not isfinite(value):
             return self.absent
@@ -197,7 +197,7 @@ def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
 
 
 def number_or_none(value: float) -> float | None:
-    """A number as JSON takes it, which knows no nan and no infinity."""
+    """Number for JSON, which has no nan and no infinity."""
     return float(value) if isfinite(value) else None
 
 
@@ -221,7 +221,7 @@ def json_type(
 
 
 def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
-    """What each measure is, in plain words, for schema and reference."""
+    """Description of each measure, for schema and reference."""
     return [
         {
             "key": item.json_key,

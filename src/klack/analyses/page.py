@@ -1,4 +1,4 @@
-"""The page of a record: what every report says in the same way."""
+"""Page of a record: the common parts of every report."""
 
 from collections.abc import Iterable, Mapping
 from datetime import datetime

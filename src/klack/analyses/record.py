@@ -1,4 +1,4 @@
-"""What every record begins with: what was computed, by which version, when, and how long it took.
+"""Head of every record: what was computed, by which version, when, and how long it took.
 
 A record is what an analysis leaves behind.  Its fields are stored under their own names
 (:mod:`klack.analyses.store`).
@@ -74,7 +74,7 @@ class CaseRecord(Record):
 
 
 class AnyRecord(Protocol):
-    """What can be read of every record, be it of one case or of several."""
+    """Common part of every record, of one case or of several."""
 
     @property
     def case(self) -> str:
@@ -118,7 +118,7 @@ class AnyRecord(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know about the numbers."""
+        """Warnings about the results."""
 
 
 class RunFields(TypedDict):
@@ -166,7 +166,7 @@ def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
 
 
 def case_fields(case: _Case | CaseRecord, case_text: str | None = None) -> CaseFields:
-    """Name, words and text of a case, or of the record that an analysis begins with."""
+    """Name, title and text of a case, or of the record that an analysis starts from."""
     if isinstance(case, CaseRecord):
         name, text = case.case, case.case_text
     else:

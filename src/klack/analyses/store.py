@@ -38,7 +38,7 @@ _LARGEST = 4_000_000_000  # bytes; the largest results have some 100 MB
 
 @dataclass(frozen=True, kw_only=True)
 class RecordFormat:
-    """How one kind of record is stored.
+    """Storage format of one kind of record.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
 
 
 def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
-    """What is read from the store of a folder; again, where it was replaced meanwhile."""
+    """Content of the store of a folder; read again if it was replaced meanwhile."""
     for _ in range(_TRIES):
         place = _find(folder)
         try:
@@ -111,7 +111,7 @@ def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
         else:
             if _find(folder) == place:
                 return found
-    raise _damaged(folder, "a result that is written again and again while it is read")
+    raise _damaged(folder, "a result that keeps changing while it is read")
 
 
 def _load(path: Path, form: RecordFormat) -> Any:
@@ -129,7 +129,7 @@ def _load(path: Path, form: RecordFormat) -> Any:
             f"result {path}",
             got=f"format version {version}",
             expected=f"version {form.version}",
-            hint="read it with the klack that wrote it, or run the case again.",
+            hint="read it with the version of klack that wrote it, or run the case again.",
         )
     try:
         _require_size(root)
@@ -160,7 +160,7 @@ def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
 
 
 def _require_plain_files(path: Path) -> None:
-    """Refuse links, which lead out of the store, and pipes, which wait for ever."""
+    """Reject links, which lead out of the store, and pipes, which block."""
     for place, folders, files in os.walk(path):
         for name in (*folders, *files):
             try:
@@ -259,7 +259,7 @@ def _has_arrays(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """JSON has no infinity: such numbers travel as words."""
+    """JSON has no infinity: such numbers are stored as text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(member) for key, member in value.items()}
     if isinstance(value, tuple | list):
@@ -289,7 +289,7 @@ def _words_checksum(values: Mapping[str, Any], order: list[str]) -> int:
 
 
 def _require_size(root: zarr.Group) -> None:
-    """Look at all sizes before memory is asked for: a lost or packed chunk may stand for a lot."""
+    """Check all sizes before allocating memory: a lost or packed chunk may be large."""
     total = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # zarr's, about parts that are lost: reading says it better

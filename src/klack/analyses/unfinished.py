@@ -1,4 +1,4 @@
-"""Finished parts of long work on disk while others still run, so that interrupted work goes on.
+"""Finished parts of long work on disk, so that interrupted work can be resumed.
 
 A text file: the first line says what is computed, each further one holds one part as JSON.  It is
 only read by the same klack for the same work; otherwise it starts anew.  A line that was cut off by
@@ -30,7 +30,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True, kw_only=True)
 class LogForm(Generic[Key, Part]):
-    """How the parts of one kind of work are kept.
+    """Storage form of the parts of one kind of work.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class LogForm(Generic[Key, Part]):
     read: Callable[[bytes], tuple[Key, Part] | None] = field(repr=False)
 
     def count(self, folder: Path) -> int:
-        """How many finished parts the file in a folder holds."""
+        """Number of finished parts in the file of a folder."""
         try:
             handle = open_own_file(folder / self.file, os.O_RDONLY)
         except (OSError, InputError):
@@ -115,7 +115,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             raise
 
     def close(self) -> None:
-        """Let other processes have the file."""
+        """Release the file for other processes."""
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -150,9 +150,9 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
                 os.close(handle)
                 raise InputError(
                     str(path),
-                    got="a file that another klack writes to",
-                    expected="one process at a time for one work",
-                    hint="wait for it, or give this one another folder with --out.",
+                    got="a file in use by another process of klack",
+                    expected="one process at a time",
+                    hint="wait for it, or choose another folder with --out.",
                 )
             try:
                 if os.path.samestat(path.lstat(), os.fstat(handle)):
@@ -177,8 +177,8 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             str(path),
             got=f"a file that cannot be written ({error.strerror or error})",
             expected=f"a place for {self.form.parts}",
-            hint="check the folder given to --out and the space that is left; the same command "
-            "goes on from what is there.",
+            hint="check the folder given to --out and the free space; the "
+            "same command resumes from there.",
         )
 
 

@@ -38,7 +38,7 @@ _shared: list[Any] = []
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Error in a form that travels between processes: where, got, expected, hint; or its words."""
+    """Error in a form for other processes: where, got, expected, hint; or its text."""
 
     kind: str
     parts: tuple[str, ...]
@@ -119,7 +119,7 @@ class WorkerPool(Closing):
         self._is_busy = False
 
     def _staff(self, count: int) -> None:
-        """Have so many processes, all of them with what is shared."""
+        """Keep the given number of processes, all with the shared data."""
         # a fork would inherit the threads and locks of the libraries
         context = multiprocessing.get_context("spawn")
         new = []
@@ -157,7 +157,7 @@ class WorkerPool(Closing):
 
 
 def shared() -> Any:
-    """What the :class:`WorkerPool` was given, inside of a worker."""
+    """Shared data of the :class:`WorkerPool`, inside a worker."""
     return _shared[0]
 
 
@@ -204,7 +204,7 @@ def _ready(running: Iterable[Connection]) -> list[Connection]:
 
 
 def _work(connection: Connection, start: Callable[[object], None]) -> None:
-    """What a worker does, until it is not wanted any more."""
+    """Loop of a worker until it is stopped."""
     with suppress(EOFError, OSError):  # the process that asked has closed its end
         start(connection.recv())
         while True:
@@ -221,7 +221,7 @@ def _attempt(compute: Callable[[Item], Result], item: Item) -> tuple[Result | No
 
 
 def _end_with_parent() -> None:
-    """End this worker when the process that asked is gone; killed, it could not say so."""
+    """End this worker when its parent process is gone."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -42,13 +42,13 @@ class AssembledBody:
     notes: tuple[str, ...]
 
     def rows(self) -> tuple[tuple[str, str, str], ...]:
-        """Lines for a table: what, its name, its value in words."""
+        """Lines for a table: kind, name, value as text."""
         lines = [("matrices", what, value) for what, value in self.report.rows]
         return (*lines, *(("matrices", "note", note) for note in self.notes))
 
 
 def assembled_from_matrices(case: CaseFile, name: str, mesh: Mesh | None) -> ElasticBody:
-    """Make a body of its matrices; see :func:`assembled_body`.
+    """Make a body from its matrices; see :func:`assembled_body`.
 
     Warns
     -----
@@ -59,8 +59,8 @@ def assembled_from_matrices(case: CaseFile, name: str, mesh: Mesh | None) -> Ela
     if made.report.strain > _ROUNDED:
         warnings.warn(
             f"the matrices of '{name}' are rounded: a rigid motion causes {made.report.strain:.1g} "
-            "of the forces that should cancel. Try: write them with more digits, in binary form or "
-            "in double precision.",
+            "of the forces that should cancel. Try: write them with more digits, in binary "
+            "form or in double precision.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -157,9 +157,9 @@ def _drawn(given: CaseBody, where: str) -> tuple[Mesh, NDArray[np.int64]]:
         return node_mesh(geometry.nodes, geometry.dimension, nodes)
     raise InputError(
         where,
-        got="matrices for a shape that klack meshes",
-        expected="geometry.mesh or geometry.nodes of the program that made them",
-        hint="give the mesh file that the matrices belong to.",
+        got="matrices with a shape that klack meshes",
+        expected="geometry.mesh or geometry.nodes of the program that wrote them",
+        hint="give the mesh file of these matrices.",
     )
 
 
@@ -178,7 +178,7 @@ def _turned(
     M: csr_array,
     absent: NDArray[np.int64],
 ) -> tuple[csr_array, csr_array]:
-    """Turn the matrices with a body that the case leans: u' = T u, K' = T K T^T."""
+    """Rotate the matrices with a body tilted by the case: u' = T u, K' = T K T^T."""
     if mesh.points.shape != drawn.points.shape:
         raise InputError(
             where,
@@ -198,8 +198,8 @@ def _turned(
     if len(absent):
         raise InputError(
             where,
-            got="a body that is held by its program and leans in the case",
-            expected="a free body to lean",
+            got="a tilted body whose matrices are constrained",
+            expected="a free body",
             hint="write its matrices without boundary conditions.",
         )
     T = csr_array(block_diag([turn] * mesh.node_count, format="csr"))

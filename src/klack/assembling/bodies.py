@@ -199,7 +199,7 @@ def _require_dimension(file: Path, mesh: Mesh, dimension: int) -> None:
             str(file),
             got=f"{kind[mesh.dimension]} elements",
             expected=f"{kind[dimension]} elements",
-            hint="say 'model: axisymmetric' in the geometry of a mesh of the half section.",
+            hint="add 'model: axisymmetric' to the geometry of a half-section mesh.",
         )
 
 
@@ -236,7 +236,7 @@ def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surfac
 def _pose(
     case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
 ) -> Pose:
-    """Lean the upper body, shift it off the axis, and move it along z to the gap of the case."""
+    """Tilt the upper body, shift it sideways, and move it along z to the gap of the case."""
     placement = case.motion.placement
     about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
     if not placement.is_centred:
@@ -295,8 +295,8 @@ def _check_refinement(
         away = min(float(np.linalg.norm(np.subtract(first, ring))) for ring in rings)
         if away > _SAFE_SHARE * extent:
             warnings.warn(
-                f"'{name}' touches first {format_si(away, 'm', 2)} away from where its mesh is "
-                f"finest; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
+                f"'{name}' touches first {format_si(away, 'm', 2)} away from its finest "
+                f"mesh; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
                 f"{format_si(1.2 * away / _SAFE_SHARE, 'm', 2)} in bodies.{name}.mesh.contact, or "
                 "a smaller placement.",
                 AccuracyWarning,

@@ -1,4 +1,4 @@
-"""One body in numbers and words, for tables."""
+"""Summary of one body, for tables."""
 
 from dataclasses import dataclass
 
@@ -47,7 +47,7 @@ class BodySummary:
 def summarise_body(
     case: CaseFile, body: ElasticBody, reduced: ReducedBody, *, compliance_share: float
 ) -> BodySummary:
-    """Put a body into numbers and words; the share is that of the kept modes at its contact."""
+    """Summary of a body; the share is that of the kept modes at its contact."""
     given = case.bodies[body.name]
     geometry = given.geometry
     if geometry.mesh is not None:

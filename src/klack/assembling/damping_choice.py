@@ -1,4 +1,4 @@
-"""How a case damps a body."""
+"""Damping of a body in a case."""
 
 from klack.case.bodies import BodyDamping
 from klack.case.schema import Case
@@ -8,7 +8,7 @@ __all__ = ["damping_of", "is_damped"]
 
 
 def damping_of(damping: BodyDamping) -> Damping:
-    """Damping model that a case asks for."""
+    """Damping model of a case."""
     if damping.modal is not None:
         return ModalDamping(ratio=damping.modal)
     if damping.rayleigh is not None:
@@ -17,5 +17,5 @@ def damping_of(damping: BodyDamping) -> Damping:
 
 
 def is_damped(case: Case, name: str) -> bool:
-    """Tell whether a case gives a body any damping."""
+    """Whether a case gives a body any damping."""
     return bool(damping_of(case.bodies[name].damping).ratios([1.0])[0] > 0.0)

@@ -228,7 +228,7 @@ def _fitted(
             if value is None:
                 warnings.warn(
                     f"{held.path.name} has no response of '{held.labels[a]}' to "
-                    f"'{held.labels[b]}': what its modes miss is left out. Try: export the "
+                    f"'{held.labels[b]}': its residual compliance is left out. Try: export the "
                     "responses (dataset 58) between all nodes of the ports.",
                     AccuracyWarning,
                     stacklevel=2,
@@ -257,7 +257,7 @@ def _weights(model: ReducedModel, port: ModelPort, held: FileModalData) -> NDArr
         raise InputError(
             f"{model.file}: port",
             got=f"the force at '{port.input}' and the displacement at '{port.output}'",
-            expected="one place: else the model is not reciprocal",
+            expected="one point: else the model is not reciprocal",
             hint="leave out 'output'.",
         )
     weights = np.zeros(len(held.labels))
@@ -305,7 +305,7 @@ def _index(
             f"{model.file}: {side}",
             got=f"number {number}",
             expected=f"1 to {count}",
-            hint="forces and displacements are counted from 1.",
+            hint="forces and displacements are numbered from 1.",
         )
     if place in names:
         return list(names).index(place)

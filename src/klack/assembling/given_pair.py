@@ -31,7 +31,7 @@ __all__ = ["GivenPair", "build_given_pair"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GivenPair:
-    """Both bodies reduced at their ports, the law between them, and the compliance beside it.
+    """Both bodies reduced at their ports, the law between them, and their residual compliance.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def build_given_pair(case: Case, progress: Progress, *, threads: int | None = No
     Raises
     ------
     InputError
-        For files that cannot be used, and a moving body that is held.
+        For files that cannot be used, and a supported moving body.
     """
     sides, missing = [], 0.0
     for i, surface in enumerate(case.contact.between):
@@ -92,7 +92,7 @@ def build_given_pair(case: Case, progress: Progress, *, threads: int | None = No
     if upper.rigid_count == 0:
         raise InputError(
             f"{case.path or 'case'}: bodies.{upper.name}",
-            got="a moving body without rigid motion: it is held",
+            got="a moving body without rigid motion: it is supported",
             expected="a free body",
             hint="export it without supports, or swap the two in contact.between.",
         )
@@ -160,12 +160,12 @@ def _elastic(case: Case, surface: SurfaceName) -> tuple[ElasticBody, Port]:
 
 
 def _note_missing(given: CaseBody, reduced: ReducedBody) -> None:
-    """Say that nothing stands for the modes left out; boundary coordinates need no such thing."""
+    """Note a missing residual compliance; boundary coordinates need none."""
     kind = given.reduced.kind if given.reduced is not None else ""
     if kind in ("state-space", "modal") and reduced.correction == "none":
         warnings.warn(
-            f"the model of '{reduced.name}' has no compliance beside its modes: what they miss has "
-            "to be in the local law, or the contact is too stiff. Try: export D, or the responses "
+            f"the model of '{reduced.name}' has no residual compliance: it has to "
+            "be in the local law, or the contact is too stiff. Try: export D, or the responses "
             "(dataset 58) of the port.",
             AccuracyWarning,
             stacklevel=2,

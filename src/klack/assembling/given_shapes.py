@@ -65,7 +65,7 @@ def require_given_shapes(case: CaseFile, read: Callable[[str], Mesh]) -> None:
 
 
 def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
-    """Ask about bodies whose size looks like another unit of length.
+    """Require confirmation of sizes that suggest another unit of length.
 
     Parameters
     ----------
@@ -97,9 +97,9 @@ def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
         raise _question(case, name, largest, "a largest body of 0.1 mm to 1 m")
     if largest > _MOST_APART * smallest:
         far = other if other in asked else name
-        expected = f"bodies of like size ('{name}' has {format_si(largest, 'm')})"
+        expected = f"bodies of similar size ('{name}' has {format_si(largest, 'm')})"
         if far == name:
-            expected = f"bodies of like size ('{other}' has {format_si(smallest, 'm')})"
+            expected = f"bodies of similar size ('{other}' has {format_si(smallest, 'm')})"
         raise _question(case, far, extents[far], expected)
 
 

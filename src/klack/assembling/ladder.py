@@ -45,7 +45,7 @@ def closing_force(case: Case) -> float:
 
 
 def impact_energy(case: Case, pair: BodyPair) -> float:
-    """Bound of the energy at first touch [J]: kinetic, and work of closing forces on the way."""
+    """Bound of the energy at first touch [J]: kinetic energy and work of closing forces."""
     kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
     gap, spring = case.contact.gap or 0.0, case.motion.spring
     stored = 0.5 * spring.stiffness * gap**2 if spring else 0.0
@@ -72,7 +72,7 @@ def static_ladder(
     energy : float [J]
         That the contact must be able to store.
     closing : float [N]
-        Force that goes on working while the bodies approach.
+        Force that keeps working while the bodies approach.
     reach : float or None [m]
         Largest gap of candidate points; found when None.
     progress : callable
@@ -125,7 +125,7 @@ def _ladder(
 ) -> StaticContact:
     """Static contact up to a force above that of a quasi-static impact of this energy.
 
-    The closing force goes on working while the bodies approach: the turning point is where the
+    The closing force keeps working while the bodies approach: the turning point is where the
     stored energy has reached ``energy + closing * approach``.
     """
     refused: ReachError | None = None

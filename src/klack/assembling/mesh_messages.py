@@ -1,4 +1,4 @@
-"""What a mesher refuses, in the words of the case: which key, and which size would do."""
+"""Errors of the mesh generator in terms of the case: the key, and a size that works."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Which elastic modes a case asks for, and which bodies keep."""
+"""Elastic modes selected by a case, and kept by its bodies."""
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +32,7 @@ _PARTICIPATING = (8, 20)  # of the upper and of the lower body
 
 
 def selection_of(choice: ModeChoice) -> ModeSelection:
-    """Selection of modes that a case asks for."""
+    """Selection of modes in a case."""
     if choice.count is not None:
         return ByCount(choice.count)
     if choice.frequency is not None:

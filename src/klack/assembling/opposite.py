@@ -1,4 +1,4 @@
-"""The stop above the moving body: meshed, placed, and its contact points chosen."""
+"""The upper stop: meshed, placed, and its contact points chosen."""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ class OppositeStop(Closing):
     Parameters
     ----------
     body : ElasticBody
-        The stop above, placed so that the case's gap is free.
+        The upper stop, placed at the gap of the case.
     surface, moving_surface : Surface
         Of the stop and of the moving body.
     flexibility : Flexibility
@@ -55,7 +55,7 @@ def build_opposite(
     *,
     threads: int | None = None,
 ) -> OppositeStop | None:
-    """Mesh the stop above, bring it to its place, and solve its static contact.
+    """Mesh the upper stop, place it, and solve its static contact.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def build_opposite(
     asked = case.opposite
     if asked is None:
         return None
-    progress("stop above", 0.0)
+    progress("upper stop", 0.0)
     name = asked.stop.body
     touch = find_touch(case.bodies, asked.stop, asked.moving)
     mesh = mesh_body(case.bodies[name], name, touch.upper if touch else ())
@@ -90,7 +90,7 @@ def build_opposite(
         lower_surface=moving_surface,
         pose=Pose.along_z(shift),
     )
-    progress("stop above", 0.5)
+    progress("upper stop", 0.5)
     # nothing gathers more energy than the first impact may have, whatever drives it up there
     static = static_ladder(
         contact,
@@ -101,7 +101,7 @@ def build_opposite(
         reach=asked.reach,
         progress=progress,
     )
-    progress("stop above", 1.0)
+    progress("upper stop", 1.0)
     return OppositeStop(
         body=_raised(body, asked.gap),
         surface=surface,

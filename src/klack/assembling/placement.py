@@ -1,4 +1,4 @@
-"""Where two bodies first touch when the upper one moves down the axis, and how far it is away.
+"""First touch of two bodies when the upper one moves down the axis, and its distance.
 
 Both surfaces are sampled as heights over the plane normal to the axis; the clearance along the
 axis is least where they touch.

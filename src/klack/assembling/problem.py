@@ -1,4 +1,4 @@
-"""The contact problem of a case: what every level needs and none should compute twice."""
+"""Contact problem of a case, computed once for all levels."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class ContactProblem:
     static : StaticContact
         Ladder of static contact states beyond the highest force of the impact.
     opposite : OppositeStop or None
-        Stop above the moving body.
+        Upper stop.
     """
 
     case: Case
@@ -46,14 +46,14 @@ class ContactProblem:
     opposite: OppositeStop | None = None
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
-        """Contact points of the same surfaces that reach twice as far.
+        """Contact points of the same surfaces with twice the reach.
 
         Parameters
         ----------
         space : ContactSpace
             Those that did not reach far enough.
         error : ReachError
-            Raised again where the case gives the reach, or has a stop above.
+            Raised again where the case gives the reach, or has an upper stop.
         """
         if self.case.contact.reach is not None or self.opposite is not None:
             raise error

@@ -1,4 +1,4 @@
-"""Both bodies reduced for one contact, and the local law that goes with them."""
+"""Both bodies reduced for one contact, with their local law."""
 
 import warnings
 from collections.abc import Mapping
@@ -58,7 +58,7 @@ _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedPair:
-    """Both bodies reduced for one contact, and the local law that goes with them.
+    """Both bodies reduced for one contact, with their local law.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def own_pair(
     stiffness: float,
     recovery: bool = False,
 ) -> ReducedPair:
-    """Reduce both bodies as the case asks for; see :func:`reduce_pair`.
+    """Reduce both bodies as in the case; see :func:`reduce_pair`.
 
     Warns
     -----
@@ -137,9 +137,9 @@ def own_pair(
     if selection != asked:
         counts = [f"{elastic_count(b)} of '{b.name}'" for b in (pair.upper, pair.lower)]
         warnings.warn(
-            f"contact: only {' and '.join(counts)} of the modes asked for are kept: more of them "
-            "would carry more than the static compliance of this contact and leave none to the "
-            "local law. The interface level keeps them all.",
+            f"contact: only {' and '.join(counts)} of the requested modes are kept: more "
+            "of them would have more than the static compliance of this contact and leave none "
+            "to the local law. The interface level keeps them all.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -147,7 +147,7 @@ def own_pair(
 
 
 def _fewer(choice: ModeSelection) -> ModeSelection:
-    """About two thirds of so many lowest modes; another choice as it is."""
+    """About two thirds of the lowest modes; other selections unchanged."""
     return ByCount(max(1, 2 * choice.count // 3)) if isinstance(choice, ByCount) else choice
 
 
@@ -250,7 +250,7 @@ def hertz_coefficient(case: Case, law: HertzLocalLaw) -> float:
                 f"{case.path or 'case'}: contact.local_law",
                 got=f"a Hertz law on body '{name}' of several materials",
                 expected="bodies of one material",
-                hint="take the consistent law, which needs no such choice.",
+                hint="use the consistent law, which needs no such choice.",
             )
         inverse += 1.0 / case.materials_of(name, [name])[name].plane_strain_modulus
     return 4.0 / 3.0 / inverse * float(np.sqrt(law.radius))

@@ -1,4 +1,4 @@
-"""Which bodies of a case sound: their structures, made while modes and statics are at hand."""
+"""Structures of the radiating bodies of a case, built while modes and statics are available."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -130,7 +130,7 @@ def _check_held(surfaces: Iterable[SurfaceName], held: Sequence[str]) -> None:
                 "noise.surfaces",
                 got=f"'{surface}'",
                 expected=f"surfaces of held bodies ({one_of(held) or 'the case has none'})",
-                hint="a body that moves freely, such as a needle, radiates into the fluid.",
+                hint="a free body, such as a needle, radiates into the fluid.",
             )
 
 

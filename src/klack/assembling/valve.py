@@ -186,7 +186,7 @@ def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
             f"bodies.{body}.ports.{point}",
             got=f"a pressure whose resultant is {abs(axial):.3g} N along z for 1 N in all",
             expected="a resultant along the axis",
-            hint="name a surface all round the axis, or take load: axial.",
+            hint="name a surface all round the axis, or use load: axial.",
         )
     return Port(point, np.sign(axial) * port.pattern)
 

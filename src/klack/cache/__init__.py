@@ -1,1 +1,1 @@
-"""Results that took long, kept on disk under a key of everything that they depend on."""
+"""Expensive results, cached on disk under a key of everything that they depend on."""

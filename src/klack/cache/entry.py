@@ -41,7 +41,7 @@ _PREFIX = len(_MAGIC) + 32 + 8
 
 
 class DamagedEntry(Exception):
-    """What is in the file is not what was written for this key."""
+    """The content of the file is not what was written for this key."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +111,7 @@ def read_entry(path: Path, key: str) -> Entry:
 
 
 def _open_trusted(path: Path) -> int:
-    """Handle of a file that the caller or the administrator has written, and nobody else can."""
+    """Handle of a file that only the caller or the administrator can write."""
     handle = os.open(path, os.O_RDONLY | SAFELY)
     state = os.fstat(handle)
     trusted = caller() is None or state.st_uid in (caller(), 0)

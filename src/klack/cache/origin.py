@@ -1,4 +1,4 @@
-"""What besides the input decides the last bit of a result: programs, and the processor."""
+"""Influences on the last bit of a result besides the input: programs and processor."""
 
 import hashlib
 import os

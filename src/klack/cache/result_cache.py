@@ -25,7 +25,7 @@ _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CacheContent:
-    """What a folder holds: number of entries, and their size [byte], unfinished files included."""
+    """Content of a folder: number of entries, and their size [byte], unfinished files included."""
 
     count: int
     size: int
@@ -94,7 +94,7 @@ class ResultCache:
         return CacheContent(count=count, size=sum(size for _, size, _ in files))
 
     def clear(self) -> CacheContent:
-        """Delete all entries; says what was deleted.
+        """Delete all entries, and return what was deleted.
 
         Raises
         ------
@@ -164,7 +164,7 @@ class ResultCache:
             first, self._writable = self._writable, False
         if first:
             warnings.warn(
-                f"results are not kept for later: {error.strerror or error} ({self.folder}). Try: "
+                f"results are not cached: {error.strerror or error} ({self.folder}). Try: "
                 "'klack cache --clear', or KLACK_CACHE with another folder, or 'off'.",
                 CacheWarning,
                 stacklevel=3,

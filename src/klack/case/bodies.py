@@ -131,7 +131,7 @@ class CaseBody(Section):
                     (key,) if isinstance(key, str) else (),
                     got=f"'{name}'",
                     expected="the name of a material, or a mapping solid: material",
-                    hint="the properties belong into 'materials'; give their name here.",
+                    hint="define the properties in 'materials' and give the name here.",
                 )
         return dict(value) if isinstance(value, Mapping) else value
 
@@ -141,7 +141,7 @@ class CaseBody(Section):
             self._refuse_with(
                 ("material", "mesh", "matrices", "fixed"),
                 "a reduced model",
-                "it holds mass, stiffness and supports already",
+                "it already includes mass, stiffness and supports",
             )
             if not self.geometry.is_absent:
                 self._refuse_with(("geometry",), "a reduced model", "it has no shape")
@@ -151,16 +151,16 @@ class CaseBody(Section):
                 (),
                 got="no key 'geometry'",
                 expected="geometry: Shape: profile, step, mesh or nodes",
-                hint="add 'geometry' here, or 'reduced' for a model that is reduced already.",
+                hint="add 'geometry' here, or 'reduced' for a reduced model.",
             )
         if self.matrices is not None:
-            self._refuse_with(("material",), "matrices", "they hold the material already")
+            self._refuse_with(("material",), "matrices", "they already include the material")
             if self.geometry.mesh is None and self.geometry.nodes is None:
                 raise CaseProblem(
                     ("matrices",),
-                    got="matrices for a shape that klack meshes",
-                    expected="geometry.mesh or geometry.nodes of the program that made them",
-                    hint="give the mesh file that the matrices belong to.",
+                    got="matrices with a shape that klack meshes",
+                    expected="geometry.mesh or geometry.nodes of the program that wrote them",
+                    hint="give the mesh file of these matrices.",
                 )
         elif self.geometry.nodes is not None:
             hint = "add matrices: {stiffness: ..., mass: ..., units: ...}."
@@ -185,7 +185,7 @@ class CaseBody(Section):
                         ("fixed", i, "sectors"),
                         got="sectors on an axisymmetric body",
                         expected="a support all round",
-                        hint="remove 'sectors', or take 'model: swept' with 'layers: 18'.",
+                        hint="remove 'sectors', or use 'model: swept' with 'layers: 18'.",
                         on_key=True,
                     )
         return self
@@ -199,13 +199,13 @@ class CaseBody(Section):
 class ModeChoice(Section):
     """Which elastic modes a body keeps: exactly one of count, frequency and participation."""
 
-    count: Count | None = Field(default=None, description="The so many lowest elastic modes.")
+    count: Count | None = Field(default=None, description="Number of lowest elastic modes.")
     frequency: Frequency | None = Field(
         default=None, gt=0, description="All elastic modes up to here."
     )
     participation: Count | None = Field(
         default=None,
-        description="The so many modes of a pool with the largest share of compliance.",
+        description="Number of modes of a pool with the largest share of compliance.",
     )
     pool: Count | None = Field(
         default=None, description="Modes to choose from, with participation."
@@ -234,18 +234,18 @@ class ModeChoice(Section):
                 ("pool",) if self.pool is not None else (),
                 got=f"a pool of {self.pool or 'no'} modes for {self.participation}",
                 expected=f"pool: {self.participation} or more",
-                hint="pool: 100 finds what matters in most bodies.",
+                hint="pool: 100 is enough for most bodies.",
             )
         return self
 
 
 class Reduction(Section):
-    """How the bodies are reduced."""
+    """Reduction of the bodies."""
 
     correction: Literal["consistent", "attachment", "none"] = Field(
         default="consistent",
-        description="What makes up for the modes left out. consistent: the local law carries their "
-        "compliance; attachment: attachment modes, as usual; none: nothing, for comparison.",
+        description="Correction for the omitted modes. consistent: the local law carries "
+        "their compliance; attachment: attachment modes, as usual; none: nothing, for comparison.",
     )
     modes: Mapping[Name, ModeChoice] = Field(
         default_factory=dict, description="Kept modes of each body; 40 where none is given."
@@ -257,12 +257,12 @@ class Reduction(Section):
 
 
 class CaseFile(Section):
-    """What every case has: a title, materials, elastic bodies, and the file that it came from."""
+    """Common part of every case: title, materials, elastic bodies, and its file."""
 
     klack: Literal[1] = Field(description="Format version of the file: 1.")
     title: Text = Field(min_length=1, description="One line.")
     description: Text = Field(
-        default="", description="What it shows and where the numbers come from."
+        default="", description="What the case shows, and the source of its numbers."
     )
     materials: Mapping[Name, CaseMaterial] = Field(
         default_factory=dict, description="name: properties."
@@ -285,7 +285,7 @@ class CaseFile(Section):
                 (),
                 got=f"the format version {version}",
                 expected="1",
-                hint="this klack reads version 1; a later klack may know others.",
+                hint="this version of klack reads version 1; a later one may read others.",
             )
         return version
 
@@ -325,9 +325,9 @@ class CaseFile(Section):
         if chosen is None:
             raise InputError(
                 f"{self._path or 'case'}: bodies.{body}",
-                got="a body that is given by its matrices or as a reduced model",
+                got="a body given by its matrices or as a reduced model",
                 expected="a body with a material",
-                hint="take a law that needs no material, e.g. {kind: linear, stiffness: 1e9 N/m}.",
+                hint="use a law that needs no material, e.g. {kind: linear, stiffness: 1e9 N/m}.",
             )
         result = {}
         for solid in solids:

@@ -1,4 +1,4 @@
-"""What ``klack calibrate`` fits to measured strokes: keys of the case, within bounds."""
+"""Parameters that ``klack calibrate`` fits to measured strokes: keys of the case, within bounds."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -11,7 +11,7 @@ __all__ = ["CalibrationParameter", "CaseCalibration"]
 
 
 class CalibrationParameter(Section):
-    """One number to find, and the keys of the case that it stands in.
+    """One fitted number, and its keys in the case.
 
     Its value in the case is where the search begins.
     """
@@ -19,7 +19,7 @@ class CalibrationParameter(Section):
     key: tuple[Text, ...] = Field(
         min_length=1,
         description="Path of the key in the case, e.g. network.components.spring.preload; a list "
-        "of paths gets the same value.",
+        "of paths gets one value.",
     )
     lower: Text | Number = Field(description="Lower bound, with the unit of the key.")
     upper: Text | Number = Field(description="Upper bound.")
@@ -34,14 +34,14 @@ class CaseCalibration(Section):
     """Parameters that are fitted to measured strokes."""
 
     variant: Literal["wet", "dry"] = Field(
-        default="wet", description="What was measured: the valve with its fluid, or dry."
+        default="wet", description="Measured valve: with its fluid, or dry."
     )
     parameters: Mapping[Name, CalibrationParameter] = Field(
-        min_length=1, description="name: the key of the case that is fitted, and its bounds."
+        min_length=1, description="name: the fitted key of the case, and its bounds."
     )
     profile: tuple[Name, ...] = Field(
         default=(),
-        description="Parameters whose profile likelihood is followed: an interval without the "
+        description="Parameters whose profile likelihood is computed: an interval without the "
         "assumption that the model is linear.",
     )
     impacts: Count = Field(
@@ -50,5 +50,5 @@ class CaseCalibration(Section):
         description="Impacts on each stop that are fitted, with the flights before and after.",
     )
     channels: tuple[Literal["lift", "current"], ...] = Field(
-        default=("lift",), min_length=1, description="What is fitted: lift, current."
+        default=("lift",), min_length=1, description="Fitted channels: lift, current."
     )

@@ -62,7 +62,7 @@ def tree_of(text: str, path: Path, components: Iterable[type[Component]] = ()) -
 
 
 def exchanged(data: Any, key: Key, value: object) -> Any:
-    """Copy of the data with another value; all that is not on the way is shared."""
+    """Copy of the data with another value; everything off the path is shared."""
     if not key:
         return value
     head, rest = key[0], key[1:]

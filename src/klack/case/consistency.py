@@ -61,12 +61,12 @@ def _check_bodies(case: ImpactSections) -> None:
             ("bodies",),
             got=f"{len(case.bodies)} bodies ({one_of(case.bodies)})",
             expected=f"exactly {words}",
-            hint="one that moves and one that it hits; with 'opposite' also the stop above.",
+            hint="one that moves and one that it hits; with 'opposite' also the upper stop.",
         )
 
 
 def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
-    """Check that a body has the surface that ``key`` names, as far as a drawing tells."""
+    """Check that a body has the surface named by ``key``, as far as the drawing shows."""
     require_known(key, surface.body, case.bodies, "body")
     body = case.bodies[surface.body]
     if not body.has_surfaces:
@@ -155,7 +155,7 @@ def _check_local_law(case: ImpactSections) -> None:
         raise CaseProblem(
             ("contact", "local_law", "kind"),
             got=f"a {law} law with the correction 'consistent'",
-            expected="the law 'consistent': it is what carries the missing compliance",
+            expected="the law 'consistent', which carries the residual compliance",
             hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
         )
     if correction != "consistent" and law == "consistent":
@@ -163,8 +163,8 @@ def _check_local_law(case: ImpactSections) -> None:
             ("reduction", "correction"),
             got=f"the correction '{correction}' with a consistent local law",
             expected="a local law of the kind linear, hertz or submodel",
-            hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or take the correction "
-            "'consistent'.",
+            hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
+            "correction 'consistent'.",
         )
 
 
@@ -180,7 +180,7 @@ def _check_opposite(case: ImpactSections) -> None:
             ("opposite", "between"),
             got=f"{stop} and {moving}",
             expected=f"a surface of the third body, then one of '{between[0]}', which moves",
-            hint="the stop above is a body of its own.",
+            hint="the upper stop is a separate body.",
         )
     if case.bodies[stop.body].geometry.dimension != case.dimension:
         raise CaseProblem(
@@ -197,11 +197,11 @@ def _check_solid_only(case: ImpactSections) -> None:
         return
     asked: list[tuple[Key, str]] = []
     if not case.motion.placement.is_centred:
-        asked.append((("motion", "placement"), "a placement off the axis"))
+        asked.append((("motion", "placement"), "an off-axis placement"))
     if case.guide is not None:
         asked.append((("guide",), "a guide"))
     if case.shots is not None:
-        asked.append((("shots",), "shots, which differ in their placement,"))
+        asked.append((("shots",), "shots, which vary in their placement,"))
     for key, what in asked:
         raise CaseProblem(
             key,
@@ -243,7 +243,7 @@ def _check_shots(case: ImpactSections) -> None:
         raise CaseProblem(
             ("shots", "friction"),
             got="friction without a guide",
-            expected="a section 'guide': that is where the moving body rubs",
+            expected="a section 'guide', in which the moving body rubs",
             hint="add 'guide', or remove 'friction'.",
             on_key=True,
         )
@@ -254,7 +254,7 @@ def _check_shots(case: ImpactSections) -> None:
         raise CaseProblem(
             ("shots", given),
             got=f"{given} without {other}, and a guide",
-            expected="both of them, or none: the guide then says how far the body may go",
+            expected="both of them, or none: the guide then limits the placement",
             hint=f"add '{other}' (0 is possible), or remove '{given}'.",
             on_key=True,
         )
@@ -262,8 +262,8 @@ def _check_shots(case: ImpactSections) -> None:
     if case.guide is None and all(getattr(shots, name) is None for name in drawn):
         raise CaseProblem(
             ("shots",),
-            got="shots that are all the same",
+            got="identical shots",
             expected=f"a section 'guide', or at least one of: {one_of(drawn)}",
-            hint="'guide' lets the moving body stand wherever its clearance allows.",
+            hint="'guide' draws placements within its clearance.",
             on_key=True,
         )

@@ -21,7 +21,7 @@ class Matrices(Section):
         description="File of K: ANSYS .full, CalculiX .sti, Matrix Market, Harwell-Boeing, Abaqus "
         ".mtx, Nastran .op4 or .pch, MATLAB .mat, NumPy .npz."
     )
-    mass: InputPath = Field(description="File of M; the same file where one holds both.")
+    mass: InputPath = Field(description="File of M; may be the same as that of K.")
     stiffness_name: Text | None = Field(
         default=None, description="Name of K in a file of several matrices."
     )
@@ -31,7 +31,7 @@ class Matrices(Section):
     dofs: InputPath | None = Field(
         default=None,
         description="Node and direction of each row (CalculiX .dof, or a table: node, direction). "
-        "Without it: as the file says, else x, y, z of node after node.",
+        "Default: as in the file, else x, y, z node by node.",
     )
     units: UnitSystemName = Field(description="Consistent units of the matrices, e.g. mm t s.")
 
@@ -42,7 +42,7 @@ class ModelPort(Section):
     input: Count | Text = Field(description="Number (from 1) or name of the force.")
     output: Count | Text | None = Field(
         default=None,
-        description="Number or name of the displacement; that of the input without.",
+        description="Number or name of the displacement; default that of the input.",
     )
 
 
@@ -61,7 +61,7 @@ class ReducedModel(Section):
         min_length=1, description="name: its force and its displacement, positive along +z."
     )
     mass: Mass | None = Field(
-        default=None, gt=0, description="Of the body, to check a free one against."
+        default=None, gt=0, description="Mass of the body, to check a free one."
     )
 
     @model_validator(mode="after")

@@ -103,7 +103,7 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
                 (*where, "key", i),
                 got=f"{place} = {format_si(place.value, place.kind.unit)}",
                 expected=f"the same as {first} = {format_si(first.value, first.kind.unit)}",
-                hint="keys of one parameter share one value; make two parameters of them.",
+                hint="keys of one parameter share one value; make them two parameters.",
             )
     bounds = {side: _bound(places, where, side, getattr(item, side)) for side in ("lower", "upper")}
     lower, upper = bounds["lower"], bounds["upper"]
@@ -141,7 +141,7 @@ def _require_cheap(key: Key, text: str) -> None:
         expected="a key of network, of measurement.sensor, or bodies.NAME.damping",
         hint="change it in the case, and compare two calibrations."
         if meshed
-        else "fit what the valve or its sensor is made of.",
+        else "fit properties of the valve or its sensor.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Where the shape of a body comes from: a drawn outline, a STEP file, or a finished mesh."""
+"""Source of the shape of a body: a drawn outline, a STEP file, or a finished mesh."""
 
 from collections.abc import Iterator, Mapping
 from math import tau
@@ -44,10 +44,10 @@ class Edge(Section):
     clockwise: bool | None = Field(
         default=None,
         strict=True,
-        description="Sense of an arc; the shorter way if it is not given.",
+        description="Sense of an arc; default the shorter arc.",
     )
     name: Name | None = Field(
-        default=None, description="Name of the surface that the edge sweeps; edges may share one."
+        default=None, description="Name of the surface that the edge forms; edges may share one."
     )
 
     @model_validator(mode="after")
@@ -66,7 +66,7 @@ class Outline(Section):
 
     start: Point = Field(description="First corner (r, z), in the unit of the profile.")
     edges: tuple[Edge, ...] = Field(
-        min_length=2, description="Edges in turn; the last one ends at the start again."
+        min_length=2, description="Edges in order; the last one ends at the start."
     )
 
     @model_validator(mode="after")
@@ -166,7 +166,7 @@ class MeshFile(Section):
     )
     unit: LengthUnit | None = Field(
         default=None,
-        description="Unit of its coordinates, e.g. mm; needed unless the file names it.",
+        description="Unit of its coordinates, e.g. mm; required unless the file has it.",
     )
     elements: Literal["all", "solids-only"] = Field(
         default="all",
@@ -184,13 +184,13 @@ class NodeTable(Section):
     """Nodes of a body without elements: a table of numbers and coordinates, and sets of them."""
 
     file: InputPath = Field(
-        description="Table (CSV or text: node, x, y, z), or a mesh file whose nodes are taken."
+        description="Table (CSV or text: node, x, y, z), or a mesh file whose nodes are used."
     )
     unit: LengthUnit = Field(description="Unit of its coordinates, e.g. mm.")
     sets: Mapping[Name, tuple[Count, ...] | InputPath] = Field(
         default_factory=dict,
-        description="name: node numbers, or a text file of node numbers; a set is what a contact "
-        "or a support calls a surface.",
+        description="name: node numbers, or a text file of node numbers; a set is used as a "
+        "surface in a contact or support.",
     )
 
 
@@ -206,13 +206,13 @@ class Geometry(Section):
     step: StepFile | None = Field(default=None, description="CAD file.")
     mesh: MeshFile | None = Field(default=None, description="Finished mesh.")
     nodes: NodeTable | None = Field(
-        default=None, description="Nodes alone, of a body that is given by its matrices."
+        default=None, description="Nodes alone, of a body given by its matrices."
     )
     model: Model | None = Field(
         default=None,
         description="axisymmetric: the half section alone (fastest); swept: three-dimensional, the "
-        "meshed half section turned in layers; solid: three-dimensional, unstructured. Needed for "
-        "a profile; a step file is always solid, a mesh solid unless said otherwise.",
+        "meshed half section, revolved in layers; solid: three-dimensional, unstructured. Needed "
+        "for a profile; a step file is always solid, a mesh solid by default.",
     )
     layers: Count | None = Field(
         default=None, ge=6, description="Layers round the circle of a swept mesh."
@@ -220,8 +220,8 @@ class Geometry(Section):
     extent: Length | None = Field(
         default=None,
         gt=0,
-        description="Longest side of the shape, to confirm its unit of length; asked for where it "
-        "is unusual: all bodies below 0.1 mm, one above 1 m, or two that differ 100-fold.",
+        description="Longest side of the shape, to confirm its unit of length; required "
+        "where it is unusual: all bodies below 0.1 mm, one above 1 m, or two that differ 100-fold.",
     )
 
     @model_validator(mode="after")
@@ -232,7 +232,7 @@ class Geometry(Section):
                 (),
                 got="a profile without model",
                 expected="model: axisymmetric, swept or solid",
-                hint="take axisymmetric first; swept for bodies that are held in sectors.",
+                hint="start with axisymmetric; swept for bodies held in sectors.",
             )
         allowed = {
             "profile": ("axisymmetric", "swept", "solid"),
@@ -248,7 +248,7 @@ class Geometry(Section):
                 hint="a profile can be turned into any of the three models.",
             )
         if self.model == "swept" and self.layers is None:
-            hint = "take 18: contact of turned parts needs few layers."
+            hint = "use 18: contact of turned parts needs few layers."
             raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)
         if self.model != "swept":
             return self._refuse_with(("layers",), f"model {self.model}", "only swept has layers")
@@ -277,12 +277,14 @@ class ContactRefinement(Section):
         examples=["5 um"], gt=0, description="Edge length there; half the contact width or less."
     )
     extent: Length = Field(
-        examples=["50 um"], gt=0, description="Distance from the first touch up to which it holds."
+        examples=["50 um"],
+        gt=0,
+        description="Radius around the point of first touch in which it holds.",
     )
 
 
 class MeshSettings(Section):
-    """How fine klack meshes a profile or a STEP file."""
+    """Element sizes for a profile or a STEP file."""
 
     size: Length = Field(examples=["1 mm"], gt=0, description="Largest edge length anywhere.")
     grading: Number = Field(
@@ -305,7 +307,7 @@ class MeshSettings(Section):
                 ("contact", "size"),
                 got="a contact size above the general size",
                 expected=f"{format_si(self.size, 'm')} or less",
-                hint="the contact needs the smallest elements of all.",
+                hint="the contact needs the smallest elements.",
             )
         return self
 
@@ -334,5 +336,5 @@ class Support(Section):
 
     surface: Name = Field(description="Name of the surface.")
     sectors: Sectors | None = Field(
-        default=None, description="Held sectors; the whole surface without."
+        default=None, description="Held sectors; default the whole surface."
     )

@@ -40,10 +40,10 @@ def require_surfaces(case: CaseFile, name: str) -> None:
         kind = "reduced" if body.reduced is not None else "geometry"
         raise CaseProblem(
             ("bodies", name, kind),
-            got="a reduced model or nodes alone in a whole valve",
+            got="a reduced model or nodes without elements in a whole valve",
             expected="a body with meshed surfaces",
-            hint="'klack impact' takes such bodies; for a stroke give the mesh, with its matrices "
-            "if you like.",
+            hint="'klack impact' takes such bodies; for a stroke give the mesh, optionally "
+            "with its matrices.",
             on_key=True,
         )
 
@@ -64,7 +64,7 @@ def check_given(case: ImpactSections) -> None:
     if not case.motion.placement.is_centred:
         raise CaseProblem(
             ("motion", "placement"),
-            got=f"a placement off the axis with '{name}', {what}",
+            got=f"an off-axis placement with '{name}', {what}",
             expected="a centred body: a port moves along the axis alone",
             hint="remove 'placement'.",
             on_key=True,
@@ -97,8 +97,8 @@ def _check_law(case: ImpactSections, name: str, what: str) -> None:
             else ("contact",),
             got=f"the local law '{law.kind}' with '{name}', {what}",
             expected="a given law: linear or hertz",
-            hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}': the contact zone alone; the "
-            "static compliance of the bodies comes on top.",
+            hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}': the contact zone alone; "
+            "the static compliance of the bodies is added.",
         )
     if law.kind == "hertz" and law.modulus is None:
         for body, given in case.bodies.items():

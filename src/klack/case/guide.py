@@ -16,7 +16,7 @@ class ConsistentGuideLaw(Section):
 
     kind: Literal["consistent"] = Field(description="Which law: consistent.")
     bore: Stiffness | None = Field(
-        default=None, gt=0, description="Stiffness of the bore in series; rigid without."
+        default=None, gt=0, description="Stiffness of the bore in series; default rigid."
     )
 
 
@@ -33,7 +33,7 @@ GuideLaw = Annotated[ConsistentGuideLaw | LinearGuideLaw, Field(discriminator="k
 class CaseGuide(Section):
     """Radial clearance contact of the shaft at two heights or more, and axial friction there."""
 
-    surface: Name = Field(description="Surface of the moving body that the guide holds.")
+    surface: Name = Field(description="Surface of the moving body in the guide.")
     heights: tuple[Length, ...] = Field(
         min_length=2,
         max_length=16,
@@ -59,6 +59,6 @@ class CaseGuide(Section):
                     ("heights", i + 1),
                     got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
                     expected="heights that rise",
-                    hint="name each guiding edge once, the lowest first.",
+                    hint="name each guiding edge once, lowest first.",
                 )
         return self

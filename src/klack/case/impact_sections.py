@@ -70,7 +70,7 @@ _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
 
 class ConsistentLocalLaw(Section):
-    """Massless law that carries exactly the compliance that the kept modes miss."""
+    """Massless law of the residual compliance of the kept modes."""
 
     kind: Literal["consistent"] = Field(description="Which law: consistent.")
 
@@ -92,8 +92,8 @@ class HertzLocalLaw(Section):
     modulus: Modulus | None = Field(
         default=None,
         gt=0,
-        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; that of the "
-        "materials without.",
+        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; default "
+        "that of the materials.",
     )
 
 
@@ -118,7 +118,7 @@ class CaseContact(Section):
     )
     gap: Length | None = Field(
         default=None,
-        description="Distance to first touch along z at the start; without it, as drawn.",
+        description="Initial distance to first touch along z; default as drawn.",
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
@@ -133,7 +133,7 @@ class CaseContact(Section):
         if gap is not None and gap < 0:
             raise CaseProblem(
                 (),
-                got=f"a gap of {format_si(gap, 'm')}: the bodies penetrate already",
+                got=f"a gap of {format_si(gap, 'm')}: the bodies already penetrate",
                 expected="0 or more",
                 hint="give the distance to first touch; the upper body is moved there.",
             )
@@ -158,7 +158,7 @@ class Spring(Section):
 
 
 class Motion(Section):
-    """How the moving body arrives."""
+    """Approach of the moving body."""
 
     speed: Speed = Field(gt=0, description="Speed in -z at the start, towards the stop.")
     force: Force = Field(
@@ -166,7 +166,7 @@ class Motion(Section):
     )
     spring: Spring | None = Field(default=None, description="Closing spring.")
     placement: Placement = Field(
-        default=Placement(), description="Off the axis or leaning; centred and upright without."
+        default=Placement(), description="Eccentricity and tilt; default centred and upright."
     )
 
     @property
@@ -197,7 +197,7 @@ class TransferSweep(Section):
 
 
 class Run(Section):
-    """What is computed."""
+    """Levels, steps and duration of a run."""
 
     duration: Time = Field(
         examples=["50 us"], gt=0, description="Time to compute, from the start of the motion."
@@ -237,8 +237,8 @@ class Lumped(Section):
         default=None,
         gt=0,
         le=1,
-        description="Dashpot in parallel (Hunt and Crossley 1975), given by the speed ratio that "
-        "it leaves; no loss without.",
+        description="Dashpot in parallel (Hunt and Crossley 1975), given by its "
+        "restitution; default no loss.",
     )
 
 
@@ -247,21 +247,21 @@ class ImpactSections(CaseFile):
 
     bodies: Mapping[Name, CaseBody] = Field(description="name: body; exactly two.")
     contact: CaseContact = Field(description="Which surfaces meet.")
-    motion: Motion = Field(description="How the moving body arrives.")
+    motion: Motion = Field(description="Approach of the moving body.")
     guide: CaseGuide | None = Field(default=None, description="Guide of the moving body.")
     opposite: CaseOpposite | None = Field(
-        default=None, description="Stop above, a third body, for bounces between both ends."
+        default=None, description="Upper stop, a third body, for bounces between both ends."
     )
     reduction: Reduction = Field(
         default=Reduction(), description="Kept modes and their correction."
     )
     run: Run = Field(description="Levels, steps, duration.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
-    shots: Shots | None = Field(default=None, description="What klack shots draws.")
+    shots: Shots | None = Field(default=None, description="Input of klack shots.")
     measurement: CaseMeasurement | None = Field(
-        default=None, description="How drops of this valve were measured."
+        default=None, description="Measurement of drops of this valve."
     )
-    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
+    noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
 
     @property
     def moving_body(self) -> CaseBody:

@@ -18,7 +18,7 @@ __all__ = ["merged", "plain_data", "with_values"]
 
 
 def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> str:
-    """Text of a case with values exchanged where they stand and added where they do not.
+    """Text of a case with values replaced, or added where missing.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> 
 
 
 def merged(data: Any, key: Key, value: object) -> Any:
-    """Copy of plain data with a value at a key; mappings on the way are made."""
+    """Copy of plain data with a value at a key; missing mappings are created."""
     if not key:
         return value
     copy = dict(data or {})

@@ -31,7 +31,7 @@ class Quantity:
         self.key, self.kind, self.value, self._field = key, kind, value, field
 
     def parse(self, text: object) -> float:
-        """SI value of what somebody wrote for this key, under the limits of the schema.
+        """SI value of the text given for this key, within the limits of the schema.
 
         Raises
         ------
@@ -79,7 +79,7 @@ def split_path(text: str) -> Key:
 
 
 def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
-    """Find what stands at a key of a checked case, and the field that describes it.
+    """Find the value at a key of a checked case, and the field that describes it.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
 
 
 def kind_at(node: Any, field: FieldInfo | None) -> Kind | None:
-    """Kind of quantity that stands at a place; None for anything else."""
+    """Kind of quantity at a key; None for anything else."""
     kind = None if field is None else kind_in(field.annotation, field.metadata)
     if kind is None and field is not None and isinstance(node, float):
         return RATIO  # a plain number
@@ -127,16 +127,16 @@ def quantity_at(case: Section, key: Key) -> Quantity:
         raise CaseProblem(
             (),
             got=f"'{'.'.join(map(str, key))}', which holds {got}",
-            expected="a key that holds one number with a unit, such as a force or a share",
+            expected="a key with one number and unit, such as a force or a share",
             hint="write a start value there, or name another key."
             if node is None
-            else "klack schema tells what each key holds.",
+            else "klack schema describes each key.",
         )
     return Quantity(key, kind, float(node), field)
 
 
 def written_at(data: Any, key: Key) -> Any:
-    """What stands in the parsed file at this path; None if nothing does."""
+    """Value in the parsed file at this path; None if there is none."""
     for part in key:
         if isinstance(data, Mapping) and part in data:
             data = data[part]

@@ -1,4 +1,4 @@
-"""How a valve was measured: which channels, where a stroke begins, which sensor."""
+"""Measurement of a valve: channels, start of a stroke, sensor."""
 
 from typing import Literal
 
@@ -18,15 +18,15 @@ class CaseMeasurement(Section):
 
     channels: Channels = Field(
         default_factory=dict,
-        description="Names of the channels by what they mean (lift, velocity, current, voltage, "
-        "pressure, acceleration, force); those without are found by name and unit.",
+        description="Names of the channels by quantity (lift, velocity, current, voltage, "
+        "pressure, acceleration, force); others are found by name and unit.",
     )
     time_step: Time | None = Field(
         default=None, gt=0, description="Sampling step of files that have no time."
     )
     trigger: Trigger | None = Field(
         default=None,
-        description="Cuts recordings into strokes; without, each recording is one stroke.",
+        description="Cuts recordings into strokes; default: each recording is one stroke.",
     )
     zero: Literal["start", "none"] = Field(
         default="start",
@@ -37,5 +37,5 @@ class CaseMeasurement(Section):
     velocity_bandwidth: Frequency | None = Field(
         default=None,
         gt=0,
-        description="Bandwidth of the velocity made from the lift; chosen by its noise without.",
+        description="Bandwidth of the velocity from the lift; default chosen by its noise.",
     )

@@ -1,4 +1,4 @@
-"""What is heard of a valve: which surfaces radiate, how it is mounted, how often it clicks."""
+"""Sound of a valve: which surfaces radiate, how it is mounted, how often it clicks."""
 
 from typing import Annotated, Literal, Self
 
@@ -34,7 +34,7 @@ class NoiseMount(Section):
     mass: Mass | None = Field(
         default=None,
         gt=0,
-        description="Of all that moves on the mount; the mass of the held bodies without.",
+        description="Of all that moves on the mount; default the mass of the held bodies.",
     )
 
 
@@ -50,7 +50,7 @@ class NoisePlate(Section):
 
 
 class NoiseDrive(Section):
-    """How often the valve is actuated in the drive pattern that can be listened to."""
+    """Actuation rate of the valve in the audible drive pattern."""
 
     frequency: Frequency | None = Field(
         examples=["10 Hz"], default=None, gt=0, description="Strokes per second."
@@ -83,11 +83,11 @@ class CaseNoise(Section):
     surfaces: tuple[BodySurface, ...] | None = Field(
         default=None,
         min_length=1,
-        description="Surfaces that meet the air, as body.surface; without, all named surfaces of "
-        "held bodies but their contacts and supports.",
+        description="Radiating surfaces, as body.surface; default all named surfaces "
+        "of held bodies except contacts and supports.",
     )
     mount: NoiseMount | None = Field(
-        default=None, description="Elastic mount of the held bodies; rigid without."
+        default=None, description="Elastic mount of the held bodies; default rigid."
     )
     plate: NoisePlate | None = Field(
         default=None, description="Plate below the mount that radiates as well."
@@ -97,7 +97,7 @@ class CaseNoise(Section):
         description="Radiation efficiency: of a piston of the same area, or 1 (equivalent radiated "
         "power, an upper bound).",
     )
-    distance: Length = Field(default=1.0, gt=0, description="From the valve to the ear.")
+    distance: Length = Field(default=1.0, gt=0, description="From the valve to the listener.")
     air_density: Density = Field(default=1.204, gt=0, description="Of air at 20 degC.")
     sound_speed: Speed = Field(default=343.2, gt=0, description="In air at 20 degC.")
     drive: Annotated[NoiseDrive, Field(description="Pattern of clicks to listen to.")] = NoiseDrive(
@@ -111,6 +111,6 @@ class CaseNoise(Section):
                 ("distance",),
                 got=f"{self.distance * 1e3:.3g} mm",
                 expected="5 cm or more",
-                hint="the estimate is one of the far field; 1 m is usual.",
+                hint="the estimate is for the far field; 1 m is usual.",
             )
         return self

@@ -32,13 +32,13 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
                 key,
                 got=f"'{surface}', but nothing holds '{surface.body}'",
                 expected=f"surfaces of held bodies ({one_of(held)})",
-                hint="a body that moves freely, such as a needle, radiates into the fluid.",
+                hint="a free body, such as a needle, radiates into the fluid.",
             )
         raise CaseProblem(
             ("bodies", surface.body),
             got=f"no key 'fixed', but '{surface}' shall radiate sound (noise.surfaces)",
             expected=f"fixed: the surfaces that hold '{surface.body}'",
-            hint="add 'fixed: [{surface: NAME}]' to the body, or take its surfaces out of 'noise'.",
+            hint="add 'fixed: [{surface: NAME}]' to the body, or remove its surfaces from 'noise'.",
         )
     if noise.plate is not None:
         key = ("noise", "plate", "material")

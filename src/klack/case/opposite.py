@@ -10,16 +10,16 @@ __all__ = ["CaseOpposite"]
 
 
 class CaseOpposite(Section):
-    """A third body above, which the moving body may hit on its way back.
+    """Third body above, which the moving body may hit after a rebound.
 
     Only the interface level knows it, in ``klack impact`` and ``klack shots``.
     """
 
     between: tuple[BodySurface, BodySurface] = Field(
-        description="Surface of the stop above, then surface of the moving body that meets it."
+        description="Surface of the upper stop, then the opposing surface of the moving body."
     )
     gap: Length = Field(
-        gt=0, description="Way of the moving body upwards, from its start to the stop above."
+        gt=0, description="Travel of the moving body upwards, from its start to the upper stop."
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
@@ -27,7 +27,7 @@ class CaseOpposite(Section):
 
     @property
     def stop(self) -> SurfaceName:
-        """Surface of the stop above."""
+        """Surface of the upper stop."""
         return self.between[0]
 
     @property

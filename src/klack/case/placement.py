@@ -1,4 +1,4 @@
-"""Where the moving body stands at the start: off the axis, and leaning."""
+"""Position of the moving body at the start: eccentricity and tilt."""
 
 from math import radians
 
@@ -13,20 +13,20 @@ _LARGEST_TILT = radians(5.0)
 
 
 class Placement(Section):
-    """Small rigid displacement of the moving body off the axis.
+    """Small rigid displacement of the moving body, eccentric and tilted.
 
-    The body first leans: its upper end goes towards ``tilt_direction``, about the point of its
+    The body is first tilted: its upper end goes towards ``tilt_direction``, about the point of its
     axis at the height of first touch.  Then it is shifted by ``eccentricity`` towards
     ``direction``, and last moved along z to the gap.  Directions count from x towards y.
     """
 
-    eccentricity: Length = Field(default=0.0, ge=0, description="Distance off the axis.")
-    direction: Angle = Field(default=0.0, description="Where to, from x towards y.")
+    eccentricity: Length = Field(default=0.0, ge=0, description="Distance from the axis.")
+    direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
     tilt: Angle = Field(
         default=0.0, ge=0, le=_LARGEST_TILT, description="Angle between its axis and z."
     )
     tilt_direction: Angle = Field(
-        default=0.0, description="Where its upper end leans to, from x towards y."
+        default=0.0, description="Direction in which its upper end is tilted, from x towards y."
     )
 
     @property

@@ -104,7 +104,7 @@ def validated(
     lines: "Lines",
     components: Mapping[str, type] | None = None,
 ) -> _Kind:
-    """Check parsed data against a kind of case; own components by their words."""
+    """Check parsed data against a kind of case; own components by their types."""
     context = {
         "path": path,
         "folder": path.parent,
@@ -145,9 +145,9 @@ def text_of(path: Path) -> str:
         line = raw[: error.start].count(b"\n") + 1
         raise InputError(
             f"{path}:{line}",
-            got=f"the byte 0x{raw[error.start]:02x}, which is no UTF-8",
+            got=f"the byte 0x{raw[error.start]:02x}, which is not UTF-8",
             expected="a text file in UTF-8",
-            hint="save the file as UTF-8; a binary file is no case.",
+            hint="save the file as UTF-8; a binary file is not a case.",
         ) from None
     except OSError as error:
         got = f"a file that cannot be read ({error.strerror})"
@@ -155,7 +155,7 @@ def text_of(path: Path) -> str:
 
 
 def parse(text: str, path: Path) -> tuple[Any, Lines]:
-    """Plain data of a YAML text, and where each key and value stands."""
+    """Plain data of a YAML text, and the position of each key and value."""
     try:
         data = bounded_yaml().load(StringIO(text))
     except DuplicateKeyError as error:
@@ -165,14 +165,14 @@ def parse(text: str, path: Path) -> tuple[Any, Lines]:
             f"{path}:{error.problem_mark.line + 1}",
             got=str(error.problem),
             expected="a plain tree of keys and values",
-            hint="close the brackets; write out what an alias repeats.",
+            hint="close the brackets; write out aliases.",
         ) from None
     except MarkedYAMLError as error:
         raise _syntax_error(error, path) from None
     except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise InputError(
             str(path),
-            got=f"text that is no YAML ({_reason(error)})",
+            got=f"text that is not YAML ({_reason(error)})",
             expected="a case file (YAML 1.2)",
             hint="compare with the output of klack schema or with a shipped case.",
         ) from None
@@ -190,7 +190,7 @@ def parse(text: str, path: Path) -> tuple[Any, Lines]:
 
 def _reason(error: Exception) -> str:
     if isinstance(error, RecursionError):
-        return "brackets nested without end"
+        return "brackets nested too deeply"
     if isinstance(error, LookupError):  # the parser looks up the version of a late '%YAML'
         return "a line '%YAML' of another version"
     if isinstance(error, TypeError):
@@ -242,7 +242,7 @@ class _Plain:
 
     def _text(self, text: str, key: Key) -> str:
         if _NO_TEXT.search(text):
-            self._refuse(key, f"the text {ascii(text)[:80]}", "text without such signs")
+            self._refuse(key, f"the text {ascii(text)[:80]}", "text without such characters")
         return text
 
     def _refuse(
@@ -270,12 +270,12 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     where = f"{path}:{mark.line + 1}" if mark else str(path)
     column = f" at column {mark.column + 1}" if mark else ""
     context = f" {error.context}" if error.context else ""
-    hint = "look at this line and the one before: indentation by spaces, 'key: value', brackets."
+    hint = "check this line and the one before: indentation by spaces, 'key: value', brackets."
     if "mapping values are not allowed" in str(error.problem):
         hint = "put text with a colon into quotes; close the bracket or quote opened before."
     return InputError(
         where,
-        got=f"text that is no YAML{column}: {error.problem or 'unreadable'}{context}",
+        got=f"text that is not YAML{column}: {error.problem or 'unreadable'}{context}",
         expected="a case file (YAML 1.2)",
         hint=hint,
     )
@@ -284,7 +284,7 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
 def _first_error(
     case: type[CaseFile], error: ValidationError, data: Any, lines: Lines, path: Path
 ) -> InputError:
-    """Turn the first of pydantic's complaints into ours; say how many more there are."""
+    """Convert the first error of pydantic, and count the others."""
     details = error.errors(include_url=False)
     first, more = details[0], len(details) - 1
     problem = _problem(first, data, case)
@@ -313,7 +313,7 @@ def _existing(data: Any, location: Sequence[str | int]) -> Key:
 
 
 def _problem(details: ErrorDetails, data: Any, case: type[CaseFile]) -> CaseProblem:
-    """Our words for one complaint."""
+    """Message of klack for one error of pydantic."""
     own = details.get("ctx", {}).get("error")
     if isinstance(own, CaseProblem):
         return own
@@ -359,7 +359,7 @@ _TYPES = {
 
 
 def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
-    """Say what was expected and what to try, for the complaints that pydantic makes itself."""
+    """Expected value and advice for the built-in errors of pydantic."""
     if kind in _TYPES:
         return _TYPES[kind]
     if kind in _BOUNDS:
@@ -379,7 +379,7 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     if kind == "too_short":
         return f"at least {context['min_length']} of them", "add what is missing."
     if kind == "too_long":
-        return f"at most {context['max_length']} of them", "remove what is too much."
+        return f"at most {context['max_length']} of them", "remove the surplus value."
     if kind == "missing":
         return "a list with one more value", "a point is [r, z], a pair is [first, second]."
     if kind == "string_too_short":
@@ -394,7 +394,7 @@ def _value_at(data: Any, key: Key) -> Any:
 
 
 def _shown(value: Any) -> str:
-    """Show what came, briefly."""
+    """Short form of the value found."""
     if isinstance(value, dict):
         return f"a mapping with the keys: {', '.join(map(str, value)) or 'none'}"[:100]
     if isinstance(value, list):

@@ -50,7 +50,7 @@ def rewritten(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> st
 
 
 def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
-    """Nothing but the values asked for may have changed; an anchor would carry them elsewhere."""
+    """Require that only the given values have changed; an anchor could change others."""
     try:
         data, _ = parse(text, tree.path)
         for key in values:
@@ -61,7 +61,7 @@ def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
         raise InputError(
             str(tree.path),
             got="values that YAML anchors share with other keys",
-            expected="every calibrated value written out where it stands",
+            expected="every calibrated value written out",
             hint="replace the anchors and aliases (& and *) of these keys by plain values.",
         )
 

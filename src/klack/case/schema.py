@@ -95,7 +95,7 @@ class Case(ImpactSections):
                 raise InputError(
                     f"{self._path or 'case'}: lumped",
                     got="no section 'lumped'",
-                    expected="its stiffness, because the level 'lumped' is asked for",
+                    expected="its stiffness, required by the level 'lumped'",
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
         return tuple(level for level in LEVELS if level in wanted)

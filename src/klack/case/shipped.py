@@ -1,4 +1,4 @@
-"""Cases that come with klack."""
+"""Cases shipped with klack."""
 
 from pathlib import Path
 

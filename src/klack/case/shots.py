@@ -1,4 +1,4 @@
-"""What differs from one drop of the valve to the next, for ``klack shots``."""
+"""Quantities that vary between drops of the valve, for ``klack shots``."""
 
 from typing import Annotated, Self
 
@@ -48,33 +48,33 @@ class Waviness(Section):
 
 
 class Shots(Section):
-    """What ``klack shots`` draws: many drops of one valve, each a little different."""
+    """Input of ``klack shots``: many slightly different drops of one valve."""
 
     count: Annotated[Count, Field(le=100_000)] = Field(default=50, description="Number of shots.")
     seed: Annotated[int, Strict()] = Field(
         default=1, ge=0, description="Seed of the random numbers; another seed, other shots."
     )
     impacts: Annotated[Count, Field(ge=2, le=1000)] = Field(
-        default=4, description="A shot ends after that many impacts."
+        default=4, description="Number of impacts after which a shot ends."
     )
     duration: Time = Field(default=5e-3, gt=0, description="Longest time of a shot.")
     step: Time = Field(default=40e-9, gt=0, description="Time step.")
     eccentricity: LengthDistribution | None = Field(
         default=None,
-        description="Distance of the moving body off the axis; drawn from the guide without.",
+        description="Distance of the moving body from the axis; default drawn from the guide.",
     )
     tilt: AngleDistribution | None = Field(
-        default=None, description="Its lean; drawn from the guide without."
+        default=None, description="Its tilt; default drawn from the guide."
     )
     force: ForceDistribution | None = Field(
         default=None,
-        description="Closing force at first touch; that of 'motion' without (force and preload).",
+        description="Closing force at first touch; default that of 'motion' (force and preload).",
     )
     friction: RatioDistribution | None = Field(
-        default=None, description="Coulomb's coefficient in the guide; that of 'guide' without."
+        default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
     )
     waviness: Waviness | None = Field(
-        default=None, description="Out-of-roundness of the contact ring; none without."
+        default=None, description="Out-of-roundness of the contact ring; default none."
     )
 
     @model_validator(mode="after")
@@ -84,6 +84,6 @@ class Shots(Section):
                 ("duration",),
                 got=f"{self.duration / self.step:.4g} steps of {format_si(self.step, 's')}",
                 expected=f"100 to {_MOST_STEPS} steps",
-                hint="some milliseconds in steps of 40 ns hold the bounces of a small valve.",
+                hint="some milliseconds in steps of 40 ns cover the bounces of a small valve.",
             )
         return self

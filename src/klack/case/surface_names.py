@@ -41,7 +41,7 @@ def require_surface_names(case: CaseFile, known: Mapping[str, Collection[str]]) 
                 got=f"the unknown surface '{surface}' of {body}",
                 expected=f"one of: {one_of(known[body])}",
                 hint=nearest(
-                    surface, known[body], "klack inspect FILE shows where each of them lies."
+                    surface, known[body], "klack inspect FILE shows the position of each."
                 ),
             )
 

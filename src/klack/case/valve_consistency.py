@@ -86,7 +86,7 @@ def _check_flexible_bodies(case: ValveSections) -> None:
 
 
 def _points(case: ValveSections, body: str) -> tuple[str, ...] | None:
-    """Names of the points of a body; None when only its mesh can tell."""
+    """Names of the points of a body; None if only its mesh has them."""
     profile = case.bodies[body].geometry.profile
     return None if profile is None else (*case.bodies[body].ports, *profile.surfaces)
 
@@ -109,7 +109,7 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
             (*key, "between"),
             got=f"{stop.upper} and {stop.lower}, two surfaces of one body",
             expected="surfaces of two bodies",
-            hint="draw the stop as a body of its own.",
+            hint="draw the stop as a separate body.",
         )
     dimensions = [case.bodies[surface.body].geometry.dimension for surface in stop.between]
     if dimensions[0] != dimensions[1]:
@@ -134,7 +134,7 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
 
 
 def _check_laws(case: ValveSections) -> None:
-    """A consistent law needs surfaces, and a correction that leaves something to it."""
+    """Check that a consistent law has surfaces, and a correction with a residual compliance."""
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue

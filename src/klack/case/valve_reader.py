@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 OwnComponents = Iterable[type[Component]]
-"""Components of the user's own that a case may name."""
+"""User components that a case may name."""
 
 
 def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCase:

@@ -1,4 +1,4 @@
-"""Who is who in a valve: the needle, its seat, its opening stop, and where its lift is measured."""
+"""Roles in a valve: the needle, its seat, its opening stop, and the point of its lift."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from klack.network.travel import StopBound, Travel
 __all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
 
 END_STOP, FLEXIBLE_BODY = "end-stop", "flexible-body"
-"""Type words of the components that a case of a whole valve speaks about itself."""
+"""Types of the components that a case of a whole valve refers to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Meeting:
 
 @dataclass(frozen=True, slots=True)
 class ValveRoles:
-    """Names that tell the story of a stroke.
+    """Main names of a stroke.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ValveRoles:
 
 
 def find_meetings(network: Network) -> dict[str, Meeting]:
-    """What every end stop of a network keeps apart."""
+    """Bodies on both sides of every end stop of a network."""
     at: dict[tuple[str, str], tuple[str, str] | None] = {}
     for node in network.nodes:
         bodies = node.having(Role.MOTION)
@@ -89,7 +89,7 @@ def find_roles(case: ValveSections) -> ValveRoles:
 
 
 def _travel(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:
-    """How far the end stops that have a law let the free bodies go."""
+    """Travel of the free bodies between the end stops with a law."""
 
     def free(side: tuple[str, str] | None) -> str | None:
         return None if side is None or _held(case, side[0]) else side[0]

@@ -51,8 +51,8 @@ class ValveBody(CaseBody):
 
     ports: Mapping[Name, BodyPort] = Field(
         default_factory=dict,
-        description="Points for the network with a name or a load of their own; every named "
-        "surface is a point already, loaded along the axis.",
+        description="Points for the network with their own name or load; every "
+        "named surface is a point, loaded along the axis.",
     )
 
 
@@ -65,9 +65,9 @@ class CaseStop(Section):
     between: tuple[BodySurface, BodySurface] = Field(
         description="Surface of the upper body, then surface of the lower one."
     )
-    speed: Speed = Field(gt=0, description="Fastest impact that the law must hold.")
+    speed: Speed = Field(gt=0, description="Fastest impact that the law must cover.")
     force: Force = Field(
-        default=0.0, ge=0, description="Greatest force that presses the two together meanwhile."
+        default=0.0, ge=0, description="Largest force that presses the two together during it."
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
@@ -85,7 +85,7 @@ class CaseStop(Section):
 
 
 class StrokeRun(Section):
-    """What is computed."""
+    """Duration, steps and variants of a stroke."""
 
     duration: Time = Field(
         examples=["5 ms"], gt=0, description="Time to compute, from the start of the drivers."
@@ -104,7 +104,7 @@ class StrokeRun(Section):
     lift: BodySurface | None = Field(
         default=None,
         description="Point of a body whose displacement is the lift, as component.point; "
-        "the point of the needle at the seat without.",
+        "default the point of the needle at the seat.",
     )
 
     @model_validator(mode="after")
@@ -139,13 +139,13 @@ class ValveSections(CaseFile):
     reduction: Reduction = Field(
         default=Reduction(), description="Kept modes and their correction."
     )
-    network: NetworkSection = Field(description="Components of the valve and how they are joined.")
+    network: NetworkSection = Field(description="Components of the valve and their connections.")
     run: StrokeRun = Field(description="Duration, steps and variants.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
     measurement: CaseMeasurement | None = Field(
-        default=None, description="How strokes of this valve were measured."
+        default=None, description="Measurement of strokes of this valve."
     )
-    noise: CaseNoise | None = Field(default=None, description="What klack noise computes.")
+    noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
     calibration: CaseCalibration | None = Field(
         default=None, description="What klack calibrate fits to measured strokes."
     )

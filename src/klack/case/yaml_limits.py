@@ -49,7 +49,7 @@ class _BoundedComposer(Composer):
         node = super().compose_node(parent, index)
         if is_alias:
             if id(node) not in self.extent:
-                problem = f"the alias '{event.anchor}' inside of what it stands for"
+                problem = f"the alias '{event.anchor}' inside its own content"
                 raise UnboundedTree(problem, event.start_mark)
             values, levels = self.extent[id(node)]
             self._require_bounded(values, levels, event.start_mark)

@@ -49,8 +49,8 @@ _Level = Annotated[
     str | None,
     Parameter(
         name="--level",
-        help="reduced or interface, whose results shall be so good. [default: reduced, interface "
-        "off the axis]",
+        help="reduced or interface, level whose results are to meet the target. [default: reduced; "
+        "interface if off-axis]",
     ),
 ]
 _Write = Annotated[
@@ -69,7 +69,7 @@ def advise(
     level: _Level = None,
     write: _Write = None,
     confirm: Annotated[
-        bool, Parameter(help="Run the advised case and lay it over the finest run.")
+        bool, Parameter(help="Run the advised case and compare it with the finest run.")
     ] = True,
     component: Components = None,
     json: Json = None,
@@ -163,9 +163,9 @@ def _require_new_file(path: Path | None) -> None:
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise InputError(
             f"--write {path}",
-            got="a folder that does not exist or may not be written to",
+            got="a folder that does not exist or is not writable",
             expected="a file in an existing folder",
-            hint="make the folder first.",
+            hint="create the folder first.",
         )
 
 
@@ -185,7 +185,7 @@ def _print_advice(advice: "Advice", yaml: str, written: Path | None, *, to_stder
     for line in advice_lines(advice):
         print(line, file=stream)
     if yaml:
-        print("\nIn place of the same keys of the case:\n", file=stream)
+        print("\nReplace these keys of the case:\n", file=stream)
         print(yaml, file=stream)
     if written is not None:
         print(f"The case with the advice: {written}", file=stream)

@@ -34,7 +34,7 @@ def cache(
     results = result_cache()
     stream = sys.stderr if str(json) == "-" else sys.stdout
     if results is None:
-        print("The cache is off (KLACK_CACHE, or a user without a home).", file=stream)
+        print("The cache is off (KLACK_CACHE, or a user without a home directory).", file=stream)
         if json is not None:
             write_json(json, _numbers(None, 0, 0, 0))
         return 0

@@ -34,13 +34,12 @@ _Files = Annotated[
         "files.",
     ),
 ]
-_Strokes = Annotated[
-    int | None, Parameter(name="--strokes", help="Fit only the first so many strokes.")
-]
+_Strokes = Annotated[int | None, Parameter(name="--strokes", help="Fit only the first N strokes.")]
 _Workers = Annotated[
     int | None,
     Parameter(
-        name="--workers", help="Processes; the numbers do not depend on it. [default: all cores]"
+        name="--workers",
+        help="Number of processes; it does not affect the results. [default: all cores]",
     ),
 ]
 

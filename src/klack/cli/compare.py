@@ -1,4 +1,4 @@
-"""``klack compare``: a stored result beside that of another program, or beside a measurement."""
+"""``klack compare``: a stored result against that of another program, or against a measurement."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -58,21 +58,20 @@ def compare(
         Parameter(
             name="--calculix",
             help="NAME.dat of a run of CalculiX on the deck of klack export, for results of klack "
-            "impact; NAME.sta and NAME.log beside it tell iterations and time.",
+            "impact; NAME.sta and NAME.log next to it give iterations and time.",
         ),
     ] = None,
     level: Annotated[
         str, Parameter(name="--level", help="Level of an impact that is compared.")
     ] = "full",
     report: Annotated[
-        bool, Parameter(help="Write report.html and report.pdf beside a measurement.")
+        bool, Parameter(help="Write report.html and report.pdf for a measurement.")
     ] = True,
     out: Annotated[
         Path | None,
         Parameter(
             name="--out",
-            help="Folder for what is written. [default: RESULT, or RESULT/measured for a "
-            "measurement]",
+            help="Folder for the output. [default: RESULT, or RESULT/measured for a measurement]",
         ),
     ] = None,
     component: Components = None,
@@ -85,7 +84,7 @@ def compare(
         raise InputError(
             "--variant",
             got=", ".join(variant),
-            expected="the variant in front of its recording",
+            expected="the variant before its recording",
             hint=f"--measurement {variant[0] if variant else 'dry'}=FILE.",
         )
     if (calculix is None) == (not measurement):

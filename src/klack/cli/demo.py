@@ -38,7 +38,7 @@ def demo(
 
 
 def _has_display() -> bool:
-    """Tell whether somebody sits in front of a screen that shows a browser."""
+    """Whether there is a display for a browser."""
     if not sys.stdout.isatty():
         return False
     if sys.platform in ("darwin", "win32"):

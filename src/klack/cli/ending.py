@@ -1,4 +1,4 @@
-"""How every command ends that leaves a record: result, report, tables, JSON, exit."""
+"""Common ending of commands with a record: result, report, tables, JSON, exit."""
 
 import sys
 from collections.abc import Callable
@@ -24,7 +24,7 @@ Kept = TypeVar("Kept", bound="AnyRecord")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ending:
-    """What the user wants of a record.
+    """Requested outputs of a record.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Ending:
         unfinished: "LogForm[Any, Any] | None" = None,
         incomplete: Exception | None = None,
     ) -> int:
-        """Write and tell a record; return the exit code.
+        """Write and print a record; return the exit code.
 
         Parameters
         ----------

@@ -70,7 +70,7 @@ _Step = Annotated[
 ]
 _Duration = Annotated[
     str | None,
-    Parameter(name="--duration", help='Time that it computes, "10 us". [default: as in the case]'),
+    Parameter(name="--duration", help='Simulated time, "10 us". [default: as in the case]'),
 ]
 _Penalty = Annotated[
     str | None,

@@ -19,7 +19,7 @@ __all__ = ["ModelChoice", "export_models"]
 
 @dataclass(frozen=True, slots=True)
 class ModelChoice:
-    """What is written, and for whom.
+    """Selection of the exported models.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def export_models(
 
 
 def chosen(models: "CaseModels", choice: ModelChoice) -> tuple["ModalModel", ...]:
-    """Models that were asked for: bodies first, then the pair."""
+    """Requested models: bodies first, then the pair."""
     bodies: tuple[ModalModel, ...] = ()
     if choice.part != "pair" or choice.body is not None:
         bodies = models.body_models(choice.body)

@@ -25,7 +25,7 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
             "the stored result",
             got=f"a stored {type(study).__name__}",
             expected="the result of klack impact or klack stroke",
-            hint="its numbers are in --json of the command that made it.",
+            hint="its numbers are in --json of the command that wrote it.",
         )
     table = result_table(study)
     name = f"{study.case}_result"
@@ -52,7 +52,7 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
 def run_and_export(
     case: "Case | ValveCase", to: str, folder: Path, *, threads: int | None, quiet: bool
 ) -> tuple[Written, Exception | None]:
-    """Run a case as it asks for, write what came out, and hand on why a run ended early."""
+    """Run a case, write its result, and pass on why a run ended early."""
     from klack.analyses.impact.run import run_impact
     from klack.analyses.incomplete import IncompleteImpactError
     from klack.analyses.stroke.record import IncompleteStrokeError

@@ -58,7 +58,7 @@ def run_case(
     threads: int | None,
     quiet: bool,
 ) -> Path:
-    """Run a case, write and print what came out; return the folder of the results."""
+    """Run a case, write and print the results; return their folder."""
     from klack.case import find_case, load_case
 
     require_json_target(json)

@@ -62,7 +62,7 @@ def inspect(
     if unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS:
         raise InputError(
             "--unit",
-            got=f"'{unit}' for a STEP file, which says its own unit",
+            got=f"'{unit}' for a STEP file, which has its own unit",
             expected="no --unit",
             hint="leave it out; klack shows sizes in mm.",
         )

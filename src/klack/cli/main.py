@@ -1,4 +1,4 @@
-"""The command ``klack``: what can be asked, and the exit code of each answer.
+"""The command ``klack``: its subcommands and their exit codes.
 
 Nothing heavy is imported here or at the top of the command modules, so that ``--help`` is quick.
 
@@ -115,10 +115,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KlackError as error:
         return _complain(f"{name}: {error}", EXIT_BAD_INPUT)
     except MemoryError:
-        text = "the memory of this machine is used up.\nTry: larger elements, or fewer modes."
+        text = "the memory of this machine is exhausted.\nTry: larger elements, or fewer modes."
         return _complain(f"{name}: {text}", EXIT_BAD_INPUT)
     except KeyboardInterrupt as stop:
-        kept = " ".join(getattr(stop, "__notes__", ())) or "nothing half written is left."
+        kept = " ".join(getattr(stop, "__notes__", ())) or "no partial files are left."
         return _complain(f"{name}: stopped; {kept}", stop_code(stop))
     except BrokenPipeError:
         # the reader of our output went away (klack schema | head); python would complain at exit

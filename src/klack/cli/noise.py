@@ -1,4 +1,4 @@
-"""``klack noise``: from the force of the impacts to what is heard, for one or two designs."""
+"""``klack noise``: from the force of the impacts to the sound, for one or two designs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -62,7 +62,7 @@ def noise(
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> int:
-    """Estimate what is heard: force spectra, vibration, radiated sound, loudness, WAV files."""
+    """Estimate the sound: force spectra, vibration, radiated sound, loudness, WAV files."""
     require_json_target(json)
     require_threads(threads)
     names = tuple(name for item in variant or () for name in item.split(",") if name)
@@ -127,7 +127,7 @@ def _sources(
 
 
 def _names(paths: Sequence[Path], sources: Sequence["NoiseSource"]) -> tuple[str, ...]:
-    """Short names that tell the designs apart: the case, what was run, the folder, a number."""
+    """Short distinct names of the designs: the case, what was run, the folder, a number."""
     per_path = len(sources) // len(paths)
     folders = [_short(paths[i // per_path]) for i in range(len(sources))]
     candidates = (

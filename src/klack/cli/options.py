@@ -90,5 +90,5 @@ def require_files(option: str, files: Sequence[Path]) -> None:
                 f"{option} {file}",
                 got="a folder" if file.is_dir() else "no such file",
                 expected="a file",
-                hint="check the spelling; the path is relative to the present folder.",
+                hint="check the spelling; the path is relative to the current folder.",
             )

@@ -29,7 +29,7 @@ _MOST_NAMES = 8
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """Files that a command has written, and the lines that tell of them.
+    """Files written by a command, and the lines that report them.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Written:
 
     @classmethod
     def of(cls, folder: Path, stage: Path, *lines: str) -> Self:
-        """What stands in the stage of a folder; without lines, one that lists it."""
+        """Content of the stage of a folder; without lines, one that lists it."""
         files = tuple(sorted(path.name for path in stage.iterdir()))
         return cls(folder, files, lines or (f"Written to {folder}: {listing(files)}",))
 
@@ -64,12 +64,12 @@ def require_file_target(option: str, path: Path | None) -> None:
         raise _refuse(option, path, "a folder", "the name of a file")
     through = path.exists() and not path.is_file()  # a link to a file is merely replaced
     if through and (found := planted(path)) is not None:
-        raise _refuse(option, path, found, "a file, or a place for one")
+        raise _refuse(option, path, found, "a file, or a path for one")
     if not path.absolute().parent.is_dir():
         raise _refuse(option, path, "a file in a folder that does not exist", "an existing folder")
     target = path if path.exists() else path.absolute().parent
     if not os.access(target, os.W_OK):
-        raise _refuse(option, path, "a place that may not be written to", "a writable file")
+        raise _refuse(option, path, "a path that is not writable", "a writable file")
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
@@ -94,7 +94,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def _write_to_stream(path: Path, text: str) -> None:
-    """Write to a device or a named pipe, of which somebody must read already."""
+    """Write to a device or a named pipe that already has a reader."""
     handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
     os.set_blocking(handle, True)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
@@ -104,12 +104,12 @@ def _write_to_stream(path: Path, text: str) -> None:
 def require_folder(folder: Path) -> None:
     """Refuse a target of ``--out`` that cannot be written, before the long work begins."""
     if (found := planted(folder)) is not None:
-        raise _refuse("--out", folder, found, "a folder, or a place for one")
+        raise _refuse("--out", folder, found, "a folder, or a path for one")
     existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
     if not existing.is_dir():
         raise _refuse("--out", folder, f"a path through the file {existing}", "a folder")
     if not os.access(existing, os.W_OK):
-        raise _refuse("--out", folder, "a place that may not be written to", "a writable folder")
+        raise _refuse("--out", folder, "a path that is not writable", "a writable folder")
 
 
 def listing(names: Iterable[str]) -> str:
@@ -137,5 +137,5 @@ def staged_folder(folder: Path, beside: Mapping[str, Mark] | None = None) -> Ite
 
 
 def _refuse(option: str, path: Path, got: str, expected: str) -> InputError:
-    hint = "check the path and the space that is left; '-' writes JSON to the terminal."
+    hint = "check the path and the free space; '-' writes JSON to the terminal."
     return InputError(f"{option} {path}", got=got, expected=expected, hint=hint)

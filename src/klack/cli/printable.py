@@ -1,4 +1,4 @@
-"""Words from files, as they may be shown on a terminal."""
+"""Texts from files, made safe for a terminal."""
 
 __all__ = ["printable"]
 

@@ -1,4 +1,4 @@
-"""Show that long work goes on, from its first second, without a word about short work."""
+"""Progress of long work, shown from its first second; short work shows nothing."""
 
 import sys
 import threading
@@ -14,10 +14,10 @@ _SOON = 0.5  # s until the bar is there
 
 
 class Progress(Protocol):
-    """What a long calculation is given to report with."""
+    """Reporter passed to a long calculation."""
 
     def __call__(self, stage: str, fraction: float) -> None:
-        """Say what is going on; ``fraction`` of this stage is done, from 0 to 1."""
+        """Report the current stage; ``fraction`` of it is done, from 0 to 1."""
         ...
 
 
@@ -98,7 +98,7 @@ def _described(stage: str, compiling: bool) -> str:
 
 
 class _Compiling:
-    """Tells when numba compiles a function that it has not kept from an earlier run.
+    """Detects when numba compiles a function that is not cached.
 
     Parameters
     ----------

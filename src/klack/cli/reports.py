@@ -1,4 +1,4 @@
-"""Results of finished studies, of either kind, with their reports beside them."""
+"""Results of finished studies with their reports."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -39,11 +39,11 @@ def write_result(
     progress: "Progress",
     unfinished: "LogForm[Any, Any] | None" = None,
 ) -> Exception | None:
-    """Put a result into a folder, and then, if wanted, its report beside it.
+    """Write a result to a folder, and its report if requested.
 
     Whatever happens to the report costs no calculation: the result stands, with no report of an
-    earlier one beside it.  An internal error in a picture is returned; Ctrl-C goes on its way with
-    a note that says what is kept.
+    earlier one beside it.  An internal error in a picture is returned; Ctrl-C is raised again
+    with a note on what is kept.
 
     Parameters
     ----------
@@ -76,13 +76,13 @@ def write_result(
 
 
 def beside_result(folder: Path) -> dict[str, Mark]:
-    """The result in a folder, beside which a report of it may be put as long as it stands there."""
+    """Result in a folder, to which its report may be added while it is unchanged."""
     mark = mark_of(folder / _RESULT)
     return {} if mark is None else {_RESULT: mark}
 
 
 def _report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
-    """Write the report, if it is still this result that stands in the folder at the end."""
+    """Write the report, if the folder still has this result at the end."""
     try:
         with staged_folder(folder, {} if mark is None else {_RESULT: mark}) as stage:
             write_reports(page(), stage)
@@ -98,6 +98,6 @@ def _no_report(folder: Path, error: OSError) -> InputError:
     return InputError(
         f"report in {folder}",
         got=f"an error: {error.strerror or error}",
-        expected="a place to write to, and one for temporary files",
-        hint="the result itself is kept: make room, then run klack report on it.",
+        expected="a writable folder, and one for temporary files",
+        hint="the result itself is kept: free space, then run klack report on it.",
     )

@@ -27,7 +27,8 @@ _Seed = Annotated[
 _Workers = Annotated[
     int | None,
     Parameter(
-        name="--workers", help="Processes; the numbers do not depend on it. [default: all cores]"
+        name="--workers",
+        help="Number of processes; it does not affect the results. [default: all cores]",
     ),
 ]
 

@@ -1,4 +1,4 @@
-"""Ends that come from outside: Ctrl-C, and the signal with which a system ends its programs."""
+"""Termination from outside: Ctrl-C, and the termination signal of the system."""
 
 import signal
 import threading
@@ -12,7 +12,7 @@ _STOPPED, _TERMINATED = 130, 143  # 128 and the number of the signal, as shells 
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM came: everything is given back as after Ctrl-C."""
+    """SIGTERM received: everything is released as after Ctrl-C."""
 
 
 def stop_code(stop: KeyboardInterrupt) -> int:
@@ -22,7 +22,7 @@ def stop_code(stop: KeyboardInterrupt) -> int:
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Raise :class:`Terminated` when SIGTERM comes; without this the process would just be gone."""
+    """Raise :class:`Terminated` on SIGTERM, which would end the process otherwise."""
     if threading.current_thread() is not threading.main_thread():  # only there may signals be set
         yield
         return

@@ -8,5 +8,5 @@ __all__ = ["is_result"]
 
 
 def is_result(path: Path) -> bool:
-    """Tell a folder with a result, or a store itself, from a case."""
+    """Whether a path is a folder with a result or a store, rather than a case."""
     return (completed(path) / "result.zarr").is_dir() or (path / "zarr.json").is_file()

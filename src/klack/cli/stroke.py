@@ -46,7 +46,7 @@ _Continue = Annotated[
     Path | None,
     Parameter(
         name="--continue",
-        help="Folder of an earlier result of the same case: go on where it ended.",
+        help="Folder of an earlier result of the same case: continue from its end.",
     ),
 ]
 
@@ -103,7 +103,7 @@ def _checked_case(
     step: str | None,
     components: "tuple[type[Component], ...]",
 ) -> "ValveCase":
-    """Read the case; duration and step of the command line take the place of its own."""
+    """Read the case; duration and step of the command line replace its own."""
     from klack.case.valve_reader import load_valve_case
 
     case = load_valve_case(path, components)

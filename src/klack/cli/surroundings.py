@@ -1,4 +1,4 @@
-"""What a command finds around it: streams, folders for temporary and compiled files, full disks."""
+"""Environment of a command: streams, folders for temporary and compiled files, full disks."""
 
 import errno
 import os
@@ -19,23 +19,22 @@ __all__ = [
 ]
 
 _WORDS: Mapping[int, str] = {
-    errno.ENOSPC: "no space is left on the disk.\nTry: make room, or give another folder (--out; "
+    errno.ENOSPC: "the disk is full.\nTry: free space, or choose another folder (--out; "
     "TMPDIR for temporary files).",
-    errno.EDQUOT: "your share of the disk is used up.\nTry: make room, or give another folder "
+    errno.EDQUOT: "your disk quota is used up.\nTry: free space, or choose another folder "
     "(--out; TMPDIR for temporary files).",
-    errno.EROFS: "a folder may only be read.\nTry: another folder (--out; TMPDIR for temporary "
-    "files).",
-    errno.EFBIG: "a file grew larger than the system allows.\nTry: ulimit -f unlimited.",
+    errno.EROFS: "a folder is read-only.\nTry: another folder (--out; TMPDIR for temporary files).",
+    errno.EFBIG: "a file exceeds the size limit of the system.\nTry: ulimit -f unlimited.",
     errno.EMFILE: "too many files are open.\nTry: ulimit -n 4096.",
     errno.ENFILE: "too many files are open.\nTry: close other programs.",
-    errno.ENAMETOOLONG: "the name of a file is longer than the system allows.\nTry: a shorter one.",
-    errno.ELOOP: "links lead round in a circle.\nTry: the place itself.",
+    errno.ENAMETOOLONG: "a file name is too long for the system.\nTry: a shorter one.",
+    errno.ELOOP: "symbolic links form a loop.\nTry: the target itself.",
     errno.EIO: "the disk or the network drive failed.\nTry: another folder (--out).",
 }
 
 
 def prepare_streams() -> None:
-    """Let every letter be printed, and closed streams swallow what is printed.
+    """Make all characters printable, and output to closed streams harmless.
 
     A terminal that has no umlaut shows its number; a program started with its output closed would
     otherwise get the first file that it opens for its output.
@@ -68,27 +67,27 @@ def prepare_compiling() -> None:
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         os.environ["NUMBA_CACHE_DIR"] = place
         print(
-            "klack: note: compiled functions cannot be kept (no writable home), so that every "
-            "command compiles them again.",
+            "klack: note: compiled functions cannot be cached (no writable home directory), "
+            "so every command compiles them again.",
             file=sys.stderr,
         )
 
 
 def require_present_folder() -> None:
-    """Refuse to start in a folder that somebody has deleted: every relative name fails there."""
+    """Refuse to start in a deleted folder, in which every relative name fails."""
     try:
         os.getcwd()
     except OSError as error:
         raise InputError(
             "the present folder",
-            got=f"an error: {error.strerror}; it was deleted or closed to you",
+            got=f"an error: {error.strerror}; it was deleted or is not accessible",
             expected="a folder that exists",
             hint="cd to another one, e.g. cd ~.",
         ) from None
 
 
 def in_words(error: OSError) -> str | None:
-    """Say what is wrong around klack; None where the error is one of klack itself."""
+    """Text on a fault of the environment; None for an internal error."""
     if "No usable temporary directory" in str(error):
         return "no folder for temporary files can be written to.\nTry: set TMPDIR to one."
     return _WORDS.get(error.errno or 0)

@@ -18,7 +18,7 @@ def print_table(
     left: int = 1,
     to_stderr: bool = False,
 ) -> None:
-    """Print rows of text; the first ``left`` columns are words, the others numbers.
+    """Print rows of text; the first ``left`` columns are texts, the others numbers.
 
     The words ``ok`` and ``FAILED`` get their colours on a terminal that has some.
     """

@@ -37,7 +37,7 @@ def verify(
         bool, Parameter(name="--all", negative="", help="Print every check, not only the worst.")
     ] = False,
     listing: Annotated[
-        bool, Parameter(name="--list", negative="", help="Say what each group covers, and stop.")
+        bool, Parameter(name="--list", negative="", help="List the groups with what each covers.")
     ] = False,
     json: Json = None,
     quiet: Quiet = False,

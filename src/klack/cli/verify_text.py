@@ -1,4 +1,4 @@
-"""Checks on the terminal: one line per group, and in full only what deserves a look.
+"""Checks on the terminal: one line per group, and in full only notable checks.
 
 A check needs its name, its source and five numbers; side by side they do not fit into the 100
 columns of a terminal, and hundreds of rows hide the one that matters.  So the table has one row per

@@ -1,7 +1,7 @@
-"""What happened in one contact between two bodies, whichever solver computed it.
+"""History of one contact between two bodies, from any solver.
 
-The lumped, the reduced and the full-order level all return this object, so any two can be laid over
-each other.  Axis of motion z; body a (the needle) is above and moves in -z onto body b.
+The lumped, the reduced and the full-order level all return this object, so any two can be
+compared.  Axis of motion z; body a (the needle) is above and moves in -z onto body b.
 """
 
 import json
@@ -61,7 +61,7 @@ class BodyEnergy:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EnergyLedger:
-    """Where the energy of an impact went.
+    """Energy balance of an impact.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class EnergyLedger:
         return min(self.contact_dissipation, self.damping) / scale if scale else 0.0
 
     def parts(self) -> dict[str, float]:
-        """Return every entry by its name in words [J], the initial energy first."""
+        """Return every entry by name [J], the initial energy first."""
         out = {"initial kinetic": self.initial}
         for body in self.bodies:
             out[f"{body.name} kinetic (rigid)"] = body.translation
@@ -213,7 +213,7 @@ class ImpactHistory:
         return float(np.sum(self.force) * self.step)
 
     def to_arrays(self) -> dict[str, NDArray]:
-        """Return everything as plain arrays (numbers only; words as UTF-8 bytes of JSON)."""
+        """Return everything as plain arrays (numbers only; texts as UTF-8 bytes of JSON)."""
         out: dict[str, NDArray] = {name: getattr(self, name) for name in _ARRAYS}
         out["scalars"] = np.array(
             [self.step, self.speed, self.mass_a, self.mass_b, self.longest_period, self.start]

@@ -227,7 +227,7 @@ class HuntCrossley:
     indentation: bounces are damped each by their own speed, trembling is not.  With ``alpha`` from
     :func:`gonthier_coefficient` two rigid bodies rebound with exactly the prescribed restitution,
     for every elastic law.  On bodies with modes the wave loss would be counted twice.  The law is
-    clipped where it would pull, and the clipped work is booked.
+    clipped where it would pull, and the clipped work is counted as a loss.
 
     Parameters
     ----------
@@ -340,8 +340,8 @@ def _with_origin(
         raise InputError(
             "TableLaw",
             got=f"points from ({d[0]:g} m, {f[0]:g} N) to ({d[-1]:g} m, {f[-1]:g} N)",
-            expected="indentation and force that both increase strictly from (0, 0)",
-            hint="sort the points, drop repeated ones, and start at first touch.",
+            expected="indentation and force, both strictly increasing from (0, 0)",
+            hint="sort the points, remove repeated ones, and start at first touch.",
         )
     return d, f
 

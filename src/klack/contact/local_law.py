@@ -30,7 +30,7 @@ from klack.errors import AccuracyWarning, InputError, require_nonnegative
 __all__ = ["LocalLaw", "OverfullModesError", "consistent_law"]
 
 _FAIR_SHARE = 0.2
-"""Share of the compliance below which the law leans on a small difference of large numbers."""
+"""Share of the compliance below which the law is a small difference of large numbers."""
 
 _POWERS = (1.0, 2.0)
 """Exponents F ~ delta^n that the beginning of a smooth contact can have."""
@@ -120,17 +120,17 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
         worst = int(np.argmax(tangent_share <= 0))
         raise OverfullModesError(
             "consistent law",
-            got=f"modes that carry more than the static compliance above {force[worst]:.4g} N "
+            got=f"modes with more than the static compliance above {force[worst]:.4g} N "
             f"({modal_compliance:.4g} m/N of {approach[-1] / force[-1]:.4g} m/N at the end)",
-            expected="a rest that rises with the force",
+            expected="a remainder that rises with the force",
             hint="keep fewer modes, or take the port pattern at a higher force.",
         )
     lowest = float(min(share.min(), tangent_share.min()))
     if lowest < _FAIR_SHARE:
         warnings.warn(
-            f"contact: only {100 * lowest:.2g} % of the static compliance is left to the local law "
-            f"at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). Keep fewer modes, "
-            "or only those with a high static participation.",
+            f"contact: only {100 * lowest:.2g} % of the static compliance is left to the "
+            f"local law at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). Keep "
+            "fewer modes, or only those with a high static participation.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -59,7 +59,7 @@ _POINTS_BY_COST = {2: 400, 3: 1000}
 """Number of contact points that an automatic reach aims at, by dimension."""
 
 _LOWEST = 32
-"""Hats that tell how much the mean gap over a hat exceeds the gap at its node."""
+"""Hats that give the excess of the mean gap over a hat over the gap at its node."""
 
 COVERED = 0.05
 """Least share of a hat's area that has to face the master."""
@@ -153,7 +153,7 @@ class ContactSpace:
         )
 
     def complete_at(self, travel: float) -> bool:
-        """Tell whether no left-out point can have closed after a has moved by ``travel`` to -z [m].
+        """Whether no omitted point can have closed after a has moved by ``travel`` to -z [m].
 
         The deformation under contact forces only opens the gaps of points without a force.
         """
@@ -250,7 +250,7 @@ def _check_pair(
             f"{where}: reach",
             got=f"{reach:g} m",
             expected="a length above 0 m",
-            hint="take about twice the largest expected approach, some micrometres.",
+            hint="use about twice the largest expected approach, some micrometres.",
         )
 
 
@@ -643,8 +643,8 @@ def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
         if abs(space.touch) <= 1e-12:
             return shift
     raise ConvergenceError(
-        f"contact: placing surface '{surface_a.name}' on '{surface_b.name}' did not settle, the "
-        f"last move was {space.touch * 1e6:.3g} um.\n"
+        f"contact: placing surface '{surface_a.name}' on '{surface_b.name}' did not converge, "
+        f"the last shift was {space.touch * 1e6:.3g} um.\n"
         "Try: a finer mesh on the contact surfaces."
     )
 

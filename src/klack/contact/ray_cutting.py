@@ -207,7 +207,7 @@ def list_near(points, normals, start, centre, axes, half, within):  # type: igno
 
 @numba.njit(cache=True)
 def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
-    """Tell whether a line along n meets a box whose middle is at d from a point of the line."""
+    """Whether a line along n meets a box whose middle is at d from a point of the line."""
     x = d[0] * axes[0, 0] + d[1] * axes[0, 1] + d[2] * axes[0, 2]
     y = d[0] * axes[1, 0] + d[1] * axes[1, 1] + d[2] * axes[1, 2]
     z = d[0] * axes[2, 0] + d[1] * axes[2, 1] + d[2] * axes[2, 2]

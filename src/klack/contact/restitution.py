@@ -116,7 +116,7 @@ class ImpactMeasures:
 
     @property
     def cut_off(self) -> bool:
-        """Tell whether the record ends before the bodies have parted.
+        """Whether the record ends before separation.
 
         Peak force, contact time and impulse are then those of the part that was recorded.
         """
@@ -125,7 +125,7 @@ class ImpactMeasures:
 
 @dataclass(frozen=True, kw_only=True)
 class Deviation:
-    """How far one history is from another (candidate minus reference).
+    """Deviation of one history from another (candidate minus reference).
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[C
     """Every contact of a record, in order.
 
     A contact is a run of records with force above ``threshold`` times the peak force of the
-    history; chatter below it neither makes a contact nor prolongs one.  The records that belong
-    to it go on outwards while the force falls, so that the impulse is complete.
+    history; chatter below it neither makes a contact nor prolongs one.  Its records extend
+    outwards while the force falls, so that the impulse is complete.
 
     Parameters
     ----------

@@ -391,11 +391,11 @@ def check_rim(static: StaticContact) -> None:
     below = static.force[first - 1] if first else 0.0
     error = ReachError(
         "contact: reach",
-        got=f"contact at the rim of the candidate points above {below:.4g} N "
+        got=f"contact at the edge of the candidate points above {below:.4g} N "
         f"(reach {static.space.reach * 1e6:.4g} um)",
-        expected=f"a reach that holds the contact up to {static.max_force:.4g} N",
-        hint=f"enlarge the reach: in a case 'reach: {2e6 * static.approach[-1]:.3g} um', under "
-        "contact or beside the stop; or let the surfaces go on further.",
+        expected=f"a reach that covers the contact up to {static.max_force:.4g} N",
+        hint=f"enlarge the reach: in a case 'reach: {2e6 * static.approach[-1]:.3g} um', "
+        "under contact or at the stop; or enlarge the named surfaces.",
     )
     error.held = float(below)
     raise error

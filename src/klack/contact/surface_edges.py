@@ -1,6 +1,6 @@
 r"""Edges of a contact surface: where the named surface ends, and where the skin has a corner.
 
-A contact that reaches the end of the *named* surface may go on where nobody looked; one on a sharp
+A contact that reaches the end of the *named* surface may continue beyond it; one on a sharp
 corner has no width of its own.  Both are told by the angle between the outward normals of the two
 faces that meet: :math:`\cos\vartheta = n_1 \cdot n_2`, counted positive where the body is convex.
 In the half section of a body of revolution an edge is a point.
@@ -54,7 +54,7 @@ class SurfaceEdges:
 
     @property
     def ends(self) -> NDArray[np.bool_]:
-        """Edges where the surface ends although the skin goes on, smoothly or rising."""
+        """Edges where the surface ends although the skin continues, smoothly or rising."""
         outside = np.array([name is not None for name in self.neighbour], dtype=bool)
         return outside & ~self.corners
 

@@ -159,7 +159,7 @@ def _check_support(body: ElasticBody) -> None:
         raise InputError(
             f"body '{body.name}': fixed_nodes",
             got=f"supports that leave {left} of {motions.shape[1]} rigid motions free",
-            expected="a support that holds the body, or none (a free body)",
+            expected="a support that constrains the body, or none (a free body)",
             hint="fix nodes that do not lie on one line, for example those of a whole surface.",
         )
 

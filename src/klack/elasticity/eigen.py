@@ -142,8 +142,8 @@ def rigid_frequencies(body: ElasticBody) -> NDArray[np.float64]:
             f"eigenmodes of body '{body.name}'",
             got=f"a rigid motion with a frequency of {frequency.max():.3g} Hz",
             expected=f"below {_RIGID_LIMIT:g} Hz for a free body",
-            hint="the stiffness matrix holds the body somewhere; name these supports as "
-            "fixed_nodes, or take them out of the matrix.",
+            hint="the stiffness matrix includes supports; name them as "
+            "fixed_nodes, or remove them from the matrix.",
         )
     return frequency
 
@@ -160,7 +160,7 @@ def _check_request(body: ElasticBody, count: int | None, max_frequency: float | 
             f"eigenmodes of body '{body.name}'",
             got="neither count nor max_frequency",
             expected="at least one of them",
-            hint="ask for count=50, or for max_frequency=300e3 (Hz).",
+            hint="use count=50, or max_frequency=300e3 (Hz).",
         )
     if max_frequency is not None:
         require_positive("eigenmodes: max_frequency", max_frequency, "Hz")
@@ -170,7 +170,7 @@ def _check_request(body: ElasticBody, count: int | None, max_frequency: float | 
             f"eigenmodes of body '{body.name}': count",
             got=f"{count}",
             expected=f"between 1 and {available}",
-            hint="ask for fewer modes, or refine the mesh.",
+            hint="request fewer modes, or refine the mesh.",
         )
 
 

@@ -49,26 +49,26 @@ def require_factor_memory(backend: str, size: int, nonzeros: int, needed: float)
 
 
 def out_of_memory(backend: str, size: int, nonzeros: int, needed: float) -> InputError:
-    """Build the error of a factorisation that the solver gave up for want of memory."""
+    """Build the error of a factorisation that ran out of memory."""
     what, hint = _words(backend, size, nonzeros, needed)
     there = available_memory()
     return InputError(
         "factorisation",
-        got=f"{what} that takes about {in_words(needed)} of memory and did not get it",
+        got=f"{what} that takes about {in_words(needed)} of memory, which was not available",
         expected=f"what fits into {in_words(there.size)} ({there.bound})",
         hint=hint,
     )
 
 
 def _words(backend: str, size: int, nonzeros: int, needed: float) -> tuple[str, str]:
-    """What is too large, and the way out."""
+    """Text on what is too large, with remedies."""
     spatial = nonzeros / size > _SPATIAL
     there = max(available_memory().size, 1e6)
     coarser = max((needed / there) ** (0.25 if spatial else 0.5), 1.0)
     ways = [f"elements {1.05 * coarser:.2g} times as large away from the contact"]
     if spatial:
-        ways.append("an axisymmetric model, which takes a hundredth")
+        ways.append("an axisymmetric model, which needs a hundredth")
     if backend == "superlu":
-        ways.append("MKL (pip install pypardiso), which takes less")
+        ways.append("MKL (pip install pypardiso), which needs less")
     ways.append(f"a machine with {in_words(1.3 * needed)} free")
     return f"a matrix of {size} degrees of freedom ({backend})", f"{'; or '.join(ways)}."

@@ -58,12 +58,12 @@ class Factorization(Protocol):
 
     @property
     def nonzeros(self) -> int | None:
-        """Entries of the factor, where the solver tells."""
+        """Entries of the factor, where the solver reports them."""
         ...
 
     @property
     def memory(self) -> int | None:
-        """Peak memory of the factorisation [byte], where the solver tells."""
+        """Peak memory of the factorisation [byte], where the solver reports it."""
         ...
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -155,8 +155,8 @@ def not_positive_definite(symptom: str) -> InputError:
         "factorize: A",
         got=f"a matrix that is not positive definite ({symptom})",
         expected="the stiffness of a supported body, or a positive combination of K and M",
-        hint="fix the body well enough that it can neither move nor turn, and check that the mesh "
-        "is in one piece.",
+        hint="fix the body so that it can neither move nor rotate, and check that the "
+        "mesh is in one piece.",
     )
 
 

@@ -51,7 +51,7 @@ _SAME_MASS = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixReport:
-    """What was found out about K and M.
+    """Properties found of K and M.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def check_matrices(
         ("modulus lambda + 2 mu", material.modulus_in_words),
         ("wave speed", f"{material.wave_speed:.4g} m/s"),
         ("rigid motions", f"{rigid}; they cause {strain:.1g} of the forces that cancel"),
-        ("definiteness", "mass positive, stiffness positive beside rigid motions"),
+        ("definiteness", "mass positive, stiffness positive except for rigid motions"),
         ("first eigenfrequency", format_si(frequency, "Hz", 6)),
     )
     return MatrixReport(
@@ -169,7 +169,7 @@ def checked_body(
     numbers: NDArray[np.int64] | None = None,
     units: UnitSystem | None = None,
 ) -> tuple[ElasticBody, MatrixReport]:
-    """Make a body of given matrices, and say what was found out about them.
+    """Make a body from given matrices, with a report on them.
 
     Parameters
     ----------
@@ -212,12 +212,12 @@ def body_of_matrices(
     *,
     fixed_nodes: Iterable[int] = (),
 ) -> ElasticBody:
-    """Make a body of given matrices in SI; see :func:`checked_body`."""
+    """Make a body from given matrices in SI; see :func:`checked_body`."""
     return checked_body(name, mesh, K, M, fixed_nodes=fixed_nodes)[0]
 
 
 class _Namer:
-    """Words for a degree of freedom."""
+    """Names of degrees of freedom."""
 
     def __init__(self, numbers: NDArray[np.int64], dimension: int) -> None:
         self._numbers, self._letters = numbers, "rz" if dimension == 2 else "xyz"
@@ -242,8 +242,12 @@ def _require_positive_diagonals(
     where: str, K: csr_array, M: csr_array, free: NDArray[np.int64], name: _Namer
 ) -> None:
     for letter, A, hint in (
-        ("K", K, "the node belongs to no element, or the mesh is another one."),
-        ("M", M, "take consistent mass; every node needs mass, and a density must be given."),
+        ("K", K, "the node belongs to no element, or the mesh is a different one."),
+        (
+            "M",
+            M,
+            "use a consistent mass matrix; every node needs mass, and a density must be given.",
+        ),
     ):
         diagonal = A.diagonal()[free]
         wrong = np.flatnonzero(~(diagonal > 0))
@@ -278,9 +282,9 @@ def _require_one_mass(
             where,
             got=f"masses of {', '.join(f'{m:.6g}' for m in mass.values())} kg along x, y, z and "
             f"{crossed:.3g} kg across",
-            expected="one mass in all directions, none across",
-            hint="the order of the rows is another one (give 'dofs'), or nodes have rotated "
-            "coordinate systems.",
+            expected="the same mass in all directions, without coupling",
+            hint="the order of the rows differs (give 'dofs'), or nodes have "
+            "rotated coordinate systems.",
         )
     nodal = np.mean([moved[way][way::d] for way in ways], axis=0)
     centre = np.asarray(nodal @ x / nodal.sum())
@@ -290,8 +294,8 @@ def _require_one_mass(
         raise InputError(
             where,
             got=f"a centre of mass at ({', '.join(f'{1e3 * c:.4g}' for c in centre)}) mm",
-            expected="a place within the box around the nodes",
-            hint="the mass matrix has negative parts, or belongs to other nodes.",
+            expected="a point within the bounding box of the nodes",
+            hint="the mass matrix has negative parts, or belongs to different nodes.",
         )
     if d == 2:
         centre[0] = 0.0
@@ -304,7 +308,7 @@ def _require_support(name: str, held: NDArray[np.float64]) -> None:
         raise InputError(
             f"body '{name}': supports",
             got=f"held degrees of freedom that leave {left} of {held.shape[1]} rigid motions free",
-            expected="a support that holds the body, or none (a free body)",
-            hint="hold nodes that do not lie on one line; what is constrained in the program that "
-            "wrote the matrices is held here too.",
+            expected="a support that constrains the body, or none (a free body)",
+            hint="fix nodes that are not on one line; constraints of the program "
+            "that wrote the matrices apply here too.",
         )

@@ -119,7 +119,7 @@ def block_lanczos(
             return values[:leading], space.basis @ S[:, :leading]
         if full:
             raise ConvergenceError(
-                f"block Lanczos: {leading} modes settled in {space.size} vectors, which is not "
+                f"block Lanczos: {leading} modes converged in {space.size} vectors, which is not "
                 "enough.\nTry: fewer modes or a lower max_frequency."
             )
 

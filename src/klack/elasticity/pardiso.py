@@ -143,7 +143,7 @@ def _library() -> ctypes.CDLL:
 
 
 def _files_of_mkl() -> list[PackagePath]:
-    """Files of the mkl package, wherever on the path it lies; none if it came by other ways."""
+    """Files of the mkl package anywhere on the path; none if installed otherwise."""
     try:
         return files("mkl") or []
     except PackageNotFoundError:

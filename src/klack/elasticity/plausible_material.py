@@ -63,7 +63,7 @@ class MaterialEstimate:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What no material has, in words."""
+        """Properties outside those of any material, as text."""
         least = 1.0 if self.exact_volume else _LEAST_FILLING
         checks = (
             (self.density, DENSITY, least, f"a density of {self.density_in_words}", "kg/m^3"),
@@ -127,8 +127,8 @@ def require_plausible_material(
         return
     fitting = [] if units is None else _fitting(material, units)
     hint = (
-        "check the units of the matrices, and the unit of the coordinates beside the mesh or the "
-        "nodes."
+        "check the units of the matrices, and the unit of the coordinates given with the "
+        "mesh or the nodes."
     )
     if fitting:
         name, other = fitting[0]

@@ -35,7 +35,7 @@ def held_dofs(mesh: Mesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def motions_left_free(held: NDArray[np.float64]) -> int:
-    """How many rigid motions a support leaves free, from their values where it holds."""
+    """Number of rigid motions left free by a support, from their values at its nodes."""
     sizes = np.linalg.svd(held, compute_uv=False)
     return held.shape[1] - int(np.sum(sizes > _SUPPORT * sizes[0]))
 
@@ -131,20 +131,20 @@ def _fault(
     if np.any(shifts) and share < _MOST_TIED:
         got = f"forces under a rigid shift at {len(np.unique(rows // d))} nodes ({named}, ...)"
         hint = (
-            "springs or supports there hold the body within its stiffness matrix: take them out, "
-            "or have the program leave out what it constrains."
+            "the stiffness matrix includes springs or supports there: remove "
+            "them, or let the program leave out constrained rows."
         )
     elif np.any(shifts):
         got = "forces under a rigid shift at most nodes"
         hint = (
-            "the rows stand in another order than x, y, z of node after node: give 'dofs', or the "
-            "matrix is no stiffness."
+            "the order of the rows is not x, y, z node by node: give 'dofs'; or "
+            "the matrix is not a stiffness."
         )
     else:
         got = "forces under a rigid rotation, but none under a shift"
         hint = (
-            "the coordinates are not those of the matrices: another mesh, another order of nodes "
-            "(give 'dofs'), or nodes with rotated coordinate systems."
+            "the coordinates are not those of the matrices: a different mesh or order "
+            "of nodes (give 'dofs'), or nodes with rotated coordinate systems."
         )
     return InputError(
         where,

@@ -40,12 +40,13 @@ def require_positive_mass(where: str, M: csr_array, free: NDArray[np.int64]) -> 
             where,
             got=f"a mass matrix with a negative eigenvalue ({smallest:.2g} of its diagonal)",
             expected="a positive definite mass matrix",
-            hint="the entry is K, or only the off-diagonal part of M; take consistent mass.",
+            hint="the entry is K, or only the off-diagonal part of M; use a consistent mass "
+            "matrix.",
         )
 
 
 def first_frequency(where: str, body: ElasticBody) -> float:
-    r"""Lowest elastic eigenfrequency [Hz], after the check that nothing else lies below it.
+    r"""Lowest elastic eigenfrequency [Hz], after the check that nothing else is below it.
 
     With K R = 0, and with as many degrees of freedom held as there are rigid motions, K has a
     Cholesky factor exactly if it has no negative eigenvalue and no motions without strain but the
@@ -63,7 +64,7 @@ def first_frequency(where: str, body: ElasticBody) -> float:
         raise InputError(
             where,
             got=f"{body.rigid_modes.shape[1]} rigid motions free, and {error.got}",
-            expected="a stiffness that strains in every other motion, all eigenvalues above 0",
+            expected="a stiffness with strain in every other motion, all eigenvalues above 0",
             hint="the body is in several pieces or has a mechanism (glue its solids before the "
             "matrices are written), or the matrix has stress stiffening, or K and M are exchanged.",
         ) from error

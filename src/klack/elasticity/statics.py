@@ -43,7 +43,7 @@ Result = TypeVar("Result")
 
 
 class Flexibility(Closing):
-    """Elastic static answer of a body to loads; one factorisation, many right-hand sides.
+    """Elastic static response of a body to loads; one factorisation, many right-hand sides.
 
     Parameters
     ----------
@@ -177,13 +177,13 @@ class Flexibility(Closing):
         return remembered(self.cache, kind, (self.key, *parts), compute, pack=pack, unpack=unpack)
 
     def close(self) -> None:
-        """Give back the memory of the factorisation."""
+        """Release the memory of the factorisation."""
         self._closed = True
         if self._factor is not None:
             self._factor.close()
 
     def _check(self) -> None:
-        """Factorise: an error of the matrix comes here and not later."""
+        """Factorise, so that an error of the matrix is raised here."""
         _ = self.factorization
 
     def _solve_block(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -198,7 +198,7 @@ class Flexibility(Closing):
 
 
 def _isostatic_support(body: ElasticBody) -> NDArray[np.int64]:
-    """As many degrees of freedom as rigid modes that, held, stop every rigid motion."""
+    """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
     d = body.dimension
     x = body.mesh.points
     if d == 2:

@@ -1,1 +1,1 @@
-"""Calculations handed to other programs, and their results read back."""
+"""Exports to other programs, and their results read back."""

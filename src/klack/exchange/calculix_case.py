@@ -24,15 +24,15 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     Warns
     -----
     AccuracyWarning
-        If the case has a guide or a stop above, which only the interface level knows.
+        If the case has a guide or an upper stop, which only the interface level supports.
     """
     if case.dimension != 3:
         raise InputError(
             f"{case.path or 'case'}: bodies",
             got="axisymmetric bodies",
-            expected="solids: CalculiX would turn axisymmetric elements into wedges of one layer, "
-            "whose contact is another problem",
-            hint="say 'model: swept' (with layers) or 'model: solid' in both geometries.",
+            expected="solids: CalculiX would turn axisymmetric elements into wedges of "
+            "one layer, with a different contact problem",
+            hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
     if left_out:

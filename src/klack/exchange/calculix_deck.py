@@ -88,7 +88,7 @@ class CalculixImpact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalculixSettings:
-    """How ccx computes an impact.
+    """Settings of ccx for an impact.
 
     Parameters
     ----------
@@ -177,15 +177,15 @@ def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
     if not square > 0:
         raise InputError(
             "CalculiX: step",
-            got=f"{step:g} s: two steps of flight need more speed than there is",
-            expected="a step that is short against the time in which the force stops the body",
+            got=f"{step:g} s: the speed is too low for two steps of flight",
+            expected="a step much shorter than the time in which the force stops the body",
             hint="take a shorter step.",
         )
     return back, sqrt(square)
 
 
 def _distance(impact: CalculixImpact) -> float:
-    """Way of the upper body to -z until any point touches [m], negative where they overlap.
+    """Travel of the upper body to -z until any point touches [m], negative where they overlap.
 
     The faces of a coarse swept mesh wave by up to 0.1 um between their nodes, which a penalty at
     integration points feels, so they are sampled densely.
@@ -243,16 +243,16 @@ def _require_solids(impact: CalculixImpact) -> None:
             raise InputError(
                 f"body '{body.name}'",
                 got="a body of revolution",
-                expected="a solid: CalculiX turns axisymmetric elements into wedges of one layer, "
-                "whose contact is another problem",
-                hint="say 'model: swept' (with layers) or 'model: solid' in the geometry.",
+                expected="a solid: CalculiX turns axisymmetric elements into wedges of "
+                "one layer, with a different contact problem",
+                hint="use 'model: swept' (with layers) or 'model: solid' in the geometry.",
             )
     if len(impact.upper.fixed):
         raise InputError(
             f"body '{impact.upper.name}'",
             got="an upper body that is held",
-            expected="one that is free to fly in -z",
-            hint="take its supports out of the case, or swap the bodies.",
+            expected="one that is free to move in -z",
+            hint="remove its supports from the case, or swap the bodies.",
         )
 
 

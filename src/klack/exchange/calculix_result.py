@@ -2,7 +2,7 @@
 
 Read are, of every time printed: the resultant of ``*CONTACT PRINT ... CF``, the spring energy of
 ``*CONTACT PRINT ... CELS`` and the totals of ``*EL PRINT ... ELSE, ELKE`` (internal and kinetic
-energy of a set).  All else in the file is passed over.  Beside ``NAME.dat`` two more files are read
+energy of a set).  All else in the file is ignored.  Beside ``NAME.dat`` two more files are read
 if they are there: ``NAME.sta`` for the number of iterations, ``NAME.log`` (what ccx wrote to the
 terminal) for its wall time.
 
@@ -42,7 +42,7 @@ _SAME_ENERGY = 2e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalculixResult:
-    """What ccx printed, one entry per increment; SI.
+    """Output of ccx, one entry per increment; SI.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def read_calculix(path: Path) -> CalculixResult:
     ------
     InputError
         If the file is missing, too large, cut off, holds no contact force or that of several
-        pairs, or numbers that are none.
+        pairs, or values that are not numbers.
     """
     path = Path(path)
     _require_file(path)
@@ -132,7 +132,7 @@ def read_calculix(path: Path) -> CalculixResult:
         with path.open(encoding="ascii") as stream:
             _read(path, stream, tables)
     except UnicodeDecodeError as error:
-        raise _refuse(path, "bytes that are no text", "the .dat file of a run of CalculiX") from (
+        raise _refuse(path, "bytes that are not text", "the .dat file of a run of CalculiX") from (
             error
         )
     time, axial, sideways = _force(path, tables)
@@ -173,7 +173,7 @@ def _refuse(path: Path, got: str, expected: str, hint: str = "") -> InputError:
         str(path),
         got=got,
         expected=expected,
-        hint=hint or "run the deck that `klack export CASE --to calculix` writes.",
+        hint=hint or "run the deck written by `klack export CASE --to calculix`.",
     )
 
 
@@ -221,7 +221,7 @@ def _number(path: Path, word: str) -> float:
     try:
         value = float(word)
     except ValueError:
-        raise _refuse(path, f"'{word[:40]}' where a number belongs", "numbers") from None
+        raise _refuse(path, f"'{word[:40]}' instead of a number", "numbers") from None
     if not np.isfinite(value):
         hint = "the run diverged: take a shorter step, or a smaller penalty."
         raise _refuse(path, f"'{word[:40]}'", "finite forces and energies", hint)
@@ -230,7 +230,7 @@ def _number(path: Path, word: str) -> float:
 
 def _cut(path: Path) -> InputError:
     hint = "let the run finish, or copy the file again."
-    return _refuse(path, "a table that breaks off", "complete tables", hint)
+    return _refuse(path, "a truncated table", "complete tables", hint)
 
 
 def _force(

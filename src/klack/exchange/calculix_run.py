@@ -72,7 +72,7 @@ def run_calculix(
     time_limit: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> CalculixRun:
-    """Run a deck; ``NAME.dat``, ``NAME.sta`` and ``NAME.log`` come to lie beside it.
+    """Run a deck; ``NAME.dat``, ``NAME.sta`` and ``NAME.log`` are written next to it.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _finished(log: Path) -> bool:
 
 
 def _failure(deck: Path, log: Path, code: int) -> InputError | ConvergenceError:
-    """Say what ccx complained about."""
+    """Error message of ccx."""
     complaint = _ERROR.search(_tail(log))
     words = " ".join(complaint[0].split())[:400] if complaint else f"exit code {code}"
     reached = _reached(deck.with_suffix(".sta"))

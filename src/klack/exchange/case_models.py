@@ -27,7 +27,7 @@ __all__ = ["CaseModels", "case_models"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CaseModels:
-    """What a case gives to other programs.
+    """Models of a case for other programs.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
                 expected="a contact law between two bodies",
                 hint="give it a law."
                 if lawless
-                else "give the stop a body of its own, held by a support.",
+                else "give the stop a separate body, held by a support.",
             )
         (upper, a), (lower, b) = met.upper, met.lower
         contacts.append(

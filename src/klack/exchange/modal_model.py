@@ -1,4 +1,4 @@
-r"""What leaves klack as a model: modes, inputs, outputs and contacts, as plain numbers.
+r"""Exported model: modes, inputs, outputs and contacts, as plain numbers.
 
 Every writer of models (FMU, Modelica, MATLAB, text) starts from a :class:`ModalModel`, so all of
 them hold the same equations,
@@ -44,7 +44,7 @@ Quantity = Literal["displacement", "velocity", "gap", "force"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Provenance:
-    """Where a model comes from; every file that leaves klack says it.
+    """Origin of a model, stated in every exported file.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def pair_model(
     if body.rigid_count == 0:
         raise InputError(
             f"model '{name}': moving body",
-            got=f"'{moving}', which is held",
+            got=f"'{moving}', which is supported",
             expected="a free body",
             hint=nearest(moving, [b.name for b in system.bodies], "name the needle."),
         )

@@ -41,7 +41,7 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
             raise InputError(
                 str(folder),
                 got=f"the model name '{model.name}' of {len(model.name)} characters",
-                expected=f"at most {LONGEST}, so that MATLAB takes it with an ending",
+                expected=f"at most {LONGEST}, so that MATLAB accepts it with a suffix",
                 hint="give the case or the body a shorter name.",
             )
         if model.mode_count == 0:
@@ -56,7 +56,7 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
 
 
 def named_apart(model: ModalModel) -> ModalModel:
-    """Return the model with a number behind every name that comes again.
+    """Return the model with a number appended to repeated names.
 
     Ports ``tip-a`` and ``tip_a`` have the same name in most programs.
     """

@@ -104,7 +104,7 @@ def _interface(model: ModalModel) -> Iterable[str]:
         )
         yield (
             '  parameter Real start_rise(unit="m") = 0 '
-            '"Way of the moving body along +z before the start, from where the case puts it";'
+            '"Displacement of the moving body along +z before the start";'
         )
     if any(contact.film and contact.series_compliance for contact in model.contacts):
         yield (

@@ -204,7 +204,7 @@ _SOFT_POWER = """
 _TABLE = """
   protected
     Integer row;
-    Real rest "Overlap that is left for the interval";
+    Real rest "Remaining overlap of the interval";
     Real s "Indentation from the start of the interval";
 SEARCH  algorithm
     row := 1;

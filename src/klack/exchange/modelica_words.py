@@ -28,7 +28,7 @@ def text(words: str) -> str:
 
 
 def class_name(name: str) -> str:
-    """Name of a class that is no word of the language and no variable of the model."""
+    """Name of a class that is neither a keyword nor a variable of the model."""
     return f"{name}_model" if name in _TAKEN else name
 
 

@@ -235,7 +235,7 @@ def contact_kind(contact: ModelContact) -> ContactKind:
         f"contact '{contact.name}'",
         got="a law with dissipation (Hunt and Crossley)",
         expected="an elastic law: consistent, linear, Hertz or table",
-        hint="bodies with modes lose energy by themselves; use the consistent law of klack.",
+        hint="bodies with modes lose energy by vibration; use the consistent law of klack.",
     )
 
 
@@ -281,5 +281,5 @@ def _require_size(model: ModalModel) -> None:
             f"model '{model.name}'",
             got=f"{states} states: a dense A of {states**2 * 8 / 2**30:.1f} GiB",
             expected="less than 2 GiB, the limit of MATLAB files of version 5",
-            hint="keep fewer modes: frequencies above 2 MHz do not matter for an impact.",
+            hint="keep fewer modes: frequencies above 2 MHz are irrelevant for an impact.",
         )

@@ -93,7 +93,7 @@ def _write_table(path: Path, heads: Sequence[str], rows: NDArray[np.float64]) ->
 
 
 def _modes(model: ModalModel) -> tuple[list[str], NDArray[np.float64]]:
-    """One row per mode; a body has a column for each port, as klack's reader of modes wants it."""
+    """One row per mode; a body has a column for each port, as klack's reader of modes expects."""
     heads, columns = ["frequency [Hz]", "damping"], [model.frequencies, model.damping]
     if model.kind == "body":
         for output in model.outputs:
@@ -150,7 +150,7 @@ def _info(model: ModalModel, form: FirstOrder) -> Iterable[str]:
     )
     if model.kind == "body":
         yield ""
-        yield "residual compliance between the inputs [m/N], what the modes miss; not in D:"
+        yield "residual compliance between the inputs [m/N]; not in D:"
         for row in model.residual_compliance:
             yield "  " + " ".join(_DIGITS % value for value in row)
     for contact in model.contacts:

@@ -33,7 +33,7 @@ class Chamber(Component):
     type: ClassVar[str] = "chamber"
     ports: ClassVar[Mapping[str, Port]] = {"fluid": COMPLIANCE}
 
-    volume: Volume = Field(gt=0, description="With all faces where they start.")
+    volume: Volume = Field(gt=0, description="With all faces at their start positions.")
     pressure: Pressure | None = Field(
         default=None,
         gt=0,

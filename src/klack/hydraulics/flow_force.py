@@ -1,4 +1,4 @@
-r"""Forces that a flow itself puts on a needle, beside the pressure on its faces.
+r"""Flow forces on a needle, in addition to the pressure on its faces.
 
 A jet that leaves a seat carries momentum away, so that the pressure near the edge is lower than in
 the chamber: the needle is drawn shut with ``rho Q v cos(theta)`` whichever way the fluid runs
@@ -37,7 +37,7 @@ class FlowForce(Section):
     )
     damping_length: Length = Field(
         default=0.0,
-        description="Column that a change of flow accelerates; positive when flow from a to b "
+        description="Fluid column accelerated by a change of flow; positive when flow from a to b "
         "runs along +z beside the needle.",
     )
 

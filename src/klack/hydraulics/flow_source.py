@@ -51,7 +51,7 @@ class FlowStep(Section):
     """Straight ramp to another flow, which then stays."""
 
     to: VolumeFlow = Field(description="At ambient density.")
-    at: Time = Field(ge=0, description="Begin of the ramp.")
+    at: Time = Field(ge=0, description="Start of the ramp.")
     rise: Time = Field(default=1e-6, gt=0, description="Length of the ramp.")
 
 
@@ -71,10 +71,10 @@ class FlowSource(Component):
     """Prescribed flow from a to b: constant, with a step, or from a table.
 
     A pump without leakage: it reaches any pressure, and its work ``(g_b - g_a) m`` (``g`` the
-    integral of ``dp/rho``) is booked as supply.  Left alone, port a takes the fluid from the
+    integral of ``dp/rho``) is counted as a supply.  Left alone, port a takes the fluid from the
     surroundings.  The flow is a volume at ambient density, times that density a mass flow.
 
-    Limits: a flow out of a chamber goes on when the chamber is empty; the fluid's pressure then
+    Limits: a flow out of a chamber continues when the chamber is empty; the fluid's pressure then
     falls to its lower end, and the run says so.
     """
 
@@ -93,7 +93,7 @@ class FlowSource(Component):
     @model_validator(mode="after")
     def _one_history(self) -> Self:
         if self._exactly_one(("flow", "table"), "the flow over time") == "table":
-            return self._refuse_with(("step",), "table", "the table holds every change")
+            return self._refuse_with(("step",), "table", "the table contains every change")
         return self
 
     def history(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -82,7 +82,7 @@ class Fluid:
 
     @property
     def pressure_range(self) -> PressureRange:
-        """Absolute pressures for which the fluid is described, and where that comes from."""
+        """Absolute pressure range of the fluid description, with its source."""
         return self.known_range or self.liquid.pressure_range
 
     @property

@@ -67,7 +67,7 @@ class FluidChoice(Section):
     the run and one atmosphere.  ``fluid: n-heptane`` is short for ``fluid: {name: n-heptane}``.
     """
 
-    name: Text = Field(description="Name of the library, or of your own fluid.")
+    name: Text = Field(description="Name in the library, or of your own fluid.")
     density: Density | None = Field(
         examples=["750 kg/m^3"], default=None, gt=0, description="At one atmosphere."
     )
@@ -97,7 +97,7 @@ class FluidChoice(Section):
         examples=["5 kPa"],
         default=None,
         gt=0,
-        description="Where it boils, absolute; default 10 Pa.",
+        description="Vapour pressure, absolute; default 10 Pa.",
     )
     vapour_density: Density | None = Field(
         examples=["1 kg/m^3"],
@@ -115,13 +115,13 @@ class FluidChoice(Section):
         default=1.4, ge=1, le=5 / 3, description="1 for slow changes, 1.4 for fast ones."
     )
     release_pressure: Pressure | None = Field(
-        default=None, gt=1, description="Below it all gas is free; default: it always is."
+        default=None, gt=1, description="Below it all gas is free; default: always free."
     )
     saturation_pressure: Pressure | None = Field(
         default=None, gt=1, description="Above it all gas is dissolved."
     )
     boiling_half_width: Pressure = Field(
-        default=2000.0, gt=0, description="Half of the band of pressures in which it boils."
+        default=2000.0, gt=0, description="Half of the pressure band in which it boils."
     )
 
     @model_validator(mode="before")
@@ -144,9 +144,9 @@ class FluidChoice(Section):
         if find_fluid(self.name) is not None:
             raise CaseProblem(
                 ("name",),
-                got=f"'{self.name}' of the library together with numbers of your own",
-                expected="a name alone, or your own numbers under a name of your own",
-                hint=f"remove the numbers, or call it e.g. my-{self.name.replace(' ', '-')}.",
+                got=f"'{self.name}' of the library together with your own values",
+                expected="a name alone, or your own values under another name",
+                hint=f"remove the values, or call it e.g. my-{self.name.replace(' ', '-')}.",
             )
         self._exactly_one(("density", "table"), "the density")
         self._exactly_one(("viscosity", "kinematic_viscosity"), "the viscosity")
@@ -159,11 +159,11 @@ class FluidChoice(Section):
 
     def _in_library(self) -> Self:
         if find_fluid(self.name) is None:
-            hint = "for a fluid of your own add density, viscosity and bulk_modulus."
+            hint = "for your own fluid add density, viscosity and bulk_modulus."
             raise CaseProblem(
                 ("name",),
                 got=f"'{self.name}'",
-                expected=f"one of: {one_of(FLUIDS)}; or numbers of your own",
+                expected=f"one of: {one_of(FLUIDS)}; or your own values",
                 hint=nearest(self.name, FLUIDS, hint),
             )
         return self

@@ -1,4 +1,4 @@
-"""What is known of a fluid over temperature, with the source of every constant."""
+"""Properties of a fluid over temperature, with the source of every constant."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,7 +45,7 @@ def _vapour_density(pressure: float, temperature: float, molar_mass: float) -> f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """A constant of a fluid and where it comes from.
+    """A constant of a fluid with its source.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Constant:
 
 
 class FluidState(NamedTuple):
-    """What :class:`FluidProperties` give at one temperature."""
+    """Values of :class:`FluidProperties` at one temperature."""
 
     liquid: LiquidLaw
     viscosity: float  # [Pa s] at one atmosphere
@@ -336,8 +336,8 @@ class FluidDefinition:
                 f"fluid '{self.name}': temperature",
                 got=f"{temperature - _ZERO_CELSIUS:g} degC",
                 expected=f"{low - _ZERO_CELSIUS:g} to {high - _ZERO_CELSIUS:g} degC",
-                hint="describe a fluid of your own by density, viscosity and bulk_modulus at this "
-                "temperature; the constants of the library hold within the range.",
+                hint="describe your own fluid by density, viscosity and bulk_modulus at "
+                "this temperature; the constants of the library hold within the range.",
             )
         state = self.properties.at(temperature)
         return Fluid(

@@ -90,7 +90,7 @@ def _pieces(fluid: Fluid, ambient_pressure: float) -> tuple[Vector, Vector]:
         count += int(np.count_nonzero(good))
         if count + left.size > _MOST_PIECES:
             raise ConvergenceError(
-                f"fluid_table: '{fluid.name}' is not settled after {_MOST_PIECES} pieces, the "
+                f"fluid_table: '{fluid.name}' has not converged after {_MOST_PIECES} pieces, the "
                 f"last at {left[~good][0]:g} Pa.\nTry: a smoother density, or fluid.kinks there."
             )
         middle = np.sqrt(left[~good] * right[~good])
@@ -141,8 +141,8 @@ def _error(fluid: Fluid, left: Vector, right: Vector, factors: Vector) -> Vector
 def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, int]:
     """Density [kg/m^3], its slope [kg/(m^3 Pa)], pressure energy [J/kg] and the place in the table.
 
-    Never fails: below 1 Pa the specific volume, above 4000 bar the density goes on as a straight
-    line, so that the density is above zero and rises with pressure everywhere.
+    Never fails: below 1 Pa the specific volume, above 4000 bar the density continues
+    linearly, so that the density is above zero and rises with pressure everywhere.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ class LandFace(Component):
     ports: ClassVar[Mapping[str, Port]] = {"inside": FLOW, "outside": FLOW, "body": ELEMENT}
 
     direction: Literal["opening", "closing"] = Field(
-        description="Where the pressure pushes: opening is +z."
+        description="Direction of the pressure force: opening is +z."
     )
     inner_diameter: Length = Field(gt=0, description="Of the land.")
     outer_diameter: Length = Field(gt=0, description="Of the land.")

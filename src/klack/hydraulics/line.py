@@ -64,8 +64,8 @@ class Line(Component):
     pressure: Pressure | None = Field(
         default=None,
         gt=0,
-        description="Absolute, about which waves run; sets sound speed and density. Default: the "
-        "higher start pressure that the case states at its ends.",
+        description="Absolute, of the linear waves; sets sound speed and density. "
+        "Default: the higher start pressure stated at its ends.",
     )
     wall_thickness: Length | None = Field(
         default=None, gt=0, description="Of a tube; without it the wall is rigid."
@@ -77,7 +77,9 @@ class Line(Component):
         default="kagawa", description="none, steady laminar, or with memory after Kagawa."
     )
     segments: Count | None = Field(
-        default=None, description="Parts between which friction and cavities sit; 2, or 1 without."
+        default=None,
+        description="Segments between which friction and cavities are lumped; "
+        "default 2, or 1 without friction.",
     )
 
     @model_validator(mode="after")
@@ -112,7 +114,7 @@ class Line(Component):
             raise InputError(
                 "Line.wave_speed: pressure",
                 got="none",
-                expected="the pressure about which the waves run",
+                expected="the pressure of the linear waves",
                 hint="give it here or to the line; in a network it is that of its ends.",
             )
         return float(self._speeds(fluid, about))
@@ -184,8 +186,8 @@ class Line(Component):
             speeds = [self.wave_speed(fluid, x) for x in (pressure, p)]
             return (
                 f"Its waves run at {speeds[0]:.4g} m/s, those at {1e-5 * p:.4g} bar at "
-                f"{speeds[1]:.4g} m/s: the times of echoes, the pressures of a change of flow and "
-                f"the fluid that the line stores are up to {100.0 * float(error(p)[0]):.2g} % off "
+                f"{speeds[1]:.4g} m/s: echo times, pressures of a change "
+                f"of flow and the stored fluid are up to {100.0 * float(error(p)[0]):.2g} % off "
                 "at such times."
             )
 
@@ -204,8 +206,8 @@ class Line(Component):
                 valid=(low, float(high)),
                 law=f"the line '{rows.component}' with the fluid of {1e-5 * pressure:.4g} bar",
                 effect=effect,
-                advice=f"give components.{rows.component}.pressure the one at which the waves that "
-                "matter run, and compare two runs with pressures that include it.",
+                advice=f"give components.{rows.component}.pressure the working pressure of "
+                "the relevant waves, and compare two runs with pressures around it.",
                 key="pressure",
                 node=node,
             )

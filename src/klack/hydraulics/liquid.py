@@ -25,7 +25,7 @@ ATMOSPHERE = 101_325.0
 """Standard atmosphere [Pa]."""
 
 HIGHEST_PRESSURE = 4e8
-"""Absolute pressure [Pa] up to which any liquid is described: where the time loop ends its run."""
+"""Absolute pressure [Pa] up to which any liquid is described: where the time loop stops."""
 
 _STEEP = 11.5  # [-] slopes above it are those of a liquid at low pressure
 _STIFFENS = 10.0  # [-] dK/dp of most liquids
@@ -135,8 +135,7 @@ class Murnaghan:
             highest=min(
                 self.reference_pressure + share * self.bulk_modulus_at_reference, HIGHEST_PRESSURE
             ),
-            source=f"its bulk modulus rises as a straight line, which real liquids follow up to "
-            f"{share:g} of it",
+            source=f"its bulk modulus rises linearly, as in real liquids up to {share:g} of it",
         )
 
     def density(self, pressure: ArrayLike) -> Values:
@@ -302,8 +301,8 @@ def _require_rising(p: Values, rho: Values) -> None:
             "TabulatedLiquid",
             got=f"points from ({p[0]:g} Pa, {rho[0]:g} kg/m^3) to ({p[-1]:g} Pa, {rho[-1]:g} "
             "kg/m^3)",
-            expected="absolute pressures and densities that both increase strictly from above 0",
-            hint="sort the points, drop repeated ones, and give the densities with more digits.",
+            expected="absolute pressures and densities above 0, both strictly increasing",
+            hint="sort the points, remove repeated ones, and give the densities with more digits.",
         )
 
 

@@ -1,4 +1,4 @@
-r"""What a liquid carries with it: entrained gas, and vapour where the pressure falls.
+r"""Liquid with entrained gas, and vapour at low pressure.
 
 Both are described by their volume per volume of liquid, so that mass is conserved by construction
 and density and stiffness are one function, see :class:`klack.hydraulics.fluid.Fluid`.

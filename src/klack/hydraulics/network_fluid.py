@@ -1,4 +1,4 @@
-"""The fluid of a network, as restrictions need it at set-up."""
+"""Fluid of a network for restrictions at set-up."""
 
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ def network_fluid(rows: Rows) -> "Fluid":
         raise InputError(
             f"{rows.component or 'component'}: fluid",
             got="no fluid in the network",
-            expected="a fluid, since this component carries or holds some",
+            expected="a fluid, since this component contains it",
             hint="name one in the network section, e.g. fluid: {name: n-heptane}.",
         )
     return rows.fluid

@@ -51,7 +51,7 @@ def choked_flow(
     throat: float,
     vapour: float,
 ) -> tuple[float, float, float]:
-    r"""Limit a mass flow by what a throat at vapour pressure lets through.
+    r"""Limit a mass flow by that of a throat at vapour pressure.
 
     .. math:: \dot m \le C_c A \sqrt{2 \varrho (p_1 - p_v)}
 
@@ -168,7 +168,7 @@ class Orifice(Component):
     hydraulic_diameter: Length | None = Field(
         default=None, gt=0, description="4 area / perimeter; of a circle by default."
     )
-    count: Count = Field(default=1, description="Number of such holes, side by side.")
+    count: Count = Field(default=1, description="Number of such holes in parallel.")
     discharge: Ratio = Field(
         default=0.7,
         gt=0,

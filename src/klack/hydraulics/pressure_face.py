@@ -35,7 +35,7 @@ class PressureFace(Component):
     ports: ClassVar[Mapping[str, Port]] = {"fluid": FLOW, "body": ELEMENT}
 
     direction: Literal["opening", "closing"] = Field(
-        description="Where the pressure pushes: opening is +z."
+        description="Direction of the pressure force: opening is +z."
     )
     area: Area | None = Field(default=None, gt=0, description="Projected along the axis.")
     outer_diameter: Length | None = Field(

@@ -20,7 +20,7 @@ class PressureStep(Section):
     """Straight ramp to another pressure, which then stays."""
 
     to: Pressure = Field(gt=0, description="Absolute.")
-    at: Time = Field(ge=0, description="Begin of the ramp.")
+    at: Time = Field(ge=0, description="Start of the ramp.")
     rise: Time = Field(default=1e-6, gt=0, description="Length of the ramp.")
 
 
@@ -55,7 +55,7 @@ class PressureSource(Component):
     @model_validator(mode="after")
     def _one_history(self) -> Self:
         if self._exactly_one(("pressure", "table"), "the pressure over time") == "table":
-            return self._refuse_with(("step",), "table", "the table holds every change")
+            return self._refuse_with(("step",), "table", "the table contains every change")
         return self
 
     def history(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

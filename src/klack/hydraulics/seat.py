@@ -208,13 +208,13 @@ class Seat(Component):
                 ("half_angle",),
                 got=f"{self.half_angle * 180 / pi:g} deg",
                 expected="less than 90 deg, measured from the axis",
-                hint="half of the angle that a drawing gives; a flat seat has shape: flat.",
+                hint="half of the angle in a drawing; a flat seat has shape: flat.",
             )
         if self.ball_diameter is not None and self.ball_diameter <= self.diameter:
             raise CaseProblem(
                 ("ball_diameter",),
                 got=f"{self.ball_diameter:g} m in a seat of {self.diameter:g} m",
-                expected="a ball larger than its seat, through which it would fall",
+                expected="a ball larger than its seat",
                 hint="check both diameters and their units.",
             )
         return self

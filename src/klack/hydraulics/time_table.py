@@ -14,7 +14,7 @@ def check_table(time: Sequence[float], values: Sequence[float], name: str) -> No
             (name,),
             got=f"{len(values)} values at {len(time)} times",
             expected="one value per time, at least one",
-            hint="both lists belong together, entry by entry.",
+            hint="give one entry in each list per time.",
         )
     for k in range(1, len(time)):
         if not time[k] > time[k - 1]:

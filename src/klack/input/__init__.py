@@ -1,1 +1,1 @@
-"""What people write: sections of documented keys, and one clear error for each mistake."""
+"""User input: sections of documented keys, and one clear error for each mistake."""

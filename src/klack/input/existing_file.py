@@ -28,14 +28,14 @@ def refuse_lfs_pointer(path: Path) -> None:
     if start == _LFS_POINTER:
         raise InputError(
             str(path),
-            got="a pointer of git-LFS: the text that stands for a file that was not downloaded",
+            got="a git-LFS pointer: a placeholder for a file that was not downloaded",
             expected="the file itself",
             hint="run 'git lfs pull' in its repository, or download the file by hand.",
         )
 
 
 def instead_of_file(path: Path) -> str:
-    """What stands where a file should be, in words; empty for a file.
+    """Description of what is in place of a file; empty for a file.
 
     A name may also be too long for the system, or lie in a folder that is closed to this user.
     """
@@ -62,8 +62,8 @@ def _existing_file(value: Any, info: ValidationInfo) -> Path:
     try:
         path = (folder / Path(value).expanduser()).resolve()
     except (OSError, RuntimeError) as error:  # the present folder is gone; links in a circle
-        hint = "write the whole path of the file."
-        got = f"'{name}', which leads nowhere ({error})"
+        hint = "write the full path of the file."
+        got = f"'{name}', which has no target ({error})"
         raise CaseProblem((), got=got, expected="an existing file", hint=hint) from None
     if kind := instead_of_file(path):
         raise CaseProblem(

@@ -39,11 +39,11 @@ def key_text(key: Key) -> str:
 
 def one_of(names: Iterable[str]) -> str:
     """List the names that can be used."""
-    return ", ".join(names) or "none (there is nothing to choose from)"
+    return ", ".join(names) or "none (there is none to choose from)"
 
 
 def nearest(name: str, known: Iterable[str], otherwise: str) -> str:
-    """Propose the known name that is spelled most like ``name``; else say ``otherwise``."""
+    """Known name most similar to ``name``; else ``otherwise``."""
     lower = {candidate.lower(): candidate for candidate in known}
     close = get_close_matches(name.lower(), lower, n=1, cutoff=0.6)
     return f"did you mean '{lower[close[0]]}'?" if close else otherwise

@@ -1,4 +1,4 @@
-"""What all sections of a case have in common: frozen, documented, and strict about their keys."""
+"""Base class of all sections of a case: frozen, documented, and strict about their keys."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Self

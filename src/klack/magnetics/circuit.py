@@ -95,7 +95,7 @@ class MagneticCircuit:
                 "MagneticCircuit.loops",
                 got=f"shape {loops.shape} for {len(self.branches)} branches",
                 expected=f"one row per branch and 1 to {MOST_LOOPS} columns",
-                hint="write +1 or -1 where a loop runs through a branch, else 0.",
+                hint="write +1 or -1 where a loop passes through a branch, else 0.",
             )
         if np.any(np.abs(loops) > 1) or np.linalg.matrix_rank(loops) < columns:
             raise InputError(

@@ -1,4 +1,4 @@
-r"""What drives a coil: a small state machine that every driver component compiles to.
+r"""Driver of a coil: a small state machine, compiled from every driver component.
 
 A driver is in one *state* at a time.  The state says which voltage the terminals see (constant, or
 a course over time) and whether a diode keeps the current from turning negative; its *switches* say
@@ -45,7 +45,7 @@ __all__ = [
 
 
 class When(IntEnum):
-    """What a switch waits for; the numbers stand in the compiled program."""
+    """Condition of a transition, by its number in the compiled program."""
 
     CURRENT_ABOVE = 0
     CURRENT_BELOW = 1
@@ -55,7 +55,7 @@ class When(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """Way out of a state.
+    """Transition from a state.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ class VoltageCourse:
             raise InputError(
                 "VoltageCourse",
                 got=f"{t.size} times and {u.size} voltages"
-                + (", times that fall" if t.size == u.size > 0 else ""),
-                expected="as many times as voltages, at least one, times that do not fall",
+                + (", decreasing times" if t.size == u.size > 0 else ""),
+                expected="as many times as voltages, at least one, not decreasing",
                 hint="sort the points by time; write a jump as the same time twice.",
             )
         object.__setattr__(self, "time", t)
@@ -221,10 +221,10 @@ class TimedDriver(Driver):
     flows comes down fast, and then the coil is open.
     """
 
-    start: Time = Field(default=0.0, ge=0, description="When the driver begins to work.")
-    end: Time | None = Field(default=None, gt=0, description="When it lets go; never if left out.")
+    start: Time = Field(default=0.0, ge=0, description="When the driver switches on.")
+    end: Time | None = Field(default=None, gt=0, description="When it switches off; default never.")
     repeat_every: Time | None = Field(
-        default=None, gt=0, description="Period after which all begins again; once if left out."
+        default=None, gt=0, description="Period of repetition; default no repetition."
     )
     freewheel: Voltage = Field(
         default=0.7, ge=0, description="Forward voltage of the diode while the coil freewheels."
@@ -232,8 +232,8 @@ class TimedDriver(Driver):
     decay: Voltage | None = Field(
         default=None,
         ge=0,
-        description="Voltage against the current after the end (zener diode, boost capacitor); "
-        "that of freewheeling if left out.",
+        description="Voltage against the current after the end (zener diode, boost "
+        "capacitor); default that of freewheeling.",
     )
 
     @model_validator(mode="after")
@@ -277,6 +277,6 @@ def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:
             f"{rows.component}.{port}",
             got=f"{len(drivers)} drivers",
             expected="one driver at the terminals of a coil",
-            hint="join the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
+            hint="connect the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
         )
     return drivers[0].program()

@@ -12,7 +12,7 @@ The current rises with the linkage everywhere on it, :math:`\partial^2 W/\partia
 voltage leads to one current only; a table whose splines fall between two gaps is refused.
 
 Limits: no eddy currents (add them as a resistance, or describe the circuit); beyond the table
-the surface goes on straight in each direction, in ``psi`` with the last differential inductance.
+the surface continues linearly in each direction, in ``psi`` with the last differential inductance.
 """
 
 import warnings
@@ -195,9 +195,9 @@ class FluxMap:
         if worst > _ACCEPTED * peak:
             k, j = np.unravel_index(int(np.argmax(np.abs(derived - force))), force.shape)
             warnings.warn(
-                f"force map: the given force is {force[k, j]:.4g} N at a gap of {x[j]:.4g} m, the "
-                f"linkage asks for {derived[k, j]:.4g} N there. The linkage is used, because only "
-                "one of both can keep the energy. Try: more gaps in the table, and force and "
+                f"force map: the given force is {force[k, j]:.4g} N at a gap of {x[j]:.4g} m, "
+                f"the linkage gives {derived[k, j]:.4g} N there. The linkage is used, because "
+                "only one of them can conserve energy. Try: more gaps in the table, and force and "
                 "linkage from the same computation.",
                 AccuracyWarning,
                 stacklevel=3,
@@ -239,7 +239,7 @@ def _checked(
             got="a table that is not increasing",
             expected="currents from 0 or above, gaps, and linkages (over the current) that increase"
             ", no linkage at 0 A",
-            hint="sort the table; take out remanence.",
+            hint="sort the table; remove remanence.",
         )
     if i[0] > 0.0:
         i, psi = np.concatenate(([0.0], i)), np.vstack((np.zeros(x.size), psi))

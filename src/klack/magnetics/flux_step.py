@@ -79,21 +79,21 @@ CHANNELS = (
 )
 
 FAILURES = {
-    1: "the magnetic circuit found no fluxes; a smaller step or a smoother magnetisation curve"
-    " helps, the circuit must hold back every flux (no reluctance of zero), and the gaps of a force"
-    " map must reach as far as its armature goes",
-    2: "the driver switches more than 30 times in one step: its current band is narrower than what"
-    " the current moves in a step; widen the band, take a smaller step, or give the coil more"
-    " leakage",
+    1: "the magnetic circuit has no solution for its fluxes; a smaller step or a"
+    " smoother magnetisation curve helps, no reluctance may be zero, and the gaps of a force"
+    " map must cover the travel of its armature",
+    2: "the driver switches more than 30 times in one step: its current band is narrower than"
+    " the change of the current in a step; widen the band, use a smaller step, or give the coil"
+    " more leakage",
 }
 
 _GAP_ADVICE = (
-    "the stroke has to end before the working gap does: raise components.{name}.gap, or lower the "
-    "gap of the stop that ends the stroke (residual_gap stays open beside both)."
+    "the stroke has to end before the working gap closes: increase components.{name}.gap, or "
+    "reduce the gap of the stop that ends the stroke (residual_gap remains in addition)."
 )
 _MAP_ADVICE = (
-    "give components.{name}.gap as the table counts it, and in components.{name}.gaps every gap "
-    "that the stops allow."
+    "give components.{name}.gap as in the table, and in components.{name}.gaps every "
+    "gap that the stops allow."
 )
 
 _TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
@@ -110,7 +110,7 @@ _HEADER = 8
 def _gaps(
     par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
 ) -> None:
-    """Prepare what a piece needs to know of its gaps; of a map just the gaps themselves."""
+    """Prepare the gap data of a piece; for a map just the gaps themselves."""
     if par[at + _MAP] != 0.0:
         middle[0], end[0], slope[0] = x0, x1, 0.0
     else:
@@ -201,7 +201,7 @@ def _locate(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, int]:
-    """Return the current and the switch that is reached first on the way to ``end``."""
+    """Return the current and the first transition before ``end``."""
     target, which, earliest = 0.0, _NONE, 2.0
     if par[block + 1] != 0.0 and end < 0.0:
         which, earliest = _BLOCKS, current / (current - end)
@@ -219,7 +219,7 @@ def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, 
 def _next_state(
     par: Any, block: int, switch: int, now: float, entered: float, cycle: float
 ) -> tuple[float, float, float]:
-    """Enter the next state, by the clock exactly when it says: state, entered, cycle."""
+    """Enter the next state, timed ones exactly on time: state, entered, cycle."""
     s = block + 3 + 4 * switch
     when, value = par[s], par[s + 1]
     clock = now

@@ -32,7 +32,7 @@ class ForceMapSolenoid(Component):
     with that, and a disagreement above 5 % of its peak is warned of.
 
     The table must hold every gap that the stops allow, and every current: beyond the last current
-    the linkage goes on straight, which is warned of.
+    the linkage continues linearly, with a warning.
 
     Limits: static map, so no eddy currents and no hysteresis; use
     :class:`~klack.magnetics.solenoid.Solenoid` where the first 100 us matter.
@@ -49,7 +49,7 @@ class ForceMapSolenoid(Component):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
-    gap: Length = Field(description="Gap at the start, as the table counts it.")
+    gap: Length = Field(description="Gap at the start, as in the table.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
     )
@@ -62,7 +62,7 @@ class ForceMapSolenoid(Component):
         default=None, description="Force, negative where it closes the gap; compared only."
     )
     start_current: Current = Field(
-        default=0.0, ge=0, description="At the start, constant for long before it: holding."
+        default=0.0, ge=0, description="Steady current before the start: holding."
     )
 
     @model_validator(mode="after")
@@ -112,7 +112,7 @@ class ForceMapSolenoid(Component):
                 valid=(-most, most),
                 slack=_BEYOND * most,
                 law=f"the map of '{rows.component}'",
-                effect=lambda value: "The linkage goes on straight there, without saturation.",
+                effect=lambda value: "The linkage continues linearly there, without saturation.",
                 advice="add currents to the table, or limit the current by the driver.",
                 channel=f"{rows.component} current",
             )

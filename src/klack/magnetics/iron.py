@@ -237,8 +237,8 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
         raise InputError(
             "measured magnetisation curve",
             got=f"points from ({B[0]:g} T, {H[0]:g} A/m) to ({B[-1]:g} T, {H[-1]:g} A/m)",
-            expected="flux density and field strength that both increase from (0, 0)",
-            hint="take the initial magnetisation curve, sorted; drop repeated points.",
+            expected="flux density and field strength, both increasing from (0, 0)",
+            hint="use the initial magnetisation curve, sorted; remove repeated points.",
         )
     slope = PchipInterpolator(B, H)(B, 1) if B.size > 2 else np.full(2, H[1] / B[1])
     secant = np.diff(H) / np.diff(B)

@@ -1,4 +1,4 @@
-"""How a case names its iron: from the library, by a formula, or by a table."""
+"""Choice of the iron in a case: from the library, by a formula, or by a table."""
 
 from typing import Any, Self
 
@@ -52,9 +52,7 @@ class IronChoice(Section):
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        chosen = self._exactly_one(
-            ("name", "froehlich", "tanh", "brauer", "table"), "which iron it is"
-        )
+        chosen = self._exactly_one(("name", "froehlich", "tanh", "brauer", "table"), "which iron")
         try:
             self.curve()
         except InputError as error:

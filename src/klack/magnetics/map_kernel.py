@@ -11,8 +11,8 @@ mean force as its discrete gradient, coordinate by coordinate and both ways roun
     \bar F = -\tfrac12 \sum_{\psi \in \{\psi_0, \psi_1\}}
         \frac{W(\psi, x_1) - W(\psi, x_0)}{x_1 - x_0} .
 
-Quotients of cubics are formed without subtraction, cell by cell.  Beyond the map the surface goes
-on by one more cell on each side, which has no end.
+Quotients of cubics are formed without subtraction, cell by cell.  Beyond the map the surface
+continues by one more unbounded cell on each side.
 """
 
 from typing import Any

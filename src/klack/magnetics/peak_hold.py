@@ -32,13 +32,13 @@ class PeakHold(TimedDriver):
     boost_voltage: Voltage = Field(gt=0, description="Until the peak current is reached.")
     peak_current: Current = Field(gt=0, description="Where the boost ends.")
     supply_voltage: Voltage = Field(gt=0, description="For holding (battery).")
-    hold_current: Current = Field(gt=0, description="Middle of the band that is held.")
-    hold_band: Current = Field(gt=0, description="Upper less lower current of the hold.")
+    hold_current: Current = Field(gt=0, description="Middle of the hold band.")
+    hold_band: Current = Field(gt=0, description="Upper minus lower current of the hold.")
     peak_until: Time | None = Field(
         default=None,
         gt=0,
-        description="Until when the peak is held, in a band below it as wide as that of the hold; "
-        "not held if left out.",
+        description="End of the peak hold, in a band below the peak as wide as that of the "
+        "hold; default no peak hold.",
     )
     fall: Literal["freewheel", "decay"] = Field(
         default="freewheel", description="Voltage against the current from peak to hold."

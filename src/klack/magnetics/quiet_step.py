@@ -1,6 +1,6 @@
 """The usual step of the usual coil in one go: two loops, one gap, nothing switches.
 
-Same equations and same books as the general step (:mod:`klack.magnetics.flux_step`), three times
+Same equations and energies as the general step (:mod:`klack.magnetics.flux_step`), three times
 faster, because all numbers stay in registers.  Whatever is unusual (a switch or the diode, a
 course of voltage, a table interval left, a second Newton step) it leaves to the general step.
 """

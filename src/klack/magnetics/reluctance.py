@@ -107,7 +107,7 @@ class GapReluctance:
                 "GapReluctance",
                 got=f"{x.size} gaps, {R.size} reluctances, {dR.size} slopes",
                 expected="the same number of each, at least two, the gaps increasing",
-                hint="sort the gaps and drop repeated ones.",
+                hint="sort the gaps and remove repeated ones.",
             )
         if not np.all(R > 0):
             raise InputError(
@@ -188,8 +188,8 @@ class IronReluctance:
         if not (np.all(np.diff(phi) > 0) and np.all(np.diff(F) > 0) and np.all(dF > 0)):
             raise InputError(
                 "IronReluctance",
-                got="a magnetisation curve that falls or stands still",
-                expected="mmf and slope that rise with the flux",
+                got="a magnetisation curve that is not increasing",
+                expected="mmf and slope that increase with the flux",
                 hint="sort the points by flux; smooth measured curves first.",
             )
         rows = _one_sided_rows(phi, F, dF)
@@ -245,7 +245,7 @@ def _one_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
 
 
 def _two_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
-    """One more straight interval in front, one step long; below its start it goes on."""
+    """One more straight interval in front, one step long; it also holds below its start."""
     step = x[1] - x[0]
     line = np.array([[x[0] - step, y[0] - dy[0] * step, dy[0], 0.0, 0.0]])
     last = np.array([[x[-1], y[-1], dy[-1], 0.0, 0.0]])

@@ -75,13 +75,13 @@ class Solenoid(Component):
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
     )
     residual_gap: Length = Field(
-        gt=0, description="Magnetic gap that stays when pole and armature touch."
+        gt=0, description="Magnetic gap that remains when pole and armature touch."
     )
     poles: tuple[PoleGap, ...] = Field(
         min_length=1, description="Working gaps in series, all closed by the same stroke."
     )
     parasitic: tuple[ParasiticGap, ...] = Field(
-        default=(), description="Further gaps in series that the stroke does not change."
+        default=(), description="Further gaps in series, independent of the stroke."
     )
     iron: tuple[IronPart, ...] = Field(default=(), description="Iron parts in series.")
     leakage: Permeance | None = Field(
@@ -98,7 +98,7 @@ class Solenoid(Component):
         default=0.0, ge=0, description="Main flux that remains without current, gap closed."
     )
     start_current: Current = Field(
-        default=0.0, ge=0, description="At the start, constant for long before it: holding."
+        default=0.0, ge=0, description="Steady current before the start: holding."
     )
 
     def circuit(self) -> MagneticCircuit:

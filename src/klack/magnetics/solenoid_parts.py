@@ -42,7 +42,7 @@ class PoleGap(Section):
         "wall (two equal poles inside a tube)."
     )
     shoulder: Length | None = Field(
-        default=None, gt=0, description="Side face behind the edge, for equal and plane."
+        default=None, gt=0, description="Side face next to the edge, for equal and plane."
     )
     wall: Length | None = Field(
         default=None, gt=0, description="Distance of the tube from the side face, for wall."
@@ -104,7 +104,7 @@ class ParasiticGap(Section):
     def _one(self) -> Self:
         ring = ("radius", "clearance", "length")
         if self.permeance is not None:
-            return self._refuse_with(ring, "permeance", "the permeance says it all")
+            return self._refuse_with(ring, "permeance", "the permeance is sufficient")
         if any(getattr(self, name) is None for name in ring):
             raise CaseProblem(
                 (),

@@ -39,7 +39,7 @@ def steady_fluxes(
         if high > _WIDEST * plant.linkage[-1]:
             raise ConvergenceError(
                 f"force map: no linkage carries {current:g} A at a gap of {gap:g} m.\n"
-                "Try: a map that reaches as far as the currents and gaps of the run."
+                "Try: a map that covers the currents and gaps of the run."
             )
     if current == 0.0:
         return np.zeros(1)

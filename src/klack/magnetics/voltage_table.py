@@ -29,7 +29,7 @@ class VoltageTable(Driver):
         if len(self.time) != len(self.voltage) or falling:
             raise CaseProblem(
                 ("time",),
-                got="times that fall"
+                got="decreasing times"
                 if falling
                 else f"{len(self.time)} times for {len(self.voltage)} voltages",
                 expected="as many times as voltages, in order",

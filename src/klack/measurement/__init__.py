@@ -1,1 +1,1 @@
-"""Measured strokes: records, single strokes, and the numbers that are read off them."""
+"""Measured strokes: records, single strokes, and their measures."""

@@ -21,10 +21,10 @@ class ChannelChoice(Section):
 
     name: Text = Field(min_length=1, description="Name of the channel, or a pattern with * and ?.")
     unit: Text | None = Field(
-        default=None, description="Unit of its values; as the file says without."
+        default=None, description="Unit of its values; default that of the file."
     )
     scale: Ratio = Field(
-        default=1.0, description="Factor on its values; -1 turns the direction round."
+        default=1.0, description="Factor on its values; -1 reverses the direction."
     )
 
     @model_validator(mode="before")
@@ -34,4 +34,4 @@ class ChannelChoice(Section):
 
 
 Channels = Mapping[Role, ChannelChoice]
-"""Channels by what they mean."""
+"""Channels by quantity."""

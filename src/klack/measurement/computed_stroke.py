@@ -26,7 +26,7 @@ def recorded_stroke(
     trigger: Trigger | None,
     zeroed: bool,
 ) -> dict[str, Vector]:
-    """Put a computed stroke through sensor, trigger and zero, onto the time axis of a set.
+    """Apply sensor, trigger and zero to a computed stroke, on the time axis of a set.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where strokes begin in a recording that comes in windows.
+"""Starts of strokes in a recording read in windows.
 
 A stroke begins where the trigger channel crosses its level in the direction asked for, found
 between two samples along a straight line.  The channel has to go back behind the level by five
@@ -126,7 +126,7 @@ def whole_piece(window: Window) -> Piece:
 
 @dataclass
 class _State:
-    """What is known of the trigger channel up to the sample scanned last."""
+    """State of the trigger channel up to the sample scanned last."""
 
     dead_time: float
     armed: bool = False
@@ -136,7 +136,7 @@ class _State:
     pending: list[float] = field(default_factory=list)
 
     def scan(self, series: TimeSeries, sign: float, level: float) -> None:
-        """Go on over the samples that were not scanned yet."""
+        """Continue over the samples not yet scanned."""
         distance = sign * (series.values - level)
         if self.scanned == -np.inf:
             self.margin = _HYSTERESIS * _noise(series.values)

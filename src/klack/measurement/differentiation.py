@@ -41,7 +41,7 @@ _NOTICED = 3.0  # standard deviations of the mean of a band
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VelocityEstimate:
-    """A velocity, and how it came about.
+    """A velocity with the parameters of its estimate.
 
     Parameters
     ----------
@@ -208,14 +208,14 @@ def _half_window(bandwidth: float, samples: int, step: float) -> int:
             "velocity bandwidth",
             got=f"{bandwidth:g} Hz at {1.0 / step:g} samples a second",
             expected=f"at most {_lost_3_dB(5, step):.3g} Hz: the narrowest window",
-            hint="ask for less bandwidth, or sample faster.",
+            hint="request less bandwidth, or sample faster.",
         )
     if 2 * guess + 1 > samples:
         raise InputError(
             "velocity bandwidth",
             got=f"{bandwidth:g} Hz for {samples} samples of {step:g} s",
             expected=f"a record of {2 * guess + 1} samples or more",
-            hint="ask for more bandwidth, or keep more time around the stroke.",
+            hint="request more bandwidth, or keep more time around the stroke.",
         )
     return guess
 

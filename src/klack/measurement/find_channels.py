@@ -62,7 +62,7 @@ def find_channels(
     needed: Collection[Role] = (),
     roles: Collection[Role] = tuple(ROLES),
 ) -> list[dict[Role, FoundChannel]]:
-    """Tell what the channels of a recording mean.
+    """Roles of the channels of a recording.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -
     return InputError(
         f"{recording.path.name}: channels",
         got=f"several that could be the {role}: {candidates}",
-        expected=f"one channel of {role}, or a series that differs in its numbers only",
+        expected=f"one channel of {role}, or a series with names that differ only in their number",
         hint=f"name it in the case: measurement: {{channels: {{{role}: {infos[0].name}}}}}.",
     )
 
@@ -252,6 +252,6 @@ def _not_found(recording: Recording, role: Role) -> InputError:
     return InputError(
         f"{recording.path.name}: channels",
         got=f"none that could be the {role}: {', '.join(listed)}",
-        expected=f"a channel of {ROLES[role].name} that is called '{role}' or the like",
+        expected=f"a channel of {ROLES[role].name} called '{role}' or the like",
         hint=f"name it in the case: measurement: {{channels: {{{role}: {choice}}}}}{meaning}.",
     )

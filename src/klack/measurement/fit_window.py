@@ -16,7 +16,7 @@ __all__ = ["FitWindow", "fit_windows", "sample_weights", "touch_shifts", "window
 Vector = NDArray[np.float64]
 
 _GUARD = 3.0
-"""Standard deviations of the impact time that a window ends before it."""
+"""Standard deviations of the impact time by which a window ends before it."""
 _LEAST_GUARD = 5e-6  # [s]
 _LEAD = 0.1e-3  # [s] of rest before the needle leaves the opening stop
 _APPROACH = 40e-6  # [s]
@@ -24,7 +24,7 @@ _LEFT = 0.03
 """Share of the lift by which the needle has left its stop."""
 _TAPER = 20e-6  # [s]
 _FLOOR = 1e-3
-"""Error of any model, as a share of the range of a channel: keeps noiseless data from ruling."""
+"""Error of any model, as a share of the range of a channel: limits the weight of noiseless data."""
 _SMOOTHED = 15e-6  # [s]
 
 

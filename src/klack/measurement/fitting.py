@@ -29,7 +29,7 @@ _SMALLEST_STEP, _LARGEST_STEP = 1e-3, 0.03
 _INSIDE = 1e-6
 _POLISHING, _SHARES = 2, (1.0, 0.5)
 _MOVED = 0.5
-"""Root mean square change of the model that a step aims at, in standard deviations."""
+"""Target of the root mean square change of the model by a step, in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -140,7 +140,7 @@ class Flight:
         return x + shift, float(np.sqrt(by_x @ self.covariance @ by_x))
 
     def told(self, index: int, mean: float, variance: float) -> "Flight":
-        """The same flight, told that one coefficient is ``mean`` up to a variance.
+        """The same flight, given one coefficient as ``mean`` with a variance.
 
         One step of linear estimation with one observation (Kalman 1960).
         """
@@ -269,7 +269,7 @@ def _shown(
     sensor: NDArray[np.float64],
     length: float,
 ) -> NDArray[np.float64]:
-    """What the sensor shows of each term, in scaled time ``s / length``."""
+    """Sensor output for each term, in scaled time ``s / length``."""
     u = s / length
     most = powers[-1]
     undo = np.zeros((most + 1, most + 1))  # coefficients of D q from those of q

@@ -39,7 +39,7 @@ _COMMON = 5  # level, contact time, acceleration, kappa, beta
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlightTrain:
-    """What the flights on one stop are, seen together.
+    """Joint estimate of the flights on one stop.
 
     Parameters
     ----------

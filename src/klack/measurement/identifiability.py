@@ -1,4 +1,4 @@
-r"""Which parameters, and which combinations of them, the data can tell.
+r"""Identifiability of parameters and their combinations from the data.
 
 With the Jacobian scaled by the bounds, ``J`` by ``z``, and weights *W*, the singular values of
 ``W^1/2 J`` say by how many standard deviations of the data the model moves when a combination of
@@ -23,7 +23,7 @@ _MOST_PART = 0.3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Identifiability:
-    """What the sensitivities alone say, before any scatter.
+    """Identifiability from the sensitivities alone, without scatter.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def identifiability_warnings(
     found: Identifiability,
     covariance: ShotCovariance,
 ) -> tuple[str, ...]:
-    """Say in words what the data do not tell.
+    """Warnings on what the data do not determine.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def identifiability_warnings(
     """
     C, error = covariance.covariance, covariance.standard_error
     notes = [
-        f"The data do not depend on '{name}' at all: it stays at its start value. "
-        "Take it out of the calibration, or measure something that it moves."
+        f"The data do not depend on '{name}': it stays at its start value. "
+        "Remove it from the calibration, or measure something that it affects."
         for name, e in zip(names, error, strict=True)
         if np.isinf(e)
     ]
@@ -94,17 +94,17 @@ def identifiability_warnings(
             if abs(strongest) > _STRONG:
                 ways = "the same way" if strongest > 0 else "opposite ways"
                 notes.append(
-                    f"'{names[j]}' and '{first}' are hard to tell apart (correlation "
-                    f"{strongest:+.3f}): the data hardly change when both move {ways}. Their "
-                    "intervals hold, but are wide; fix one of them if it is known."
+                    f"'{names[j]}' and '{first}' are hard to separate (correlation "
+                    f"{strongest:+.3f}): the data hardly change when both change {ways}. Their "
+                    "intervals are valid, but wide; fix one of them if it is known."
                 )
     for name, place in zip(names, z, strict=True):
         if place < 1e-3 or place > 1.0 - 1e-3:
             side = "lower" if place < 0.5 else "upper"
             notes.append(
-                f"'{name}' ended at its {side} bound: its interval is not to be trusted. "
-                "Widen the bounds if they are no physical limit; else another parameter or a part "
-                "of the model is wrong."
+                f"'{name}' ended at its {side} bound: its interval is not reliable. "
+                "Widen the bounds if they are not a physical limit; else another parameter "
+                "or a part of the model is wrong."
             )
     return tuple(notes)
 

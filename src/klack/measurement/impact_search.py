@@ -99,7 +99,7 @@ def _sharp(away: NDArray[np.float64], peak: int, half: int) -> bool:
 
 
 def _arrivals(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
-    """Samples at which the needle comes from far and does not leave again."""
+    """Samples at which the needle arrives from a distance and stays."""
     here = max(smooth.least_height, 0.01 * span)
     far = 2.0 * here
     out: list[int] = []

@@ -202,7 +202,7 @@ def _prepare(
         elif np.isfinite(rest):
             levels[name], errors[name] = rest, error
         else:
-            notes.append(f"the needle rests nowhere near the {name} stop; its level is not known")
+            notes.append(f"the needle never rests near the {name} stop; its level is unknown")
     poles = sensor_poles(used)
     slowest = 1.0 / float(np.min(-poles.real)) if poles.size else 0.0
     record = _Record(
@@ -317,7 +317,7 @@ def _window(
 
 
 def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | None:
-    """Flight that comes from elsewhere: from the other stop, or from the start of the record."""
+    """First approach: from the other stop, or from the start of the record."""
     t = record.time
     touch = float(t[after.index])
     guard = record.smooth.half * float(t[1] - t[0])

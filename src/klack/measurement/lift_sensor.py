@@ -1,4 +1,4 @@
-r"""What a lift sensor shows of a motion, and how a smooth motion is read back from it.
+r"""Output of a lift sensor for a motion, and its inverse for smooth motions.
 
 An inductive sensor follows the tip through a low pass,
 

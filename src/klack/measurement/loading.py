@@ -28,11 +28,11 @@ _WINDOW_TIMES = 20.0  # of one stroke: windows are not shorter
 
 
 class MeasurementSection(Protocol):
-    """What a case says of its recordings (:class:`klack.case.measurement.CaseMeasurement`)."""
+    """Description of the recordings in a case (:class:`klack.case.measurement.CaseMeasurement`)."""
 
     @property
     def channels(self) -> Channels:
-        """Channels by what they mean."""
+        """Channels by quantity."""
 
     @property
     def time_step(self) -> float | None:
@@ -164,9 +164,9 @@ def _aligned(
     if not strokes:
         raise InputError(
             source,
-            got=f"{len(rejected)} strokes, none of which can be used "
-            f"({rejected[0].name}: {rejected[0].reason})",
-            expected="at least one whole stroke",
+            got=f"{len(rejected)} strokes, none of them "
+            f"usable ({rejected[0].name}: {rejected[0].reason})",
+            expected="at least one complete stroke",
             hint="check the trigger, and how long was recorded.",
         )
     return StrokeSet(
@@ -201,6 +201,6 @@ def _shortened(axis: NDArray[np.float64], trigger: Trigger) -> Iterator[str]:
     if axis[0] > -trigger.before + 2.0 * step or axis[-1] < trigger.after - 2.0 * step:
         yield (
             f"Recorded around the trigger is {1e3 * axis[0]:.4g} ms to {1e3 * axis[-1]:.4g} ms, "
-            f"less than the {-1e3 * trigger.before:.4g} ms to {1e3 * trigger.after:.4g} ms asked "
-            "for."
+            f"less than the {-1e3 * trigger.before:.4g} ms to {1e3 * trigger.after:.4g} ms "
+            "requested."
         )

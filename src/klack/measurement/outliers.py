@@ -5,7 +5,7 @@ Only what is beyond doubt is discarded: scatter from shot to shot is the matter 
 ========== ==================================================================================
 no motion  lift moves by less than 20 % of the median way
 clipped    ten samples or more stay at the largest or smallest value, while the median stroke
-           goes on beyond it by five standard deviations of the noise
+           exceeds it by five standard deviations of the noise
 noise      more than 3 times the median noise of the set
 shape      RMS distance from the median stroke above 4 times the median distance, and above it by
            6 standard deviations (from the median absolute deviation); 6 strokes or more

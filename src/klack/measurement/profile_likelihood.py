@@ -117,7 +117,7 @@ _Path = Generator[Vector, Vector, list[_Point]]
 
 
 def _side_by_side(model: Model, paths: Sequence[_Path]) -> list[list[_Point]]:
-    """Let all paths go on together: what they ask for is computed in one go."""
+    """Advance all paths together: their trials are computed in one batch."""
     results: list[list[_Point]] = [[] for _ in paths]
     asked: dict[int, Vector] = {}
     for i, path in enumerate(paths):

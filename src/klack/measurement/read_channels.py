@@ -72,8 +72,8 @@ def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> Com
         notes.append(base.note)
         if base.uniform and not _on_grid(base, start, fastest.step):
             notes.append(
-                f"{recording.path.name}: '{name}' (step {base.step:.4g} s) brought onto steps of "
-                f"{fastest.step:.4g} s along straight lines."
+                f"{recording.path.name}: '{name}' (step {base.step:.4g} s) resampled to steps of "
+                f"{fastest.step:.4g} s by linear interpolation."
             )
     kept = tuple(dict.fromkeys(note for note in notes if note))
     return CommonTime(start=start, step=fastest.step, count=count, notes=kept)
@@ -212,8 +212,8 @@ def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: V
             hint="leave this part out of the file, or choose another channel.",
         )
     warnings.warn(
-        f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' bridged "
-        "along straight lines.",
+        f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' filled "
+        "by linear interpolation.",
         AccuracyWarning,
         stacklevel=4,
     )

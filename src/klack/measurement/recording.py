@@ -139,7 +139,7 @@ class Recording(Closing):
                 f"{self.path.name}: channel '{channel.name}'",
                 got=f"{end - begin} samples at once",
                 expected=f"at most {_LARGEST_WINDOW}",
-                hint="read it in windows; give a trigger in the section 'measurement'.",
+                hint="read it piecewise: give a trigger in the section 'measurement'.",
             )
         return begin, end
 
@@ -152,7 +152,7 @@ class Recording(Closing):
         return channel.start + channel.step * np.arange(first, last, dtype=np.float64)
 
     def close(self) -> None:  # many formats hold nothing open
-        """Let go of the file."""
+        """Close the file."""
 
 
 def some_names(channels: tuple[ChannelInfo, ...], most: int = 12) -> str:

@@ -1,4 +1,4 @@
-"""What a measured channel can be, and the kind of quantity that it then holds."""
+"""Roles of a measured channel, and the quantity of each."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -21,4 +21,4 @@ ROLES: Mapping[Role, Kind] = {
 """Kind of quantity of each role; inside klack its values are in the SI unit of that kind."""
 
 LIFT_ALONE: tuple[Role, ...] = ("lift",)
-"""What a comparison needs of a recording, beside its trigger."""
+"""Channels that a comparison needs of a recording, in addition to its trigger."""

@@ -1,4 +1,4 @@
-"""What a lift sensor makes of the motion of the needle."""
+"""Model of a lift sensor: bandwidth, sensitivity, offset and resolution."""
 
 from pydantic import Field
 
@@ -12,7 +12,7 @@ class LiftSensor(Section):
     """Inductive (or other) lift sensor: low pass, sensitivity, offset, resolution."""
 
     bandwidth: Frequency | None = Field(
-        default=None, gt=0, description="Frequency at which 3 dB are lost; unlimited without."
+        default=None, gt=0, description="Frequency at which 3 dB are lost; default unlimited."
     )
     order: Count = Field(
         default=1, le=4, description="Order of its low pass (Butterworth above 1)."
@@ -20,7 +20,7 @@ class LiftSensor(Section):
     sensitivity: Ratio = Field(
         default=1.0, gt=0, description="Measured change over true change of the lift."
     )
-    offset: Length = Field(default=0.0, description="What it shows for the closed valve.")
+    offset: Length = Field(default=0.0, description="Reading for the closed valve.")
     resolution: Length = Field(
-        default=0.0, ge=0, description="Smallest step that it shows; none without."
+        default=0.0, ge=0, description="Smallest step of its reading; default none."
     )

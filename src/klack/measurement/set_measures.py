@@ -3,7 +3,7 @@ r"""Numbers of a set of strokes: distributions, and the centric reference.
 Every stroke is read alone first; then again, told what the other strokes say of the shape of its
 flights (:class:`klack.measurement.stroke_measures.FlightShape`), which they share.
 
-**The highest rebound.**  Off the axis a needle loses more in vibration, so the shot that rebounds
+**The highest rebound.**  Off-axis a needle loses more to vibration, so the shot that rebounds
 highest is the nearest to a centric one.  But the largest of n measured values is large by scatter
 as well.  With measured scatter ``s`` and measurement error ``u`` (root mean square standard error)
 the scatter of the shots themselves is ``sigma = sqrt(max(s^2 - u^2, 0))``; for normal shots the
@@ -284,8 +284,8 @@ def highest_rebound(column: Column) -> HighestRebound:
         raise InputError(
             f"{column.quantity} on the {column.stop}",
             got="no stroke with this number",
-            expected="at least one rebound that was measured",
-            hint="look at the notes of the strokes.",
+            expected="at least one measured rebound",
+            hint="check the notes of the strokes.",
         )
     index = int(np.nanargmax(column.values))
     n = known.size

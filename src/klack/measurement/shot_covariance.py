@@ -1,4 +1,4 @@
-r"""How uncertain fitted parameters are when whole strokes differ, not single samples.
+r"""Uncertainty of fitted parameters when whole strokes scatter, not single samples.
 
 Noise of the samples averages out over the thousands of them in a stroke; what makes one stroke open
 later than the next does not: all residuals of one stroke move together.  The usual covariance
@@ -37,7 +37,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 _NOTHING = 1e-9
-"""Sensitivity relative to the largest one below which the data do not see a parameter."""
+"""Sensitivity relative to the largest one below which the data do not depend on a parameter."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +70,7 @@ class ShotCovariance:
 
     @property
     def correlation(self) -> Matrix:
-        """Correlation of the estimates, shape (p, p); 0 with what the data do not see."""
+        """Correlation of the estimates, shape (p, p); 0 for parameters without effect."""
         return correlation_of(self.covariance)
 
 
@@ -91,7 +91,7 @@ def seen_by_data(jacobian: Matrix, weights: Vector) -> NDArray[np.bool_]:
 
 
 def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matrix:
-    """Step of the parameters that each stroke alone asks for.
+    """Parameter step of each single stroke.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the needle rests, and how far a motion must go to be seen above the noise."""
+"""Rest levels of the needle, and the least motion above the noise."""
 
 from dataclasses import dataclass
 

@@ -11,7 +11,7 @@ Stop = Literal["opening", "seat"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightShape:
-    """What the flights on one stop have in common, each with its standard error.
+    """Common parameters of the flights on one stop, each with its standard error.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class StrokeMeasures:
 
     @property
     def lift(self) -> float:
-        """Way between the stops [m]; nan if only one was met."""
+        """Travel between the stops [m]; nan if only one was reached."""
         return self.opening_level - self.seat_level
 
     def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
@@ -127,5 +127,5 @@ class StrokeMeasures:
         return next(iter(self.on(stop)), None)
 
     def bounces(self, stop: Stop) -> int:
-        """How often the needle left a stop again, higher than :attr:`least_height`."""
+        """Number of times the needle left a stop again, higher than :attr:`least_height`."""
         return sum(impact.rebound_speed != 0.0 for impact in self.on(stop))

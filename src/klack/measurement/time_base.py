@@ -111,20 +111,20 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
             where,
             got=f"a gap of {longest * usual:.3g} s in its time, with steps of {usual:.3g} s",
             expected="gaps of at most five samples",
-            hint="export the parts between the gaps into files or channels of their own.",
+            hint="export the parts between the gaps into separate files or channels.",
         )
     if _two_lengths(sorted(lengths)) and deviation < 1.0 and longest < _GAP:
         return replace(base, note=f"{where}: time is rounded in the file; taken as uniform.")
     what = "leaves out samples" if longest > _GAP else "jitters"
     note = (
-        f"{where}: time {what} (longest step {longest:.2f} of the usual one); resampled along "
-        "straight lines."
+        f"{where}: time {what} (longest step {longest:.2f} of the usual one); resampled "
+        "by linear interpolation."
     )
     return replace(base, step=usual, uniform=False, note=note)
 
 
 def _check_order(steps: Vector, time: Vector, first: int, where: str) -> None:
-    """Raise where the time stands still, goes back or is missing."""
+    """Raise where the time is constant, decreasing or missing."""
     wrong = np.flatnonzero(~(steps > 0))
     if wrong.size == 0:
         return
@@ -134,7 +134,7 @@ def _check_order(steps: Vector, time: Vector, first: int, where: str) -> None:
         where,
         got=f"a time that does not rise: {came} at sample {first + k + 1}",
         expected="times that rise from sample to sample",
-        hint="write each stroke into its own file or channel; a time that starts again is not cut.",
+        hint="write each stroke into its own file or channel; a restarting time is not cut.",
     )
 
 

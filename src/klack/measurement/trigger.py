@@ -1,4 +1,4 @@
-"""How a long recording is cut into strokes."""
+"""Trigger that cuts a long recording into strokes."""
 
 from typing import Literal, Self
 
@@ -29,8 +29,8 @@ class Trigger(Section):
         default=None,
         gt=0,
         lt=1,
-        description="The same as a share of the way from its resting to its highest value; 20 % "
-        "without a level.",
+        description="Level as a share of the range from its rest value to its highest "
+        "value; 20 % without a level.",
     )
     slope: Literal["rising", "falling"] = Field(
         default="rising", description="Direction of the crossing."
@@ -40,7 +40,7 @@ class Trigger(Section):
     dead_time: Time | None = Field(
         default=None,
         gt=0,
-        description="No second trigger within this time; the time kept after it without.",
+        description="No second trigger within this time; default the time kept after it.",
     )
 
     @model_validator(mode="after")
@@ -61,12 +61,12 @@ class Trigger(Section):
 
     @property
     def value(self) -> float | None:
-        """Trigger level in SI; None if it is a share of the way."""
+        """Trigger level in SI; None if it is a share."""
         if self.level is None:
             return None
         return parse_quantity(self.level, ROLES[self.channel], "level")
 
     @property
     def share_of_way(self) -> float:
-        """Share of the way from the resting to the highest value, without a level."""
+        """Share of the range from the rest value to the highest value, without a level."""
         return _USUAL_SHARE if self.share is None else self.share

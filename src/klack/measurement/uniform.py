@@ -1,4 +1,4 @@
-"""The one time axis that the arithmetic on records needs: uniform."""
+"""Uniform time axis of records."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ def uniform_step(time: NDArray[np.float64], where: str) -> float:
     if not worst <= _JITTER:  # also nan
         raise InputError(
             where,
-            got=f"samples up to {worst:.2g} steps beside a uniform axis",
+            got=f"samples up to {worst:.2g} steps off a uniform axis",
             expected="uniform sampling",
             hint="interpolate the record to one step first.",
         )

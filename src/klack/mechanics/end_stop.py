@@ -47,7 +47,7 @@ class EndStop(Component):
         default=None, gt=0, le=1, description="Of rigid bodies; leave it out for modal ones."
     )
     series_compliance: Compliance = Field(
-        default=0.0, ge=0, description="Of the bulk behind the faces that the modes miss."
+        default=0.0, ge=0, description="Residual compliance of the bulk behind the faces."
     )
     film: FilmShape | None = Field(default=None, description="Squeeze film between the faces.")
 
@@ -66,8 +66,8 @@ class EndStop(Component):
             raise CaseProblem(
                 ("restitution",),
                 got="restitution without a law",
-                expected="a contact law that it can act on",
-                hint="remove it: a film alone brings its own loss.",
+                expected="a contact law that it applies to",
+                hint="remove it: a film alone has its own loss.",
                 on_key=True,
             )
         return self
@@ -93,7 +93,7 @@ class EndStop(Component):
         elif isinstance(self.law, ConsistentStopLaw):
             raise InputError(
                 "EndStop.law",
-                got="a consistent law that is not computed yet",
+                got="a consistent law that has not been computed",
                 expected="a law from the static contact of the two bodies",
                 hint="a case names the surfaces under 'stops'; in Python call with_law(...).",
             )

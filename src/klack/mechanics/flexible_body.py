@@ -1,4 +1,4 @@
-"""A body that rings: the modes of a finite-element model, seen from its ports."""
+"""Elastic body: the modes of a finite-element model at its ports."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
@@ -54,7 +54,7 @@ class FlexibleBody(Component):
                 ("points",),
                 got=f"{', '.join(self.points)}",
                 expected="every surface once",
-                hint="one point can take any number of springs, stops and forces.",
+                hint="one point can have any number of springs, stops and forces.",
             )
         return self
 
@@ -101,7 +101,7 @@ class FlexibleBody(Component):
         if self.speed and not reduced.rigid_count:
             raise CaseProblem(
                 ("speed",),
-                got=f"{self.speed:g} m/s for '{reduced.name}', which is held",
+                got=f"{self.speed:g} m/s for '{reduced.name}', which is supported",
                 expected="no speed, or a free body",
                 hint="remove the speed, or the supports of the body.",
             )

@@ -137,7 +137,7 @@ class Instance(ABC):
 
     @abstractmethod
     def _sizes(self, count: int) -> tuple[c_size_t, ...]:
-        """What follows the values in an access to variables."""
+        """Arguments after the values in an access to variables."""
 
     @abstractmethod
     def _initialise(self) -> None: ...
@@ -301,7 +301,7 @@ def _line(reader: int) -> bytes:
 
 
 def _whole(reader: int, size: int) -> bytes:
-    """So many bytes; none if the other side closed."""
+    """Read the given number of bytes; none if the other side closed."""
     data = os.read(reader, size)
     while 0 < len(data) < size:
         more = os.read(reader, size - len(data))
@@ -310,7 +310,7 @@ def _whole(reader: int, size: int) -> bytes:
 
 
 def _die_with(parent: int) -> None:
-    """End this process when the one that asked is gone, whatever the FMU does meanwhile."""
+    """End this process when its parent is gone, whatever the FMU does."""
 
     def watch() -> None:
         while os.getppid() == parent:

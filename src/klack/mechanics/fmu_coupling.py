@@ -10,8 +10,8 @@ force :math:`f_{k+1}`.  Until the next point the loop feels
 The FMU itself did the work :math:`W_k = \tfrac12 (f_k + f_{k+1})(y_{k+1} - y_k)`, the loop got
 :math:`\int F\,\mathrm dy`.  The difference is energy that coupling loses (above zero) or makes
 (below), as the residual energy of Sadjina et al. (2017); it falls with the coupling step, once for
-``hold`` and twice for ``linear``.  Both stand in the books: the work as a supply, the difference as
-a loss, so that the ledger of the whole network still closes to round-off.
+``hold`` and twice for ``linear``.  Both are entries of the energy balance: the work as a supply,
+the difference as a loss, so that the balance of the whole network still closes to round-off.
 """
 
 from typing import Literal
@@ -34,7 +34,7 @@ _ROUND_OFF = 1e-6  # of the coupling step
 
 
 class FmuCoupling:
-    """Step function of an imported FMU: two ports, :data:`STATES` states, two books.
+    """Step function of an imported FMU: two ports, :data:`STATES` states, two energy entries.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class FmuCoupling:
         return InputError(
             f"{self.slave.fmu.path.name}: coupling_step",
             got=f"{self.coupling_step:g} s, and an exchange after {step:g} s",
-            expected="whole steps of the time loop, for an FMU that takes even steps only",
+            expected="whole steps of the time loop, for an FMU with fixed steps only",
             hint="take a whole number of coarse steps (run.coarse times run.step).",
         )
 
@@ -129,7 +129,7 @@ class FmuCoupling:
 def _gone_on(slave: FmuSlave) -> InputError:
     return InputError(
         slave.fmu.path.name,
-        got="a run that goes on from a stored state",
-        expected="a run from its start: the inner state of an FMU is not stored",
+        got="a run continued from a stored state",
+        expected="a run from its start: the internal state of an FMU is not stored",
         hint="compute the whole time in one run.",
     )

@@ -1,4 +1,4 @@
-"""A functional mock-up unit (FMU) as a file: what it says of itself, and its safe unpacking.
+"""Functional mock-up unit (FMU) as a file: its description and safe unpacking.
 
 The archive is a file of somebody else: no member may leave the folder it is unpacked to, and sizes
 are checked before anything is written.  Its binary, though, is native code that runs with the
@@ -51,7 +51,7 @@ class FmuVariable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuDescription:
-    """What an FMU says of itself.
+    """Description of an FMU by itself.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         raise _damaged(
             path,
             "an FMU for model exchange only",
-            "one for co-simulation, which brings its own solver",
+            "one for co-simulation, which has its own solver",
             "export it again as a co-simulation FMU.",
         )
     return fmu
@@ -193,7 +193,7 @@ def unpack_fmu(fmu: FmuDescription, folder: Path) -> Path:
                 expected=f"one for this platform, '{library}'",
                 hint=f"compile its sources into it: fmpy compile {fmu.path.name}"
                 if sources
-                else "ask its maker for a binary of this platform, or for its sources.",
+                else "ask its supplier for a binary for this platform, or for its sources.",
             )
         wanted = (f"binaries/{place}/", "resources/")
         _extract(
@@ -219,7 +219,7 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def _extract(path: Path, archive: zipfile.ZipFile, folder: Path, wanted: object) -> None:
-    """Unpack what is wanted, after a look at all names and sizes."""
+    """Unpack the needed files, after a check of all names and sizes."""
     assert callable(wanted)
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS or sum(item.file_size for item in members) > _LARGEST:
@@ -227,14 +227,14 @@ def _extract(path: Path, archive: zipfile.ZipFile, folder: Path, wanted: object)
             path,
             f"{len(members)} files of {sum(item.file_size for item in members) / 2**30:.1f} GiB",
             f"at most {_MOST_MEMBERS} files and {_LARGEST / 2**30:.0f} GiB",
-            "this is no ordinary FMU.",
+            "this is not an ordinary FMU.",
         )
     for item in members:
         name = PurePosixPath(item.filename)
         odd = "\\" in item.filename or ":" in item.filename or "\0" in item.filename
         if odd or name.is_absolute() or ".." in name.parts:
             raise _damaged(
-                path, f"a file '{item.filename[:80]}' that wants out of its folder", "plain names"
+                path, f"a file '{item.filename[:80]}' that leads out of its folder", "plain names"
             )
     chosen = [item for item in members if wanted(item.filename)]
     described = [item for item in chosen if item.filename == _DESCRIPTION]

@@ -1,4 +1,4 @@
-"""A process that serves one FMU: started, asked and ended from here.
+"""Process that serves one FMU: start, calls and end.
 
 It ends with the process that started it, whatever happens to that.  A call that takes too long is
 ended by a thread that looks in from time to time; the calls themselves cost one round trip through
@@ -29,7 +29,7 @@ _LOOKS, _LONGEST_LOOK = 10, 0.25  # of the watching thread: within the time limi
 
 
 class FmuFailed(Exception):
-    """An FMU did not answer as it should; says what it did instead."""
+    """An FMU failed; the text describes the fault."""
 
 
 class FmuProcess(Closing):
@@ -75,7 +75,7 @@ class FmuProcess(Closing):
             raise
 
     def call(self, what: int, time: float, step: float, *motion: float) -> float:
-        """Ask for something; see :data:`klack.mechanics.fmu_child.REQUEST`.
+        """Send a request; see :data:`klack.mechanics.fmu_child.REQUEST`.
 
         Returns
         -------
@@ -147,7 +147,7 @@ class _Watch(threading.Thread):
         self._process, self._is_over = process, threading.Event()
 
     def run(self) -> None:
-        """Look in until :meth:`stop`."""
+        """Check repeatedly until :meth:`stop`."""
         seen, waited = -1, 0.0
         while not self._is_over.wait(pause := min(self.limit / _LOOKS, _LONGEST_LOOK)):
             if self.calls != seen:
@@ -160,7 +160,7 @@ class _Watch(threading.Thread):
                     return
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop checking."""
         self._is_over.set()
 
 

@@ -67,7 +67,7 @@ class FmuSlave:
         self._unit = wiring.force[1]
 
     def begin(self) -> None:
-        """Make a new instance and enter its initialisation, in which forces can be asked for.
+        """Make a new instance and enter its initialisation, in which forces can be read.
 
         Raises
         ------
@@ -103,7 +103,7 @@ class FmuSlave:
         self._asked(RUN, 0.0, 0.0, 0.0, 0.0)
 
     def advance(self, time: float, step: float, displacement: float, velocity: float) -> float:
-        """Go on from ``time`` by ``step`` [s]; inputs hold from the start of the step.
+        """Continue from ``time`` by ``step`` [s]; inputs hold from the start of the step.
 
         Returns
         -------
@@ -137,7 +137,7 @@ class FmuSlave:
         return ConvergenceError(
             f"{self.fmu.path.name}: the FMU {what}, {when}.\n"
             f"Try: 'fmpy simulate {self.fmu.path.name}' alone, other parameters, a shorter "
-            f"coupling_step; a time_limit above {self.time_limit:g} s if it computes that long."
+            f"coupling_step; a time_limit above {self.time_limit:g} s if it needs that long."
         )
 
 

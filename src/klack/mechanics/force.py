@@ -18,7 +18,7 @@ __all__ = ["ConstantForce", "ForceOverTime"]
 
 @step_function
 def constant_force_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Constant force; what it does comes from outside."""
+    """Constant force; its work is a supply."""
     out[0] = par[0]
     out[1] = par[0] * (inp[3] - inp[2])
     return 0
@@ -27,7 +27,7 @@ def constant_force_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 class ConstantForce(Component):
     """Force of constant size along +z on one port.
 
-    The work that it does is booked as a supply, negative while the body moves against it.
+    Its work is counted as a supply, negative while the body moves against it.
     """
 
     type: ClassVar[str] = "constant-force"
@@ -110,7 +110,7 @@ class ForceOverTime(Component):
             raise CaseProblem(
                 ("time",),
                 got="times that do not increase",
-                expected="each later than the one before",
+                expected="each later than the previous one",
                 hint="sort them; write a jump as two times 1 ns apart.",
             )
         return self

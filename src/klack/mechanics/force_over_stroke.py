@@ -86,7 +86,7 @@ class ForceOverStroke(Component):
     }
 
     stroke: tuple[Length, ...] = Field(
-        min_length=2, description="Displacements of 'end' against 'base', increasing."
+        min_length=2, description="Displacements of 'end' relative to 'base', increasing."
     )
     force: tuple[Force, ...] = Field(min_length=2, description="Force along +z at each of them.")
 
@@ -103,7 +103,7 @@ class ForceOverStroke(Component):
             raise CaseProblem(
                 ("stroke",),
                 got="displacements that do not increase",
-                expected="each larger than the one before",
+                expected="each larger than the previous one",
                 hint="sort them.",
             )
         return self
@@ -114,7 +114,7 @@ class ForceOverStroke(Component):
         return np.concatenate(([0.0], np.cumsum(0.5 * np.diff(x) * (force[1:] + force[:-1]))))
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one element; without ``base`` it stands on the ground."""
+        """Add one element; without ``base`` it acts against the ground."""
         rows.element(
             stroke_force_step,
             ports=(rows.port("end"), rows.port("base")),

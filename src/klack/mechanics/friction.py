@@ -59,10 +59,10 @@ class GuideFriction(Component):
 
     coulomb: Force = Field(ge=0, description="Sliding friction Fc; 0.05 to 1 N in small valves.")
     breakaway: Force | None = Field(
-        default=None, ge=0, description="Largest friction Fs near rest; Fc if not given."
+        default=None, ge=0, description="Largest friction Fs near rest; default Fc."
     )
     stribeck_speed: Speed = Field(
-        default=0.01, gt=0, description="Speed vs at which the excess of Fs has faded to 1/e."
+        default=0.01, gt=0, description="Speed vs at which the excess of Fs has decayed to 1/e."
     )
     smoothing_speed: Speed = Field(
         default=1e-3, gt=0, description="Speed vd below which friction falls to zero."

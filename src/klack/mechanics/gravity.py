@@ -55,7 +55,7 @@ class Gravity(Component):
                 f"component '{rows.component}'",
                 got="no body with a mass at its port",
                 expected="a rigid mass or a flexible body",
-                hint="join it to the body whose weight it is.",
+                hint="connect it to its body.",
             )
         weight = masses[0] * self.acceleration * cos(self.inclination)
         rows.element(

@@ -32,12 +32,12 @@ class ImportedFmu(Component):
     converted, all others are taken in m, m/s, N.
 
     Exchange at every ``coupling_step``, as :mod:`klack.mechanics.fmu_coupling` tells; its energy
-    error stands in the books as ``<component> coupling error``.
+    error is the entry ``<component> coupling error`` of the energy balance.
 
     Limits: a force that depends on the motion stiffly makes the explicit coupling unstable; for a
     stiffness k against a mass m keep the coupling step well below :math:`\sqrt{m/k}`.  Before the
     start the FMU is asked for its force at rest in its initialisation, which only forces without
-    memory answer rightly.  A run cannot go on from a stored state.
+    memory answer rightly.  A run cannot continue from a stored state.
 
     The binary inside is native code with the rights of the user.  It runs in a process of its own:
     a crash, an exit, a call longer than ``time_limit``, and a force that is no number or above
@@ -58,12 +58,12 @@ class ImportedFmu(Component):
         gt=0, description="Time between two exchanges, in whole steps of the time loop."
     )
     displacement: str | None = Field(
-        default=None, description="Input that gets the displacement of 'end' against 'base'."
+        default=None, description="Input for the displacement of 'end' relative to 'base'."
     )
     velocity: str | None = Field(
-        default=None, description="Input that gets the mean velocity since the last exchange."
+        default=None, description="Input for the mean velocity since the last exchange."
     )
-    force: str = Field(description="Output that is the force along +z on 'end'.")
+    force: str = Field(description="Output with the force along +z on 'end'.")
     parameters: Mapping[str, Number] = Field(
         default_factory=dict,
         description="Parameters and start values by name, in the units of the FMU.",
@@ -83,7 +83,7 @@ class ImportedFmu(Component):
             raise CaseProblem(
                 (),
                 got="neither 'displacement' nor 'velocity'",
-                expected="at least one input that gets the motion",
+                expected="at least one input for the motion",
                 hint=f"inputs of {self.file.name}: {_some(self._named('input'))}.",
             )
         self._wiring()
@@ -127,12 +127,12 @@ class ImportedFmu(Component):
                 key,
                 got=f"'{name}'{other}",
                 expected=f"an {' or '.join(causalities)} of {self.file.name}: {_some(fitting)}",
-                hint=nearest(name, fitting, "look into it with: fmpy info."),
+                hint=nearest(name, fitting, "inspect it with: fmpy info."),
             )
         if known[name].kind != "real" and key[0] != "parameters":
             raise CaseProblem(
                 key,
-                got=f"'{name}', which is no single real number",
+                got=f"'{name}', which is not a single real number",
                 expected="a real variable",
                 hint="take another one.",
             )
@@ -152,12 +152,12 @@ class ImportedFmu(Component):
                 ("parameters", name),
                 got=f"'{name}'",
                 expected=f"a parameter or start value of {self.file.name}: {_some(names)}",
-                hint=nearest(name, names, "look into it with: fmpy info."),
+                hint=nearest(name, names, "inspect it with: fmpy info."),
                 on_key=True,
             )
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one element with an instance of the FMU of its own."""
+        """Add one element with its own instance of the FMU."""
         slave = FmuSlave(self._description(), self._wiring(), self.time_limit)
         coupling = FmuCoupling(slave, self.coupling_step, self.extrapolation)
         rows.element(

@@ -19,7 +19,7 @@ __all__ = ["RigidMass"]
 
 
 class RigidMass(Component):
-    r"""Rigid body with one way to move, along the axis.
+    r"""Rigid body with one degree of freedom, along the axis.
 
     .. math:: m \ddot y = \sum_p F_p
 
@@ -43,7 +43,7 @@ class RigidMass(Component):
                 ("points",),
                 got=f"{', '.join(self.points)}",
                 expected="every name once",
-                hint="one point can take any number of springs, stops and forces.",
+                hint="one point can have any number of springs, stops and forces.",
             )
         return self
 

@@ -62,7 +62,7 @@ class Spring(Component):
     )
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one element; without ``base`` the spring stands on the ground."""
+        """Add one element; without ``base`` the spring acts against the ground."""
         rows.element(
             spring_step,
             ports=(rows.port("end"), rows.port("base")),

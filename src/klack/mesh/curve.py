@@ -102,7 +102,7 @@ def _gauss(order: int) -> tuple[NDArray, NDArray]:
 
 
 def on_axis(curve: Curve) -> bool:
-    """Tell whether an edge is straight and lies on r = 0."""
+    """Whether an edge is straight and on r = 0."""
     return curve.centre is None and curve.start[0] == 0 == curve.end[0]
 
 

@@ -1,4 +1,4 @@
-"""How many elements a mesh will have, before it is made.
+"""Estimated number of elements of a mesh, before it is made.
 
 A size of 1 um instead of 1 mm makes a thousand million times as many tetrahedra.  The
 estimate is 0.5 to 1.5 of what netgen makes at a single size; the grading between two sizes is left
@@ -62,7 +62,7 @@ def element_count(
 
 
 def element_memory(dimension: int, count: float) -> float:
-    """Memory [byte] of so many elements with their stiffness and mass matrix."""
+    """Memory [byte] of a number of elements with their stiffness and mass matrix."""
     return _BYTES[dimension] * count
 
 
@@ -92,7 +92,7 @@ def require_meshable(
     require_memory(
         f"{where}: {worst}",
         needed,
-        what=f"{format_si(size, 'm', 3)}, which makes some {total:.1g} elements, a mesh",
+        what=f"{format_si(size, 'm', 3)}, which gives some {total:.1g} elements, a mesh",
         hint=f"a 'mesh: {worst}' of {format_si(fitting, 'm', 2)} or more; check its unit.",
     )
 

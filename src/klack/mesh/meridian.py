@@ -26,7 +26,7 @@ __all__ = ["mesh_meridian"]
 
 @dataclass(frozen=True)
 class _Triangulation:
-    """What netgen gives, with every boundary segment on a known curve."""
+    """Output of netgen, with every boundary segment on a known curve."""
 
     points: NDArray[np.float64]  # (n, 2) [m]
     triangles: NDArray[np.int64]  # (n, 3)
@@ -150,7 +150,7 @@ def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
         if np.hypot(x, y) > 0:
             raise InputError(
                 "mesh_meridian: refinement",
-                got=f"a point at ({x:g}, {y:g}, {z:g}) m, off the axis",
+                got=f"a point at ({x:g}, {y:g}, {z:g}) m, not on the axis",
                 expected="a ring (r, z), or a point on the axis",
                 hint="an axisymmetric mesh can only be refined on rings: give (r, z).",
             )

@@ -127,7 +127,7 @@ class Mesh:
             known = ", ".join(sorted(self.surfaces)) or "none"
             got, hint = "a name that the mesh does not have", "check the spelling, or name the face"
             if name in self.node_sets:
-                got, hint = "a set of nodes, which knows no faces", "name its faces as a surface"
+                got, hint = "a set of nodes, which has no faces", "name its faces as a surface"
             raise InputError(
                 f"surface '{name}'",
                 got=got,

@@ -229,7 +229,7 @@ def _half_circle_sense(where: str, start: Point, end: Point, centre: Point) -> b
     if keeps[0] == keeps[1]:
         raise _error(
             where,
-            "a half circle, for which both ways are equally long",
+            "a half circle, whose two arcs are equally long",
             "clockwise True or False",
             "set clockwise, or split the arc in two.",
         )

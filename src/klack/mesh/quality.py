@@ -267,5 +267,5 @@ def require_connected(where: str, mesh: Mesh) -> None:
             got=f"{count} parts that share no node (one of {sizes[small]} nodes, "
             f"at {_place(mesh.points[node])})",
             expected="one connected body without loose nodes",
-            hint="merge coincident nodes in the mesher, or make one body per part.",
+            hint="merge coincident nodes in the mesher, or define one body per part.",
         )

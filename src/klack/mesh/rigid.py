@@ -16,7 +16,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pose:
-    """Where a body stands, compared with its drawing.
+    """Pose of a body relative to its drawing.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def rotation_matrix(rotation: Vector) -> NDArray[np.float64]:
     --------
     >>> import numpy as np
     >>> R = rotation_matrix(np.array([0.0, np.pi / 2, 0.0]))
-    >>> (R @ [0.0, 0.0, 1.0]).round(15).tolist()  # z leans towards x
+    >>> (R @ [0.0, 0.0, 1.0]).round(15).tolist()  # z tilts towards x
     [1.0, 0.0, 0.0]
     """
     x, y, z = np.asarray(rotation, dtype=float)

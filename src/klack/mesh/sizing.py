@@ -1,4 +1,4 @@
-"""How fine a mesh shall be: globally, on surfaces, and around points or rings."""
+"""Element sizes: global, on surfaces, and around points or rings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -90,7 +90,7 @@ class MeshSizing:
 
     @property
     def smallest(self) -> float:
-        """Smallest edge length asked for [m]."""
+        """Smallest requested edge length [m]."""
         sizes = [self.size, *self.surfaces.values(), *(r.size for r in self.refinements)]
         return min(sizes)
 

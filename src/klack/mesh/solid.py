@@ -167,7 +167,7 @@ def face_names(shape: Any) -> tuple[str, ...]:
 
 
 def _names(shapes: Any, kind: str) -> tuple[str, ...]:
-    """Names of solids or faces; those without are called after their place in the list."""
+    """Names of solids or faces; those without are named by their position in the list."""
     return tuple(shape.name or f"{kind}{k + 1}" for k, shape in enumerate(shapes))
 
 

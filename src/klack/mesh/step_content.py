@@ -1,4 +1,4 @@
-"""What a STEP file holds, before it is meshed: its solids and faces, and where they lie."""
+"""Content of a STEP file before meshing: its solids and faces with their positions."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A first reading of a STEP file in a process of its own.
+"""First reading of a STEP file in a separate process.
 
 OpenCASCADE reads whatever a file says.  Of files with a few wrong digits or a lost line one in six
 brought it to an end without a word (a segmentation fault), some keep it busy without end: that may
@@ -46,7 +46,7 @@ def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
 
 @cache  # a file that was refused is tried again: memory may have been short
 def _try(path: Path, patience: float, state: tuple[int, ...]) -> None:
-    """Start the child; ``state`` tells a file from what stood at its path before."""
+    """Start the child; ``state`` identifies a version of the file."""
     try:
         done = subprocess.run(
             [sys.executable, "-c", _PROGRAM, str(path.absolute())],
@@ -57,13 +57,13 @@ def _try(path: Path, patience: float, state: tuple[int, ...]) -> None:
     except subprocess.TimeoutExpired:
         raise _refuse(path, f"a STEP file that takes longer than {patience:g} s to read") from None
     if done.returncode != 0:
-        raise _refuse(path, "a damaged STEP file: OpenCASCADE breaks on it")
+        raise _refuse(path, "a damaged STEP file: OpenCASCADE crashes on it")
 
 
 def _refuse(path: Path, got: str) -> InputError:
     return InputError(
         str(path),
         got=got,
-        expected="a whole STEP file (AP203, AP214 or AP242)",
+        expected="a complete STEP file (AP203, AP214 or AP242)",
         hint="export it again; open it in a CAD program and repair it.",
     )

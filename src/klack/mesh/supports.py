@@ -53,7 +53,7 @@ def sector_nodes(
             "sector_nodes: count",
             got=str(count),
             expected="at least one sector",
-            hint="three sectors hold a body like a chuck.",
+            hint="three sectors act like a chuck.",
         )
     require_positive("sector_nodes: width_rad", width_rad, "rad")
     pitch = 2 * np.pi / count

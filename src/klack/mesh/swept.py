@@ -75,7 +75,7 @@ def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
     require_memory(
         "sweep: layers",
         element_memory(3, count),
-        what=f"{layers} layers, which make {count:.2g} tetrahedra, a mesh",
+        what=f"{layers} layers, which give {count:.2g} tetrahedra, a mesh",
         hint="fewer layers (18 are usual), or larger elements in the half section.",
     )
     ring = _ring(meridian, layers)

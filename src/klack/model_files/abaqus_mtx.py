@@ -41,8 +41,8 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
             str(path),
             got=f"an internal node {table[:, [0, 2]].min():g}",
             expected="nodes of the mesh alone",
-            hint="take contact, couplings, connectors and hybrid elements out of the model that "
-            "writes the matrices.",
+            hint="remove contact, couplings, connectors and hybrid elements from the "
+            "model that writes the matrices.",
         )
     nodes = whole_numbers(str(path), table[:, [0, 2]], "a node")
     ways = whole_numbers(str(path), table[:, [1, 3]], "a direction")

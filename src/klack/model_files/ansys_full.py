@@ -41,14 +41,14 @@ class _Records:
     words: NDArray[np.int32]
 
     def integers(self, at: int) -> tuple[NDArray[np.int32], int]:
-        """Integers of the record at word ``at``, and where the next one starts."""
+        """Integers of the record at word ``at``, and the start of the next one."""
         data, flags, behind = self._record(at)
         if not flags & _INTEGER:
             raise _damaged(self.path, f"numbers instead of integers at byte {4 * at}")
         return data, behind
 
     def numbers(self, at: int) -> tuple[NDArray[np.float64], int]:
-        """Double-precision numbers of the record at word ``at``, and where the next one starts."""
+        """Double-precision numbers of the record at word ``at``, and the start of the next one."""
         data, flags, behind = self._record(at)
         if flags & (_INTEGER | _SINGLE) or len(data) % 2:
             raise _damaged(self.path, f"integers instead of numbers at byte {4 * at}")
@@ -59,7 +59,7 @@ class _Records:
         count = int(words[at]) if 0 <= at < len(words) - 2 else 0
         behind = at + count + 3
         if count <= 0 or behind > len(words) or words[behind - 1] != count:
-            raise _damaged(self.path, f"no whole record at byte {4 * at}")
+            raise _damaged(self.path, f"no complete record at byte {4 * at}")
         flags = int(words[at + 1]) & 0xFFFFFFFF
         if flags & (_ZLIB | _SPARSE):
             raise InputError(
@@ -137,7 +137,7 @@ def _check_kind(path: Path, head: NDArray[np.int32]) -> None:
                 str(path),
                 got=what,
                 expected="symmetric matrices with consistent mass",
-                hint="say LUMPM,OFF and NROPT,FULL or AUTO in the solution, without friction.",
+                hint="use LUMPM,OFF and NROPT,FULL or AUTO in the solution, without friction.",
             )
 
 
@@ -159,7 +159,7 @@ def _places(
             hint="export a model of solid elements alone; no mass, contact or beam elements.",
         )
     if len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)):
-        raise _damaged(file.path, "nodes, directions or marks that do not fit")
+        raise _damaged(file.path, "inconsistent nodes, directions or marks")
     rows = RowPlaces(
         np.repeat(nodes, len(labels)).astype(np.int64),
         np.tile(labels, len(nodes)).astype(np.int64),

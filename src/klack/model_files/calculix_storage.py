@@ -1,4 +1,4 @@
-"""What CalculiX stores with ``*FREQUENCY, SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof``.
+"""Matrices of CalculiX, ``*FREQUENCY, SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof``.
 
 The matrices are lists of entries (row, column, value) of one triangle.  ``.dof`` says of each row
 ``node.direction``.  Degrees of freedom of ``*BOUNDARY`` are missing in all of them.

@@ -102,5 +102,5 @@ def _damaged(path: Path, got: str) -> InputError:
         str(path),
         got=got,
         expected="a Harwell-Boeing file",
-        hint="the file is cut off or damaged; write it again in ASCII form.",
+        hint="the file is truncated or damaged; write it again in ASCII form.",
     )

@@ -3,7 +3,7 @@
 Read by hand, not by ``scipy.io.loadmat``: of 300 damaged files SciPy 1.17 takes 14 to 33 whose
 sparse matrix reaches, when it is used, for memory that is not its own, and ends the process.  Here
 every count is checked against the bytes that are there.  Read are full and sparse matrices,
-texts, cell arrays and structures; objects are passed over.
+texts, cell arrays and structures; objects are ignored.
 """
 
 import struct
@@ -57,7 +57,7 @@ class _Budget:
     def take(self, size: int) -> None:
         self.left -= size
         if self.left < 0:
-            raise _damaged(self.path, "more numbers than it has room for")
+            raise _damaged(self.path, "more numbers than it can hold")
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _unpacked(budget: _Budget, data: memoryview) -> memoryview:
     except zlib.error as error:
         raise _damaged(budget.path, str(error)) from error
     if not machine.eof:
-        raise _damaged(budget.path, "a compressed variable is cut off or too large")
+        raise _damaged(budget.path, "a compressed variable is truncated or too large")
     budget.take(len(plain))
     return memoryview(plain)
 
@@ -195,12 +195,12 @@ def _elements(
 
 
 def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[str, MatValue]:
-    """Name and value of one array; None for what is passed over."""
+    """Name and value of one array; None if ignored."""
     parts = _elements(budget, data, order)
     if len(data) == 0:
         return "", np.zeros((0, 0))
     if depth > _DEEPEST:
-        raise _damaged(budget.path, "structures in structures without end")
+        raise _damaged(budget.path, "structures nested too deeply")
     flags = _integers(budget, next(parts, None), order)
     if len(flags) < 1:
         raise _damaged(budget.path, "a variable without kind")
@@ -242,7 +242,7 @@ def _raw(budget: _Budget, element: _Element | None, order: str) -> NDArray[Any]:
 def _integers(budget: _Budget, element: _Element | None, order: str) -> NDArray[np.int64]:
     values = _raw(budget, element, order)
     if values.dtype.kind == "f":
-        raise _damaged(budget.path, "a count that is no whole number")
+        raise _damaged(budget.path, "a count that is not a whole number")
     return values.astype(np.int64)
 
 
@@ -275,7 +275,7 @@ def _sparse(
     fits = fits and starts[0] == 0 and bool(np.all(np.diff(starts) >= 0))
     fits = fits and starts[-1] <= min(len(rows), len(values))
     if not fits:
-        raise _damaged(budget.path, "a sparse matrix whose columns do not fit")
+        raise _damaged(budget.path, "a sparse matrix with inconsistent columns")
     count = int(starts[-1])
     rows = rows[:count]
     if count and (rows.min() < 0 or rows.max() >= shape[0]):
@@ -309,7 +309,7 @@ def _texts(
     else:
         codes = _raw(budget, element, order)
         if codes.dtype.kind == "f":
-            raise _damaged(budget.path, "a text of broken numbers")
+            raise _damaged(budget.path, "a text of invalid numbers")
         text = "".join(chr(int(code) & 0xFFFF) for code in codes)
     if len(shape) != 2 or len(text) != prod(shape):
         return (text.strip(),)

@@ -84,7 +84,7 @@ def _choice(
 def _of_fields(
     path: Path, fields: Mapping[str, Any], name: str | None, role: Role | None
 ) -> SystemMatrix:
-    """Choose among fields of structures, by their last name if need be."""
+    """Choose among fields of structures, by their last name if necessary."""
     square = {key: value for key, value in fields.items() if _is_matrix(value)}
     last = {key.rpartition(".")[2]: key for key in square}
     if name is not None and name not in last:

@@ -1,4 +1,4 @@
-"""Stiffness and mass matrices from files of other programs; the ending of the name says which."""
+"""Stiffness and mass matrices from files of other programs, selected by suffix."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -4,7 +4,7 @@ The heading says ``%%MatrixMarket matrix coordinate real symmetric``; then comme
 and one entry per line, counted from one.  Array form lists all numbers column by column.
 
 Read by hand, not by ``scipy.io.mmread``: SciPy 1.17 takes ``1.5D+03`` for 1.5 and ``2x`` for 2
-without a word, and a file that is cut off within an exponent ends the process.  Of 300 damaged
+without a word, and a truncated file within an exponent ends the process.  Of 300 damaged
 files it takes 59, this reader 21.
 """
 
@@ -112,5 +112,5 @@ def _damaged(path: Path, got: str, expected: str) -> InputError:
         str(path),
         got=got,
         expected=expected,
-        hint="the file is damaged or cut off; write it again.",
+        hint="the file is damaged or truncated; write it again.",
     )

@@ -51,7 +51,7 @@ class FileModalData:
     labels : tuple of str
         Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
     residual : array, shape (n, n), or None
-        Compliance that the modes miss, between the columns.
+        Residual compliance between the columns.
     by_node : bool
         True where columns are nodes and directions.
     length, force : float or None [m], [N]
@@ -104,7 +104,7 @@ def read_modal_data(path: Path) -> FileModalData:
             f"{path}: mode {worst + 1}",
             got=f"a modal mass of {data.modal_mass[worst]:g}",
             expected="a modal mass above 0 (1 for mass-normalised shapes)",
-            hint="export mass-normalised shapes; without modal mass their size means nothing.",
+            hint="export mass-normalised shapes; without modal mass their size has no meaning.",
         )
     return data
 
@@ -146,7 +146,7 @@ def _of_arrays(held: NamedArrays) -> FileModalData:
             f"{held.path}: residual",
             got=f"{residual.shape[0]} x {residual.shape[1]} numbers",
             expected=f"{ports} x {ports}: from every port to every port",
-            hint="leave it out if it is not known.",
+            hint="leave it out if it is unknown.",
         )
     labels = held.find_text(*_LABELS, group=group)
     return FileModalData(

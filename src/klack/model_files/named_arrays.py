@@ -1,4 +1,4 @@
-"""Arrays by name from ``.mat``, ``.npz`` and text: what reduced models are handed over in.
+"""Arrays by name from ``.mat``, ``.npz`` and text, as used for reduced models.
 
 Nothing in such a file is executed, and sizes are checked before memory is taken.
 """

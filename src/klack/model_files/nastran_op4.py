@@ -101,5 +101,5 @@ def _damaged(path: Path, at: int, got: str) -> InputError:
         f"{path}, byte {at}",
         got=got,
         expected="records of OUTPUT4",
-        hint="the file is damaged or cut off; copy it in binary mode, or write it FORMATTED.",
+        hint="the file is damaged or truncated; copy it in binary mode, or write it FORMATTED.",
     )

@@ -27,7 +27,9 @@ class _AsciiStrings(Op4Strings):
     def _values(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
         values = fixed_numbers(self.lines, self.form.width) if self.lines else np.empty(0)
         if values is None or len(values) != count.sum():
-            raise _damaged(self.place, "values that are no numbers or not as many as announced")
+            raise _damaged(
+                self.place, "values that are not numbers or differ from the declared count"
+            )
         return values
 
 
@@ -48,7 +50,7 @@ def read_ascii_matrices(path: Path) -> list[Op4Strings]:
         try:
             at = _columns(path, lines, at, strings)
         except (IndexError, ValueError) as error:
-            raise _damaged(f"{path}:{min(at, len(lines)) + 1}", "a file that is cut off") from error
+            raise _damaged(f"{path}:{min(at, len(lines)) + 1}", "a truncated file") from error
         result.append(strings)
     if not result:
         raise _damaged(str(path), "no matrix")
@@ -62,7 +64,7 @@ def _heading(path: Path, at: int, line: bytes) -> _AsciiStrings:
         head = [int(text[k : k + 8]) for k in range(0, 32, 8)]
         form = FixedFormat(text[40:].strip() or _FALLBACK)
     except ValueError as error:
-        raise _damaged(place, "another heading of a matrix") from error
+        raise _damaged(place, "an unknown matrix heading") from error
     header = Op4Header.checked(place, head, text[32:40])
     return _AsciiStrings(header=header, data=np.empty(0, np.uint8), form=form, place=place)
 
@@ -137,5 +139,5 @@ def _damaged(place: str, got: str) -> InputError:
         place,
         got=got,
         expected="a file of OUTPUT4 in ASCII form",
-        hint="the file is damaged, cut off, or of another kind.",
+        hint="the file is damaged, truncated, or of another kind.",
     )

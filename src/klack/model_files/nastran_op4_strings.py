@@ -1,4 +1,4 @@
-"""Strings of non-zeros of an OUTPUT4 matrix, collected while its records are gone through."""
+"""Strings of non-zeros of an OUTPUT4 matrix, collected while reading its records."""
 
 from dataclasses import dataclass, field
 from typing import Self

@@ -32,7 +32,7 @@ class _Punched:
     parts: list[NDArray[np.float64]] = field(default_factory=list)
 
     def flush(self, where: str) -> None:
-        """Make numbers of the words."""
+        """Convert the words to numbers."""
         if not self.words:
             return
         values = numbers_in(b" ".join(self.words))
@@ -85,7 +85,7 @@ def _names(data: bytes) -> list[str]:
 
 
 def _read(path: Path, data: bytes, chosen: str) -> dict[str, _Punched]:
-    """Entries of the chosen matrix; those of the others are gone past."""
+    """Entries of the chosen matrix; those of the others are skipped."""
     found: dict[str, _Punched] = {}
     open_matrix: _Punched | None = None
     column: tuple[bytes, bytes] | None = None
@@ -163,8 +163,8 @@ def _check(place: str, name: str, again: bool, words: list[bytes]) -> None:
 
 
 def _no_numbers(where: str) -> InputError:
-    hint = "the file is damaged or cut off; write it again."
-    return InputError(where, got="entries that are no numbers", expected="numbers", hint=hint)
+    hint = "the file is damaged or truncated; write it again."
+    return InputError(where, got="entries that are not numbers", expected="numbers", hint=hint)
 
 
 def _with_letter(word: bytes) -> bytes:

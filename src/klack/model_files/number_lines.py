@@ -89,7 +89,7 @@ def _signs(comments: bytes) -> tuple[bytes, ...]:
 
 
 def _even(text: bytes, columns: int, count: int) -> bool:
-    """True if every line has either no word or as many as there are columns."""
+    """True if every line has either no word or one per column."""
     letters = np.frombuffer(text.translate(_PLAIN) + b"\n", np.uint8)
     blank = letters <= _BLANK
     begins = ~blank
@@ -105,7 +105,7 @@ def _not_numbers(where: str, line: int, row: bytes, columns: int) -> InputError:
         f"{where}:{line}",
         got=f"'{shown}'",
         expected=f"{columns} numbers",
-        hint="the file is damaged or cut off, or of another kind.",
+        hint="the file is damaged or truncated, or of another kind.",
     )
 
 

@@ -28,7 +28,7 @@ _HINT = "store plain arrays of numbers: numpy.savez, or scipy.sparse.save_npz fo
 
 
 class _Arrays:
-    """Arrays of the file by name, each read when it is asked for."""
+    """Arrays of the file by name, each read on first use."""
 
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.path, self._archive = path, archive

@@ -1,4 +1,4 @@
-"""What the rows of a matrix are: a table of node and direction.
+"""Meaning of the rows of a matrix: a table of node and direction.
 
 Understood are ``node.direction`` (CalculiX ``.dof``), ``node, direction`` and
 ``row, node, direction`` (the mapping that ANSYS HBMAT writes).  A direction is 1 to 6, x, y, z,

@@ -1,4 +1,4 @@
-"""Matrices that programs hand over as arrays: compressed columns or rows, triplets, or full."""
+"""Matrices stored as arrays: compressed columns or rows, triplets, or full."""
 
 from typing import Any
 

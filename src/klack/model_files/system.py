@@ -135,7 +135,7 @@ def _check_rows(
             where,
             got=f"K with {n} rows and M with {M.matrix.shape[0]}",
             expected="the same rows",
-            hint="write both in one run, after the same boundary conditions.",
+            hint="write both in one run, with the same boundary conditions.",
         )
     if rows is not None and len(rows.node) != n:
         raise InputError(
@@ -161,7 +161,7 @@ def _in_order(where: str, M: SystemMatrix, rows: RowPlaces, m_rows: RowPlaces) -
             where,
             got=f"mass at node {m_rows.node[lost][0]}, which has no stiffness",
             expected="K and M of the same degrees of freedom",
-            hint="take point masses out of the model, or write both in one run.",
+            hint="remove point masses from the model, or write both in one run.",
         )
     return _moved(M.matrix, at, len(key))
 
@@ -195,7 +195,7 @@ def on_nodes(system: FileSystem, numbers: NDArray[np.int64], dimension: int) -> 
         _require_full(system, n, dimension)
         notes = system.notes
         if np.any(np.diff(numbers) < 0):
-            notes = (*notes, "rows taken in the order of the nodes in the file, not by number")
+            notes = (*notes, "rows in the order of the nodes in the file, not by number")
         return NodeSystem(K=system.K, M=system.M, absent=np.empty(0, np.int64), notes=notes)
     _require_translations(system.where, rows, dimension)
     order = np.argsort(numbers)
@@ -228,7 +228,7 @@ def _require_full(system: FileSystem, nodes: int, dimension: int) -> None:
     hint = "give the node and direction of each row with 'dofs'; constrained ones may be missing."
     if rows % nodes == 0:
         hint = (
-            f"the matrices have {rows // nodes} degrees of freedom per node: take solid elements "
+            f"the matrices have {rows // nodes} degrees of freedom per node: use solid elements "
             "without rotations, and 'model: axisymmetric' for r and z alone."
         )
     raise InputError(
@@ -248,5 +248,5 @@ def _require_translations(where: str, rows: RowPlaces, dimension: int) -> None:
             got=f"direction {rows.direction[turned][0]} at node {rows.node[turned][0]} and "
             f"{np.count_nonzero(turned)} rows of that kind",
             expected=f"the directions {', '.join(letters)}",
-            hint="take solid elements alone: no shells, beams, couplings or rotary inertia.",
+            hint="use solid elements alone: no shells, beams, couplings or rotary inertia.",
         )

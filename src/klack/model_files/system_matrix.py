@@ -112,7 +112,7 @@ def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Ro
         where,
         got=f"no matrix '{wanted}'" if wanted else f"{len(known)} matrices",
         expected=f"one of: {listed}" if known else "a matrix",
-        hint=f"say which one with {key} (klack inspect: --matrix)."
+        hint=f"select one with {key} (klack inspect: --matrix)."
         if known
         else "check what was written to this file.",
     )
@@ -189,7 +189,7 @@ def _same_pattern(A: csr_array, B: csr_array) -> bool:
 
 
 def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) -> tuple[str, ...]:
-    """Say how far a matrix is from its transpose; refuse one that is far."""
+    """Notes on asymmetry; reject a clearly asymmetric matrix."""
     size = float(np.linalg.norm(A.data))
     asymmetry = float(np.linalg.norm(difference)) / size if size else 0.0
     if not asymmetry <= _LARGEST_ASYMMETRY:
@@ -197,8 +197,8 @@ def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) 
             where,
             got=f"a matrix that is not symmetric: |A - A^T| / |A| = {asymmetry:.2g}",
             expected=f"at most {_LARGEST_ASYMMETRY:g}",
-            hint="write K and M of a linear elastic model without friction, follower loads or "
-            "rotating frame; dampers have no place in them.",
+            hint="write K and M of a linear elastic model without friction, "
+            "follower loads, rotating frame or dampers.",
         )
     if asymmetry <= _SEEN_ASYMMETRY:
         return ()
@@ -217,7 +217,7 @@ def _check_entries(
             where,
             got=f"{size} rows with {len(value)} entries",
             expected="one entry or more in every row",
-            hint="the file is cut off, or its mass matrix leaves nodes without mass.",
+            hint="the file is truncated, or its mass matrix has nodes without mass.",
         )
     for index in (row, column):
         low, high = int(index.min()), int(index.max())
@@ -231,7 +231,7 @@ def _check_entries(
     if not np.all(np.isfinite(value)):
         raise InputError(
             where,
-            got=f"{np.count_nonzero(~np.isfinite(value))} entries that are no finite numbers",
+            got=f"{np.count_nonzero(~np.isfinite(value))} entries that are not finite numbers",
             expected="finite numbers",
-            hint="the run that made the matrix has failed; check its log.",
+            hint="the run that wrote the matrix has failed; check its log.",
         )

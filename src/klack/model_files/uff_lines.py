@@ -16,7 +16,7 @@ def uff_refusal(path: Path, line: int, got: str, expected: str) -> InputError:
         f"{path}, line {line}",
         got=got,
         expected=expected,
-        hint="the file is cut off or damaged; export it again.",
+        hint="the file is truncated or damaged; export it again.",
     )
 
 
@@ -43,7 +43,7 @@ def uff_datasets(path: Path, lines: list[str]) -> Iterator[tuple[str, int, int]]
 def uff_numbers(
     path: Path, lines: list[str], at: int, end: int, count: int, *, width: int = 13
 ) -> list[float]:
-    """Numbers from line ``at`` on, as many as asked for, over several lines if need be."""
+    """Numbers from line ``at`` on, as many as requested, over several lines if necessary."""
     values: list[float] = []
     while len(values) < count:
         if at >= end:
@@ -63,7 +63,7 @@ def uff_numbers(
 
 
 def _fixed(path: Path, at: int, line: str, width: int) -> list[float]:
-    """Fields of so many characters that touch each other."""
+    """Adjacent fields of fixed width."""
     try:
         return [float(line[k : k + width]) for k in range(0, len(line.rstrip()), width)]
     except ValueError:

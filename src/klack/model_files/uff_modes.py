@@ -96,12 +96,14 @@ def read_uff_modes(path: Path) -> UffModes:
             str(path),
             got=f"datasets {', '.join(dict.fromkeys(kinds)) or '(none)'}",
             expected="mode shapes (dataset 55)",
-            hint="frequency responses (dataset 58) are no modes; run the modal analysis first and "
-            "export its shapes, mass-normalised.",
+            hint="frequency responses (dataset 58) are not modes; run the modal analysis "
+            "first and export its mass-normalised shapes.",
         )
     if len({mode.nodes for mode in modes}) > 1 or len({m.shapes.shape for m in modes}) > 1:
         odd = next(mode for mode in modes if mode.nodes != modes[0].nodes or mode is modes[-1])
-        raise uff_refusal(path, odd.line, "a mode of other nodes than the first", "the same nodes")
+        raise uff_refusal(
+            path, odd.line, "a mode with other nodes than the first", "the same nodes"
+        )
     width = modes[0].shapes.shape[1]
     return UffModes(
         frequency=np.array([mode.frequency for mode in modes]),
@@ -125,7 +127,7 @@ def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
             f"{path}, line {first + 6}",
             got="a complex mode",
             expected="real normal modes (analysis type 2, real data)",
-            hint="export normal modes; klack takes damping as a ratio beside the shape.",
+            hint="export normal modes; damping is a ratio given with the shape.",
         )
     if analysis != _NORMAL_MODE or quantity not in (0, _DISPLACEMENT) or not 1 <= width <= 6:
         raise uff_refusal(

@@ -1,1 +1,1 @@
-"""Components, the ports that they meet in, and the rows that the solver runs; no physics."""
+"""Components, their ports, and the rows of the solver; no physics."""

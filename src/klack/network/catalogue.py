@@ -45,11 +45,11 @@ COMPONENTS = (
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
 )
-"""Type word and dotted path of the class, for each component type."""
+"""Type and dotted path of the class, for each component type."""
 
 
 def type_words() -> tuple[str, ...]:
-    """Words that can stand after ``type:``."""
+    """Values allowed after ``type:``."""
     return tuple(word for word, _ in COMPONENTS)
 
 
@@ -57,7 +57,7 @@ _NONE: Mapping[str, type[Component]] = MappingProxyType({})
 
 
 def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> type[Component]:
-    """Class of a type word; imports classes of klack only.
+    """Class of a type; imports classes of klack only.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What makes a network a valve that can be computed; one clear error for each way it can fail."""
+"""Checks that a network is a computable valve, with one clear error for each fault."""
 
 import warnings
 from collections.abc import Iterable, Mapping
@@ -22,7 +22,7 @@ class LooseBodyWarning(UserWarning):
 
 
 def check_nodes(components: Mapping[str, Component], nodes: Iterable[Node]) -> None:
-    """Check what can be seen from the connections alone.
+    """Checks that need only the connections.
 
     Raises
     ------
@@ -48,16 +48,16 @@ def _check_dangling(components: Mapping[str, Component], nodes: Iterable[Node]) 
             raise CaseProblem(
                 ("components", component),
                 got=f"the port {component}.{name} in no connection",
-                expected=f"every port joined ({port.domain}: it {port.role.value})",
+                expected=f"every port connected ({port.domain}: it {port.role.value})",
                 hint=_where_to(port.domain, f"{component}.{name}"),
             )
 
 
 def _where_to(domain: str, port: str) -> str:
     words = {
-        "mechanical": f"join it to a port of a body, or to the ground: [{port}, ground].",
-        "hydraulic": f"join it to a chamber or a pressure, or let it drain: [{port}, ambient].",
-        "electric": f"join it to its partner: [driver.terminals, {port}].",
+        "mechanical": f"connect it to a port of a body, or to the ground: [{port}, ground].",
+        "hydraulic": f"connect it to a chamber or a pressure, or to ambient: [{port}, ambient].",
+        "electric": f"connect it to its partner: [driver.terminals, {port}].",
     }
     return words[domain]
 
@@ -67,15 +67,15 @@ def _check_motion(components: Mapping[str, Component], node: Node) -> None:
     if node.word and bodies:
         raise CaseProblem(
             ("connections", node.index),
-            got=f"{_and(bodies)} joined to the ground",
+            got=f"{_and(bodies)} connected to the ground",
             expected="a body or the ground, not both at one point",
-            hint="fix the body where it is described, or hold it by a stiff spring.",
+            hint="fix the body in its definition, or support it by a stiff spring.",
         )
     if len(bodies) > 1:
         raise CaseProblem(
             ("connections", node.index),
             got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
-            expected="one body and what pushes it",
+            expected="one body and the components that act on it",
             hint="put an end stop or a spring between the bodies, or make them one body.",
         )
     if not node.word and not bodies:
@@ -83,7 +83,8 @@ def _check_motion(components: Mapping[str, Component], node: Node) -> None:
             ("connections", node.index),
             got=f"{node}: nothing there has a mass",
             expected="a port of one body, or the ground",
-            hint="add the body that they push to this list; springs in series need one between.",
+            hint="add the body that they act on to this list; springs in series need one in "
+            "between.",
         )
 
 
@@ -102,7 +103,7 @@ def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
         raise CaseProblem(
             ("connections", node.index),
             got=f"the volume {volumes[0]} where {prescribed[0]} prescribes the pressure",
-            expected="either a volume, whose pressure is computed, or a prescribed pressure",
+            expected="either a volume with a computed pressure, or a prescribed pressure",
             hint="remove the chamber, or put an orifice between the two.",
         )
     if prescribed and not node.word:
@@ -117,13 +118,13 @@ def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressur
             raise CaseProblem(
                 ("connections", node.index),
                 got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
-                expected="a flow into a volume, whose pressure can answer",
-                hint="join it to a chamber; at a prescribed pressure it changes nothing.",
+                expected="a flow into a volume, whose pressure can respond",
+                hint="connect it to a chamber; at a prescribed pressure it has no effect.",
             )
 
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
-    """Whether the component needs nothing else than this port for a flow."""
+    """Whether the component forces a flow with this port alone."""
     needed = [
         port for port in components[joint.component].port_kinds().values() if not port.optional
     ]
@@ -131,9 +132,9 @@ def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
 
 
 def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProblem:
-    got = f"{node}: nothing there stores fluid or gives the pressure"
+    got = f"{node}: nothing there stores fluid or prescribes the pressure"
     if any(_is_flow_source(components, joint) for joint in node.joints):
-        got = f"{node}: a flow is forced into a node that stores nothing"
+        got = f"{node}: a flow is forced into a node without volume"
     return CaseProblem(
         ("connections", node.index),
         got=got,
@@ -164,7 +165,7 @@ def _no_driver(key: tuple[str | int, ...], coil: str) -> CaseProblem:
         key,
         got=f"the coil {coil} without a driver",
         expected="a driver at its terminals",
-        hint=f"add one, e.g. of the type voltage-step, and join it: [driver.terminals, {coil}].",
+        hint=f"add one, e.g. of the type voltage-step, and connect it: [driver.terminals, {coil}].",
     )
 
 
@@ -178,7 +179,7 @@ def _no_coil(key: tuple[str | int, ...], driver: str) -> CaseProblem:
 
 
 def check_rows(rows: Rows) -> None:
-    """Check what the parts have contributed, before the solver sees it.
+    """Checks of the rows of all components, before the solver.
 
     Raises
     ------
@@ -204,7 +205,7 @@ def check_rows(rows: Rows) -> None:
                 ("components", interface.component),
                 got=f"a gap of {format_si(interface.gap, 'm')} at the start: closed already",
                 expected="a gap of 0 or more",
-                hint="start touching (gap 0): a preload then presses the stop together.",
+                hint="start in contact (gap 0): a preload then compresses the stop.",
             )
     _check_node_rows(rows)
     check_ranges(rows)
@@ -235,7 +236,7 @@ def _warn_of_loose_bodies(rows: Rows) -> None:
     for body in rows.bodies:
         if body.body.rigid_count and not held & (set(body.ports) - {GROUND}):
             warnings.warn(
-                f"nothing holds '{body.component}': a steady force drives it away without end.\n"
+                f"nothing holds '{body.component}': a steady force accelerates it without limit.\n"
                 "Try: add an end stop or a spring.",
                 LooseBodyWarning,
                 stacklevel=4,

@@ -1,4 +1,4 @@
-"""What every component of a network is: documented parameters, ports, and the rows it adds."""
+"""Base class of the components of a network: documented parameters, ports, and rows."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -64,7 +64,7 @@ class Component(Section):
 
     @abstractmethod
     def add_rows(self, rows: Rows) -> None:
-        """Add what this component contributes to the solver; ``rows`` knows its connections."""
+        """Add the rows of this component; ``rows`` has its connections."""
 
 
 def _first_problem(name: str, error: ValidationError) -> InputError:

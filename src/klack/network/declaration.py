@@ -79,7 +79,7 @@ def _read_component(value: Any, info: ValidationInfo) -> Component:
 
 
 AnyComponent = Annotated[Component, BeforeValidator(_read_component), _ComponentSchema()]
-"""Field that takes any registered component, ``{type: ..., ...}``."""
+"""Field for any registered component, ``{type: ..., ...}``."""
 
 _FLUID = ("klack.hydraulics.fluid_choice", "FluidChoice")
 
@@ -115,14 +115,14 @@ class AmbientSection(Section):
     """Surroundings of the valve."""
 
     pressure: Pressure = Field(
-        default=101_325.0, gt=0, description="Absolute; pressure forces count from here."
+        default=101_325.0, gt=0, description="Absolute; reference of pressure forces."
     )
     temperature: Temperature = Field(
         default=293.15, gt=0, description="Of the surroundings and of the fluid."
     )
 
     def ambient(self) -> Ambient:
-        """Return it as the rows know it."""
+        """Return it in the form of the rows."""
         return Ambient(self.pressure, self.temperature)
 
 
@@ -131,14 +131,14 @@ class NetworkSection(Section):
 
     ambient: AmbientSection = Field(default=AmbientSection(), description="Surroundings.")
     fluid: Annotated[Any, BeforeValidator(_read_fluid), LateSection()] = Field(
-        default=None, description="What flows through the valve; none: a dry valve."
+        default=None, description="Fluid of the valve; none: a dry valve."
     )
     components: Mapping[Name, AnyComponent] = Field(
         min_length=1, description="name: {type: ..., and the keys of that type}."
     )
     connections: tuple[tuple[Text, ...], ...] = Field(
-        description="Each a list of the ports, component.port, that meet in one node; the words "
-        "ground and ambient may stand among them."
+        description="Each a list of the ports, component.port, that meet in one node; "
+        "ground and ambient are allowed."
     )
 
     @model_validator(mode="after")

@@ -83,7 +83,7 @@ class Network:
                     raise CaseProblem(
                         (),
                         got=f"no fluid, but the hydraulic component '{name}'",
-                        expected="fluid: what flows through the valve",
+                        expected="fluid: the fluid of the valve",
                         hint="add e.g. 'fluid: {name: n-heptane}'.",
                     )
 
@@ -197,7 +197,7 @@ class Network:
     def _changed(
         self, parts: Mapping[str, Component | None], instead: str, fluid: "Fluid | None"
     ) -> Self:
-        """Exchange components; what became None is left out, its ports become the word given."""
+        """Replace components; None removes one, and its ports become the given word."""
         kept = {name: part for name, part in parts.items() if part is not None}
         connections = []
         for connection in self.connections:

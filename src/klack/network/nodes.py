@@ -10,7 +10,7 @@ from klack.network.port import Port, Role
 __all__ = ["RESERVED", "Joint", "Node", "join"]
 
 RESERVED = {"ground": "mechanical", "ambient": "hydraulic"}
-"""Words that may stand in a connection instead of a port, and their domains."""
+"""Words allowed in a connection instead of a port, and their domains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def _node(
             ("connections", index),
             got=f"only {connection[0]}" if connection else "an empty connection",
             expected="two ports or more, or a port and ground or ambient",
-            hint="write all ports that meet in one list: [needle.tip, spring.end].",
+            hint="list all ports that meet: [needle.tip, spring.end].",
         )
     joints: list[Joint] = []
     words: list[str] = []
@@ -101,14 +101,14 @@ def _node(
             ("connections", index),
             got=" with ".join(f"{name} ({domain})" for name, domain in domains.items()),
             expected="ports of one domain",
-            hint="a part that lives in two domains has a port in each: join them one by one.",
+            hint="a component of two domains has a port in each: connect them one by one.",
         )
     if not joints:
         raise CaseProblem(
             ("connections", index),
             got=f"no port beside {one_of(words)}",
             expected="at least one port of a component",
-            hint="remove the connection, or add the port that it was meant for.",
+            hint="remove the connection, or add the missing port.",
         )
     domain = next(iter(domains.values()))
     return Node(index, domain, tuple(joints), words[0] if words else "")
@@ -152,5 +152,5 @@ def _joined_twice(key: tuple[str | int, ...], joint: Joint, first: int) -> CaseP
         key,
         got=f"{joint} a second time (first in connections[{first}])",
         expected="each port in one connection",
-        hint="write all that meets there in one list: [a.x, b.y, c.z].",
+        hint="list all ports that meet there together: [a.x, b.y, c.z].",
     )

@@ -1,4 +1,4 @@
-"""Components of the user's own: classes outside of klack, which only the user may let in.
+"""User components: classes outside klack, which only the user may allow.
 
 A case file names such a class as ``package.module:Class``, but never has it imported: the class is
 handed to the reader of the case, from Python or by the option ``--component`` of a command.
@@ -21,7 +21,7 @@ _REGISTERED = frozenset(path for _, path in COMPONENTS)
 
 
 def component_word(kind: type[Component]) -> str:
-    """Word of a class in a case file, ``package.module:Class``."""
+    """Type of a class in a case file, ``package.module:Class``."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
@@ -60,7 +60,7 @@ def import_component(word: str) -> type[Component]:
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise InputError(
             f"{_OPTION} {word}",
-            got="something that is no component",
+            got="something that is not a component",
             expected="a class derived from klack.network.component.Component",
             hint="see docs/how-to/add-a-component.md.",
         )
@@ -68,7 +68,7 @@ def import_component(word: str) -> type[Component]:
 
 
 def source_digests(components: Iterable[Component]) -> Mapping[str, str]:
-    """Own components among these, and which code they are.
+    """User components among these, with the digest of their code.
 
     Returns
     -------

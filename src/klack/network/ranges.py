@@ -1,4 +1,4 @@
-"""Ranges of a whole network, and what can be said of them before it runs."""
+"""Ranges of a whole network, and their check before the run."""
 
 from collections import defaultdict
 from math import inf
@@ -32,9 +32,9 @@ def _volumes(rows: Rows) -> list[LimitRow]:
             valid=(0.0, inf),
             usable=(0.0, inf),
             law="a chamber",
-            effect=lambda value: "No fluid is left in it.",
-            advice="give it its volume with all faces where they start, dead volume included, or "
-            "give the face that moves in its true area.",
+            effect=lambda value: "It has no fluid left.",
+            advice="give its volume with all faces at their start positions, dead volume "
+            "included, or correct the area of the moving face.",
             key="volume",
             start=rows.nodes[node].volume,
             ports=tuple(ports),
@@ -58,10 +58,11 @@ def _pressures(rows: Rows) -> list[LimitRow]:
             law=f"the fluid '{name}'",
             source=known.source,
             effect=lambda value: (
-                "Stiffness and waves are more than 10 % and 5 % off, volumes and flows less."
+                "Stiffness and wave speed are wrong by more than 10 % and 5 %, volumes and flows "
+                "by less."
             ),
             advice="check volumes, flows and pressures (absolute, with their units); where they "
-            "are meant, give a fluid of your own with a table of densities.",
+            "are intended, define your own fluid with a table of densities.",
             node=node,
         )
         for node, row in rows.nodes.items()
@@ -106,13 +107,13 @@ def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
         raise CaseProblem(
             ("components", limit.component, *([limit.key] if limit.key else [])),
             got=_way_text(rows, limit, way, stops),
-            expected=f"a {limit.quantity} {range_text(limit)} wherever the stops let it go",
+            expected=f"a {limit.quantity} {range_text(limit)} anywhere between the stops",
             hint=limit.advice,
         )
 
 
 def _way_text(rows: Rows, limit: LimitRow, way: float, stops: tuple[str, ...]) -> str:
-    """Both numbers: what there is at the start, and what the stops let the motion take or add."""
+    """Both numbers: the initial value, and its largest change within the stops."""
     start, change = (value_text(abs(value), limit.unit) for value in (limit.start, way))
     gaps = {row.component: row.gap for row in rows.interfaces}
     named = " and ".join(f"components.{name}.gap: {format_si(gaps[name], 'm')}" for name in stops)
@@ -138,7 +139,7 @@ def _check_pressure(rows: Rows, limit: LimitRow) -> None:
 
 
 def range_text(limit: LimitRow) -> str:
-    """Range of the law in words: "from 0 m to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
+    """Range of the law as text: "from 0 m to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
     low, high = limit.valid
     text = f"from {value_text(low, limit.unit)} to {value_text(high, limit.unit)}"
     if high == inf:

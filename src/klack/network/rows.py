@@ -1,4 +1,4 @@
-"""What the solver runs, as rows that components add; the solver turns them into flat arrays.
+"""Rows that components add and the solver turns into flat arrays.
 
 Handles are plain integers: of a mechanical port (a degree of freedom along +z of some body) and of
 a hydraulic node (one pressure).
@@ -43,7 +43,7 @@ GROUND = -1
 """Handle of the immovable ground as a mechanical port."""
 
 AMBIENT = 0
-"""Handle of the surroundings as a hydraulic node; always there when anything is hydraulic."""
+"""Handle of the surroundings as a hydraulic node; always present when anything is hydraulic."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Ambient:
     Parameters
     ----------
     pressure : float [Pa]
-        Absolute; pressure forces count from here.
+        Absolute; reference of pressure forces.
     temperature : float [K]
     """
 
@@ -63,7 +63,7 @@ class Ambient:
 
 @dataclass(frozen=True, slots=True)
 class Book:
-    """One entry of the energy ledger that a row keeps itself; see ``step_function``."""
+    """One entry of the energy balance that a row keeps itself; see ``step_function``."""
 
     label: str
     kind: Literal["store", "supply", "loss"]
@@ -102,7 +102,7 @@ class BodyRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ElementRow:
-    """Something that pushes ports; see :mod:`klack.network.step_function`.
+    """Element that applies forces to ports; see :mod:`klack.network.step_function`.
 
     ``names`` are what the component calls its ports.  ``at_rest`` gives the first states that the
     element has at the start once its ports rest at given displacements [m]; without it the states
@@ -451,7 +451,7 @@ class Rows:
         )
 
     def wall(self, node: int, port: int, area: float) -> None:
-        """Let a pressure push a port along +z over ``area`` [m^2] (negative: along -z)."""
+        """Apply a pressure to a port along +z over ``area`` [m^2] (negative: along -z)."""
         self.walls.append(WallRow(component=self.component, node=node, port=port, area=area))
 
     def interface(

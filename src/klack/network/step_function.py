@@ -18,18 +18,18 @@ positive along +z, *on the body*: the work done on the body is exactly ``F (y1 -
 [Pa] are absolute, densities [kg/m^3] belong to them, both *at the end* of the step (implicit); the
 mass flow ``mdot`` [kg/s] runs from a to b.
 
-Books [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
+Energies [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
 outside during it; a *loss* what was turned into heat.  An element must satisfy, to round-off,
-``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch books only what it stores.
-The solver books the rest of the hydraulic power: into the branch's supply, if it names one (a
+``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch gives only what it stores.
+The solver adds the rest of the hydraulic power: into the branch's supply, if it names one (a
 pump), else as its loss.
 
 The solver calls a function several times in a step, with better and better ``y1`` and pressures,
 and takes over the next state of the last call.  Before the first step it calls with ``h = 0`` and
 ``y0 = y1``: then only the stores are read; nothing may be divided by ``h``.  And it calls with
-short steps up to the time zero (``t = -h``), for the static start and the first record: no next
-state of an element is taken over from these.  Status 0 is success; any other number stops the run,
-and the component says in words what it means.
+short steps up to the time zero (``t = -h``), for the static equilibrium and the first record: no
+next state of an element is taken over from these.  Status 0 is success; any other number stops the
+run, and the component gives its meaning.
 """
 
 import ctypes
@@ -184,7 +184,7 @@ class _PythonStep:
 def python_step(
     function: PythonStep, *, parameters: int, states: int, inputs: int, outputs: int
 ) -> StepFunction:
-    """Let a plain Python function act in the time loop: about 2 us per call.
+    """Use a plain Python function in the time loop: about 2 us per call.
 
     Parameters
     ----------

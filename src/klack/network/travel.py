@@ -1,4 +1,4 @@
-"""How far the stops let the bodies of a network go: before any time passes."""
+"""Travel of the bodies of a network between the stops, before the run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -117,7 +117,7 @@ class Travel:
 
     @staticmethod
     def factors(rows: Rows, ports: Iterable[tuple[int, float]]) -> dict[str, float]:
-        """Factors of bodies from those of ports (handles); ports that stand count nothing."""
+        """Factors of bodies from those of ports (handles); fixed ports count nothing."""
         owner = _owners(rows)
         total: dict[str, float] = {}
         for port, factor in ports:

@@ -1,4 +1,4 @@
-"""Damping of modes: a small viscous ratio for each, whatever the user knows it from.
+"""Modal damping: a small viscous ratio for each mode, from any input.
 
 The reduced body is damped mode by mode, ``q'' + 2 zeta omega q' + omega^2 q = phi^T F``.  Rigid
 modes (``omega = 0``) are never damped: that would be drag, which belongs to the fluid.

@@ -61,7 +61,7 @@ def body_of_craig_bampton(
                 got=f"{matrix[i, j]:.6g} in row {i + 1}, column {j + 1} and {matrix[j, i]:.6g} "
                 "across",
                 expected="a symmetric matrix",
-                hint="rotating and damping terms cannot be taken; export K and M alone.",
+                hint="rotating and damping terms are not supported; export K and M alone.",
             )
     omega2, shapes = _all_modes(where, 0.5 * (K + K.T), 0.5 * (M + M.T))
     limit = (2.0 * np.pi * RIGID_FREQUENCY) ** 2 + 1e-12 * float(np.max(np.abs(omega2)))

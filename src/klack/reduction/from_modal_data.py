@@ -51,7 +51,7 @@ def body_of_modal_data(
                 f"{where}: {key} of mode {worst + 1}",
                 got=f"{values[worst]:g} {unit}",
                 expected=f"0 {unit} or more",
-                hint="a negative damping makes energy; correct or leave out the mode.",
+                hint="a negative damping creates energy; correct or leave out the mode.",
             )
     rigid = frequency < RIGID_FREQUENCY
     count = len(port_names)

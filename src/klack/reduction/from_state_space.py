@@ -139,8 +139,8 @@ def _split_rigid(
             f"{where}: poles at zero",
             got=f"{V0.shape[1]} of them in {chains} chains",
             expected="two for each rigid motion: its displacement and its velocity",
-            hint="a body is free or held; a drag on the rigid motion belongs outside of it, and "
-            "integrated outputs have to go.",
+            hint="a body is free or supported; a drag on the rigid motion is not part of "
+            "it, and integrated outputs are not possible.",
         )
     inner = W0.T @ V0
     into, out = np.linalg.solve(inner, W0.T @ B), C @ V0
@@ -208,8 +208,8 @@ def _check_stable(where: str, poles: Complex) -> None:
             f"{where}: stability",
             got=f"a pole that grows by {poles[worst].real:.4g} 1/s at "
             f"{abs(poles[worst].imag) / (2e3 * np.pi):.6g} kHz",
-            expected="poles that decay or stay",
-            hint="the model is unstable and would make energy; reduce the body again.",
+            expected="poles that decay or persist",
+            hint="the model is unstable and would create energy; reduce the body again.",
         )
 
 
@@ -239,7 +239,7 @@ def _oscillating(found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
 
 
 def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
-    """Pairs of real poles with opposite residues; those that no port sees are left out."""
+    """Pairs of real poles with opposite residues; those not visible at any port are left out."""
     real = np.flatnonzero(wanted & (found.poles.imag == 0))
     sizes = np.array([float(np.max(np.abs(r))) for r in found.residues]) * np.abs(found.poles)
     floor = _NOISE * _NOISE * float(sizes.max(initial=0.0))
@@ -253,9 +253,9 @@ def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_P
         if k < 0 or apart[k] > TOLERANCE * float(np.max(np.abs(r))):
             raise InputError(
                 f"{where}: real pole at {found.poles[i].real:.6g} 1/s",
-                got="no second real pole with the opposite share",
+                got="no second real pole with the opposite residue",
                 expected="overdamped modes have two",
-                hint="filters, actuators and drag on the rigid motion are no part of a body.",
+                hint="filters, actuators and drag on the rigid motion are not part of a body.",
             )
         j = left.pop(k)
         slow, fast = float(found.poles[i].real), float(found.poles[j].real)
@@ -276,8 +276,8 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             where,
             got=f"a complex shape ({100 * turned / own:.2g} % out of phase)",
             expected="real modes: damping that does not couple them",
-            hint="reduce with modal or Rayleigh damping, or give force and displacement of one "
-            "place.",
+            hint="reduce with modal or Rayleigh damping, or give force and displacement "
+            "at one point.",
         )
     own_share = np.diag(G.real)
     if own_share.min() < -limit:
@@ -289,9 +289,9 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             where,
             got=f"{G[i, j].real:.6g} 1/kg from '{ports[j]}' to '{ports[i]}', "
             f"{G[j, i].real:.6g} 1/kg back ({100 * apart[i, j] / own:.2g} % apart)",
-            expected="the same both ways (reciprocity): else a contact makes or takes energy",
-            hint="weight the displacement of a port as its force; one node for a loaded area is "
-            "not the same.",
+            expected="the same both ways (reciprocity): else a contact creates or removes energy",
+            hint="weight the displacement of a port like its force; a single node for a "
+            "loaded area is different.",
         )
     values, vectors = np.linalg.eigh(0.5 * (G.real + G.real.T))
     if values[0] < -limit:
@@ -302,7 +302,7 @@ def _makes_energy(where: str, port: str, share: float) -> InputError:
     return InputError(
         where,
         got=f"a share of {share:.6g} 1/kg at port '{port}'",
-        expected="shares of 0 or more (passivity): force and displacement point the same way",
+        expected="shares of 0 or more (passivity): force and displacement have the same direction",
         hint="check the signs of input and output, and that the output is a displacement, not "
         "an acceleration.",
     )

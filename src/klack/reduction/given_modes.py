@@ -58,7 +58,7 @@ class ModesAtPorts:
 def body_of_modes(
     name: str, where: str, modes: ModesAtPorts, *, mass: float | None = None
 ) -> ReducedBody:
-    """Put modes into the form of klack and check them.
+    """Convert modes to the form of klack and check them.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _residual(where: str, modes: ModesAtPorts) -> Floats:
         raise InputError(
             f"{where}: feedthrough",
             got=f"a compliance of {values[0]:.4g} m/N, most of it at '{port}'",
-            expected="0 or more: a negative compliance gives energy away (not passive)",
+            expected="0 or more: a negative compliance creates energy (not passive)",
             hint="check the sign of the output; outputs are displacements along +z.",
         )
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
@@ -157,8 +157,8 @@ def _rigid_shapes(where: str, modes: ModesAtPorts) -> Floats:
         raise InputError(
             f"{where}: rigid motion at port '{port}'",
             got=f"an inverse mass of {values[0]:.4g} 1/kg",
-            expected="one above 0: a force moves its own port ahead",
-            hint="force and displacement of a port must point the same way, along +z.",
+            expected="a value above 0: a force moves its own port in its direction",
+            hint="force and displacement of a port must have the same direction, along +z.",
         )
     return shapes_of_gram(gram, int(np.sum(values > _RANK * largest)))
 
@@ -176,7 +176,8 @@ def _axial(where: str, ports: Sequence[str], rigid: Floats) -> Floats:
             f"{where}: rigid motion",
             got=f"ports that do not move together along z ({moved} 1/sqrt(kg))",
             expected="the same rigid motion at every port",
-            hint="ports are axial, positive along +z; turn the sign, or leave lateral ports out.",
+            hint="ports are axial, positive along +z; reverse the sign, or leave lateral ports "
+            "out.",
         )
     return np.asarray(axial)
 
@@ -187,7 +188,7 @@ def _checked_mass(where: str, axial: Floats, rank: int, mass: float | None) -> f
         raise InputError(
             f"{where}: mass",
             got=f"{rank} rigid motions at the ports, and no mass",
-            expected="the mass: it tells translation from rotation",
+            expected="the mass: it separates translation from rotation",
             hint="add 'mass: 5 g' to the reduced model, or give ports on the axis only.",
         )
     if mass is not None and abs(found - mass) > _MASS * mass:
@@ -195,7 +196,7 @@ def _checked_mass(where: str, axial: Floats, rank: int, mass: float | None) -> f
             f"{where}: mass",
             got=f"{found:.6g} kg from the rigid motion of the model",
             expected=f"{mass:.6g} kg, as the case says, within 1 %",
-            hint="check 'units', and that the port lies on the axis: beside it a body turns as "
-            "well and seems lighter.",
+            hint="check 'units', and that the port is on the axis: off-axis a body "
+            "rotates as well and seems lighter.",
         )
     return found if mass is None or rank == 1 else float(mass)

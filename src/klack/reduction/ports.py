@@ -189,7 +189,7 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
 def node_observer(
     mesh: Mesh, place: int | ArrayLike, direction: Direction, *, name: str
 ) -> Observer:
-    """Displacement of one node, to look at (see the module text: not to load).
+    """Displacement of one node, for output only (see the module text: not for loads).
 
     Parameters
     ----------

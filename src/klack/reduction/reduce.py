@@ -49,7 +49,7 @@ def reduce_body(
     backend: Backend = "auto",
     threads: int | None = None,
 ) -> ReducedBody:
-    """Reduce a body to rigid, elastic and (if asked for) attachment modes.
+    """Reduce a body to rigid, elastic and (if requested) attachment modes.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def reduce_body(
             f"reduction of body '{body.name}': shifts",
             got=f'shifts with correction="{correction}"',
             expected='correction="attachment"',
-            hint="leave the shifts out, or ask for attachment modes.",
+            hint="leave the shifts out, or use attachment modes.",
         )
     rigid = body.rigid_modes
     shapes = np.hstack([rigid, kept.shapes, extra.shapes])
@@ -179,7 +179,7 @@ def _require_length(where: str, values: NDArray[np.float64], length: int) -> Non
             where,
             got=f"{len(values)} weights",
             expected=f"{length}, one for each degree of freedom of the body",
-            hint="build the port with the mesh of this body.",
+            hint="define the port with the mesh of this body.",
         )
 
 

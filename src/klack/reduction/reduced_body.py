@@ -40,7 +40,7 @@ class StateSpace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedBody:
-    r"""Modes of a body, seen from its ports.
+    r"""Modes of a body at its ports.
 
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad y_p = \sum_i \varphi_{ip} q_i
@@ -138,7 +138,7 @@ class ReducedBody:
 
     @property
     def residual_compliance(self) -> NDArray[np.float64]:
-        """What the modes miss [m/N]: static minus modal compliance, shape (n_ports, n_ports)."""
+        """Residual compliance [m/N]: static minus modal compliance, shape (n_ports, n_ports)."""
         return self.static_compliance - self.modal_compliance
 
     @property

@@ -109,7 +109,7 @@ def select(
             f"mode selection {selection}",
             got=f"a pool of {len(omega)} computed modes",
             expected=f"at least {needed}",
-            hint="compute more modes, or ask for fewer.",
+            hint="compute more modes, or request fewer.",
         )
     if isinstance(selection, ByCount):
         return np.arange(selection.count)

@@ -82,12 +82,12 @@ def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
             where,
             got=f"a file that holds {found}",
             expected=kind,
-            hint="choose a file that klack wrote for this purpose.",
+            hint="choose a file written by klack for this purpose.",
         )
     if int(arrays["version"]) > version:
         raise InputError(
             where,
             got=f"version {int(arrays['version'])}",
             expected=f"version {version} or older",
-            hint="it was written by a newer klack; update this one.",
+            hint="it was written by a newer version of klack; update this one.",
         )

@@ -28,7 +28,7 @@ STRUCTURE_UNITS: Mapping[str, str] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Structure:
-    r"""Modes of a held body, seen from its ports, its support and its surface.
+    r"""Modes of a supported body at its ports, its support and its surface.
 
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad u_n(x) = \sum_i n \cdot \phi_i(x)\, q_i + \sum_p r_p(x) F_p
@@ -109,7 +109,7 @@ class Structure:
 
     @property
     def residual_compliance(self) -> NDArray[np.float64]:
-        """What the modes miss of the static compliance [m/N], shape (p, p)."""
+        """Residual compliance of the modes [m/N], shape (p, p)."""
         scaled = self.port_shapes / self.omega[:, None]
         return self.static_compliance - scaled.T @ scaled
 

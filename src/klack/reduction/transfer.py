@@ -1,4 +1,4 @@
-r"""How far up a reduced body can be trusted: its receptance against that of the full body.
+r"""Frequency limit of a reduced body: its receptance against that of the full body.
 
 The deviation is taken in decibels, point by point, ``20 log10 |G_reduced / G_full|``, and its
 magnitude is then averaged over a sliding window of one-third octave (equal weight per logarithmic

@@ -1,4 +1,4 @@
-"""A chart described once, in the words of its reader, and drawn by any renderer.
+"""Chart described once, and drawn by any renderer.
 
 ``klack.report.interactive`` draws it with plotly for the browser, ``klack.report.printed`` with
 matplotlib for paper.  Curves are told apart by line style as well as by colour, so that a black and
@@ -58,7 +58,7 @@ DASHES: dict[Style, tuple[float, ...]] = {
 AREA_OPACITY = 0.3
 
 LABEL_STEP = 0.13
-"""Labels of upright marks stand below each other, this share of the panel apart."""
+"""Labels of vertical marks are placed below each other, this share of the panel apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +125,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """Shaded range of x with a word on it."""
+    """Shaded range of x with a label."""
 
     low: float
     high: float

@@ -1,4 +1,4 @@
-"""One self-contained page: figures, plotly itself and the words in a single file.
+"""Self-contained page: figures, plotly and texts in a single file.
 
 The page loads nothing from anywhere; its content security policy forbids it.  The plotly library
 is packed with gzip, which browsers undo themselves (``DecompressionStream``, in all of them since

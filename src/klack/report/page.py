@@ -1,4 +1,4 @@
-"""What a report says, before it is laid out: the same words for screen and paper.
+"""Content of a report before its layout: the same texts for screen and paper.
 
 Everything here is plain text; each renderer escapes it in its own way, because titles, names and
 the text of the case come from the user.
@@ -24,7 +24,7 @@ class Table:
 
 
 class Picture(Protocol):
-    """An image (SVG) and what has to be said about it."""
+    """Image (SVG) and its caption."""
 
     @property
     def image(self) -> bytes:
@@ -37,7 +37,7 @@ class Picture(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sound:
-    """A sound to listen to (WAV; empty if it is too long for a page), and what to say about it."""
+    """Sound (WAV; empty if too long for a page) and its caption."""
 
     title: str
     wav: bytes

@@ -1,4 +1,4 @@
-"""Fewer points that look the same: the smallest and the largest value of every pixel column."""
+"""Thinning of points without visible change: smallest and largest value of every pixel column."""
 
 import numpy as np
 from numpy.typing import NDArray

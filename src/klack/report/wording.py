@@ -93,7 +93,7 @@ def count(value: int) -> str:
 
 
 def listed(words: list[str]) -> str:
-    """Words with commas and a last 'and'.
+    """List of words with commas and a final 'and'.
 
     >>> listed(["a", "b", "c"]), listed(["a"])
     ('a, b and c', 'a')
@@ -112,7 +112,7 @@ def sentence(text: str) -> str:
 
 
 def fixed(value: float, decimals: int, unit: str = "") -> str:
-    """So many decimals.
+    """Number with fixed decimals.
 
     >>> fixed(-0.31, 1)
     '−0.3'

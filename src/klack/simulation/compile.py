@@ -29,7 +29,7 @@ _RESOLUTION = 0.05  # step over the shortest period, and over the rise time of t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyBlock:
-    """Where a body sits among all modes, and how to get back to its own.
+    """Position of a body among all modes, and the transformation back to its own.
 
     Parameters
     ----------

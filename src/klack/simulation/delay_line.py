@@ -10,7 +10,7 @@ step, and ``Z`` the impedance,
 over fine steps ``h``; a delay that is no multiple of ``h`` is read by linear interpolation, and a
 step of ``m`` fine steps reads the mean of ``m`` samples and writes ``m`` equal ones.  Every read
 is a mean with weights that add up to one, so the volume of a pulse is kept, and by convexity the
-energy ``h w^2 / (4 Z)`` per sample can only fall: what it loses is booked.
+energy ``h w^2 / (4 Z)`` per sample can only fall: the loss is counted.
 
 Friction sits between segments and, half each, at both ends: ``R q`` and resistance-inductance
 pairs ``dp_k = gain_k (q - i_k)``, ``di_k/dt = rate_k (q - i_k)``, advanced exactly for a flow that
@@ -55,7 +55,7 @@ Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LINE_LOSSES = ("friction", "interpolation", "cavity collapse")
-"""Columns of the books of :func:`lines_commit`."""
+"""Columns of the losses in :func:`lines_commit`."""
 
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over friction terms use registers
 _A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as whole
@@ -272,7 +272,7 @@ def _segment_steps(row: LineRow, step: float, coarse: int) -> Vector:
     if blocks < 1.0 - _A_WHOLE:
         fewer = int(total / coarse)
         longest = format_si(row.delay / (row.segments * coarse), "s", 3)
-        cure = f"take a fine step of {longest} or less, or fewer fine steps in a coarse one"
+        cure = f"use a fine step of {longest} or less, or fewer fine steps in a coarse one"
         raise InputError(
             f"line '{row.component}'",
             got=f"segments that a wave crosses in {format_si(row.delay / row.segments, 's')}",
@@ -485,7 +485,7 @@ def line_cavity(lines: Lines, state: LineState, line: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _held(lines: Lines, state: LineState, segment: int, wave: int, power: int) -> float:
-    """Sum of the samples, or of their squares, that are still under way."""
+    """Sum of the samples, or of their squares, still in transit."""
     oldest = lines.start[segment, wave] + state.head[segment]
     total = 0.0
     for i in range(oldest, oldest + lines.depth[segment]):

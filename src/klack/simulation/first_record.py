@@ -1,4 +1,4 @@
-"""What acts at the moment at which a run begins: the record before its first step.
+"""Forces at the start of a run: the record before its first step.
 
 Later records hold means over the time before them; the first one holds the limit of that, values of
 the started state itself.
@@ -21,7 +21,7 @@ Vector = NDArray[np.float64]
 
 
 def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vector, Vector]:
-    """Forces, flows and recorded states now, once all rows were asked for a short step up to now.
+    """Forces, flows and recorded states now, after a short step of all rows up to now.
 
     Parameters
     ----------

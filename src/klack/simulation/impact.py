@@ -130,7 +130,7 @@ def simulate(
                 f"simulate: velocity of '{name}'",
                 got="a supported body",
                 expected="a free body",
-                hint="only bodies without support can move as a whole.",
+                hint="only unsupported bodies can move as a whole.",
             )
     flat = flatten(system, velocities, step)
     if flat.v.size == 0:
@@ -181,7 +181,7 @@ def simulate(
     )
     if status != STATUS_FINE:
         raise ConvergenceError(
-            f"simulate: the forces of {contacts} contacts did not settle within a step of "
+            f"simulate: the forces of {contacts} contacts did not converge within a step of "
             f"{step:g} s.\nTry: a tenth of the step."
         )
     pairs = [
@@ -207,7 +207,7 @@ def simulate(
         ledger.residual,
         ledger.least_loss,
         limit=_BALANCE,
-        advice="a shorter step; bodies and laws whose numbers lie far apart cost digits",
+        advice="a shorter step; bodies and laws of very different magnitudes cost digits",
     )
     return SystemRecord(
         system=system,
@@ -234,7 +234,7 @@ def simulate_impact(
     steps_per_record: int = 1,
     contact: int = 0,
 ) -> ImpactHistory:
-    """Let the upper body of a contact fly onto the lower one.
+    """Simulate the impact of the upper body of a contact on the lower one.
 
     Parameters
     ----------
@@ -331,7 +331,7 @@ def _external_forces(
     step: float,
     velocity: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Mean axial force on each body; the springs see the motion of the centre of mass."""
+    """Mean axial force on each body; springs act on the centre of mass."""
     out = np.zeros((records, len(system.bodies)))
     for k, block in enumerate(flat.blocks):
         body, rigid = block.body, block.body.rigid_count

@@ -1,6 +1,6 @@
 """Impacts in a run: when, how fast, how hard, how long, and what was left.
 
-They are found while the run goes on, in a few numbers per interface, so that their memory does not
+They are found during the run, with a few numbers per interface, so that their memory does not
 grow with time.  :class:`ImpactFinder` is fed with the steps in which an interface carried force and
 with the speed of its gap between them; where the run is cut into parts does not matter, not even
 for the last bit.
@@ -88,7 +88,7 @@ class ImpactFinder:
 
     @property
     def state(self) -> Vector:
-        """What is known of unfinished impacts, shape (interfaces, n); to go on from."""
+        """State of unfinished impacts, shape (interfaces, n), to continue from."""
         return self._state.copy().view(np.float64).reshape(len(self._stops), _STATE.itemsize // 8)
 
     @state.setter
@@ -119,7 +119,7 @@ class ImpactFinder:
             self._found += [self._event(c, row) for row in out[:count]]
 
     def events(self) -> tuple[ImpactEvent, ...]:
-        """All impacts so far, in order of time, each as far as it is known.
+        """All impacts so far, in order of time, complete or not.
 
         One that is not over yet is reported again, whole, by a finder that resumes from
         :attr:`state`; it has the same stop and the same time.
@@ -132,7 +132,7 @@ class ImpactFinder:
         return tuple(sorted((*self._found, *open_ones), key=lambda event: event.time))
 
     def told(self) -> None:
-        """Note that all impacts so far are reported: again only those of which more gets known."""
+        """Mark all impacts so far as reported; only changed ones are reported again."""
         self._found.clear()
         self._state["news"] = self._state["impact_news"] = 0.0
 
@@ -174,7 +174,7 @@ def _feed(
     rates: Vector,
     out: Any,
 ) -> int:
-    """Steps and records in order of time; a record stands before the step that starts then."""
+    """Steps and records in order of time; a record precedes the step that starts then."""
     s = state[c]
     count, place = 0, 0
     for i in range(rows.shape[0]):
@@ -387,7 +387,7 @@ def _emit(s: Any, out: Any, count: int) -> int:
 
 @njit(cache=True)
 def _unfinished(state: Any, c: int, period: float, out: Any) -> int:
-    """What the impacts that may go on would be if nothing followed; leaves the state as it is."""
+    """Unfinished impacts as if nothing followed; leaves the state as it is."""
     copy = state[c : c + 1].copy()
     s = copy[0]
     count = 0

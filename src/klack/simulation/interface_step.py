@@ -21,7 +21,7 @@ rises with a slope of 1 or more.
 compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
 1/2 would let ``e`` change its sign in every step for ever.  ``theta = 1 - D c / h`` is the smallest
 value that does not; without a film it is 1, and a compression left at release vanishes with its
-energy booked.
+energy counted as a loss.
 
 At first touch the film ends while the contact begins, and what only the film had compressed is
 lost: ``theta`` is 1 in the step after it.  With 1/2 this share of ``e`` would change its sign in

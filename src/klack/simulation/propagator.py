@@ -103,7 +103,7 @@ def damping_loss(
 ) -> DampingLoss:
     """Quadratic forms of the modal damping loss, by Gauss integration of the exact velocity.
 
-    It does not use the energy balance, so a ledger that books it is a true check.
+    It does not use the energy balance, so a balance with it is an independent check.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ask every row of a network for its forces and flows at one moment, outside of the time loop."""
+"""Forces and flows of every row of a network at one moment, outside the time loop."""
 
 import numpy as np
 from numba import njit

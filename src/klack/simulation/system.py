@@ -1,4 +1,4 @@
-"""What takes part in an impact: reduced bodies, contacts, constant forces, springs to ground."""
+"""System of an impact: reduced bodies, contacts, constant forces, springs to ground."""
 
 from dataclasses import dataclass, field
 

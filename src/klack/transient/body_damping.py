@@ -104,7 +104,7 @@ class DampingMatrix:
 
     @classmethod
     def of(cls, damping: BodyDamping, body: ElasticBody, M: csr_array) -> "DampingMatrix":
-        """Put the matrix of a body together.
+        """Assemble the matrix of a body.
 
         Parameters
         ----------

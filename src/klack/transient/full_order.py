@@ -14,7 +14,7 @@ is no penalty and no regularisation.  Damping (:mod:`klack.transient.body_dampin
 ``contact-stabilised-newmark``
     (Deuflhard, Krause & Ertel 2008.)  Where free flight would carry the inertia of contact nodes
     through the other body it is first put back, :math:`w = u_0 + h v_0 + M^{-1} G^T \mu` with
-    :math:`0 \le \mu \perp g(w) \ge 0`.  The energy can only fall, and the two losses are booked:
+    :math:`0 \le \mu \perp g(w) \ge 0`.  The energy can only fall, and the two losses are counted:
 
     .. math:: E_1 - E_0 = -\lambda^T g_0 - \tfrac{2}{h^2} \mu^T g_1
 
@@ -81,7 +81,7 @@ _LEARN_STEPS = 60
 """The same for the points whose response is worked out together with those needed now."""
 
 _RIM_RESERVE = 1.1
-"""Places of a body travel a little farther than its centre of mass while it rings."""
+"""Points of a vibrating body travel slightly farther than its centre of mass."""
 
 _REVIEW_STEPS = 32
 """Steps between reviews of the watched points."""
@@ -117,7 +117,7 @@ def simulate_full_order(
     progress: Callable[[float], None] | None = None,
     snapshots: Snapshots | None = None,
 ) -> FullOrderResult:
-    """Let body a fly in -z onto body b and follow both until ``duration``.
+    """Simulate body a moving in -z onto body b until ``duration``.
 
     Body a starts free of strain with ``speed``, body b at rest.  The rigid flight until just before
     the first touch is skipped: the record starts there, and its clock at the given placement.
@@ -187,7 +187,7 @@ def simulate_full_order(
             "simulate_full_order: scheme",
             got=f"'{scheme}'",
             expected="'contact-stabilised-newmark' or 'massless'",
-            hint="take the first one; the second is for comparison.",
+            hint="use the first one; the second is for comparison.",
         )
     begin = perf_counter()
     with ExitStack() as stack:
@@ -198,7 +198,7 @@ def simulate_full_order(
             raise InputError(
                 f"simulate_full_order: body '{bodies[0].name}'",
                 got="a body a that is fixed along z",
-                expected="a body that is free to fly along z",
+                expected="a body that is free to move along z",
                 hint="fix only radial degrees of freedom of the needle, or swap the bodies.",
             )
         for body in bodies:
@@ -334,7 +334,7 @@ class _Motion:
             self.solve = LowRankSolve(self.solve, self.factor, self.G, Z, D)
 
     def learn(self, points: NDArray[np.int64]) -> None:
-        """Work out the response to contact points that come near for the first time."""
+        """Compute the response to contact points that come near for the first time."""
         self.solve.learn(points)
         if self.inverse_mass is not None:
             columns = self.inverse_mass.mobility(self.G, points)
@@ -409,7 +409,7 @@ class _Motion:
         return self.v - self.inverse_mass.solve(self.G_transposed @ y)
 
     def whole(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Put the fixed degrees of freedom back into a field."""
+        """Insert the fixed degrees of freedom into a field."""
         out = np.zeros(self.dof_count)
         out[self.free] = field
         return out
@@ -443,7 +443,7 @@ class _Run:
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
     def place(self) -> tuple[float, float]:
-        """Put a just before the first touch; returns the time flown and the retraction."""
+        """Place a just before the first touch; returns the time flown and the retraction."""
         needle, axial = self.bodies[0], self.space.axial
         facing = axial > 1e-6
         if not np.any(facing):
@@ -478,7 +478,7 @@ class _Run:
         return _WATCH_STEPS * self.reach_per_step
 
     def watch(self, points: NDArray[np.bool_]) -> None:
-        """Look at these points from now on."""
+        """Watch these points from now on."""
         if np.any(points & ~self.learned):
             new = (points | (self.gap < _LEARN_STEPS * self.reach_per_step)) & ~self.learned
             self.together([partial(body.learn, np.flatnonzero(new)) for body in self.bodies])
@@ -548,7 +548,7 @@ class _Run:
         return self.force_problem.solve(gap, active)
 
     def _commit(self, lam: NDArray[np.float64], gap: NDArray[np.float64]) -> tuple[float, float]:
-        """Book the step and make its end the new state."""
+        """Add the energies of the step and make its end the new state."""
         before, self.gap = self.gap, gap
         if self.scheme == "massless":
             mean = 0.5 * (self.lam + lam)
@@ -596,7 +596,7 @@ class _Run:
 
 
 class _Record:
-    """Grows while a run goes on."""
+    """Grows during a run."""
 
     def __init__(self, run: _Run) -> None:
         self.force: list[float] = []
@@ -687,7 +687,7 @@ def _march(
 
 
 class _Show:
-    """Hands out the fields after every step for which it is time."""
+    """Passes on the fields after every due step."""
 
     def __init__(self, run: _Run, start: float, snapshots: Snapshots) -> None:
         self.run, self.start, self.snapshots = run, start, snapshots
@@ -714,9 +714,9 @@ def _check_rim(run: _Run) -> None:
         at = ", ".join(f"{x * 1e3:.4g}" for x in run.space.points[np.argmax(beyond)])
         raise ReachError(
             "simulate_full_order: contact space",
-            got=f"a contact point at the rim of the candidates, at ({at}) mm, that closed "
+            got=f"a contact point at the edge of the candidate area, at ({at}) mm, that closed "
             f"{run.steps * run.step * 1e6:.4g} us after the start of the record",
-            expected="contact only inside of the candidates",
+            expected="contact only inside the candidate area",
             hint="build the contact space with a larger reach; in a case, enlarge contact.reach.",
         )
 

@@ -211,7 +211,7 @@ def _axis(where: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
             where,
             got=f"a surface that is off the nearest round one by {miss * size * 1e6:.3g} um",
             expected="a cylinder around the axis of the body",
-            hint="name the cylindrical part of the shaft alone, or refine the mesh around it.",
+            hint="name only the cylindrical part of the shaft, or refine the mesh around it.",
         )
     return np.asarray(middle + size * solution[:2])
 
@@ -224,7 +224,7 @@ def _weights(places: NDArray[np.float64], size: float) -> NDArray[np.float64]:
 
 
 def _supports(places: NDArray[np.float64], size: float) -> bool:
-    """Tell whether points hold the axis from all sides: no weight below zero, no sector free."""
+    """Whether points support the axis from all sides: no weight below zero, no sector free."""
     if len(places) < 4:
         return False
     angle = np.sort(np.arctan2(places[:, 1], places[:, 0]))

@@ -93,7 +93,7 @@ class InverseMass:
 
 
 def massless_nodes(M: csr_array, nodes: NDArray[np.int64], dimension: int) -> csr_array:
-    r"""Mass matrix without inertia at ``nodes``; what they had goes to their neighbours.
+    r"""Mass matrix without inertia at ``nodes``; theirs goes to their neighbours.
 
     The velocity of a node without mass is taken as a weighted mean W of its neighbours with mass:
 

@@ -1,4 +1,4 @@
-r"""Elastic bodies as modes, and the compliance that the modes miss, point by point.
+r"""Elastic bodies as modes, with their residual compliance point by point.
 
 Between the contact points of several bodies
 
@@ -91,7 +91,7 @@ class InterfaceContact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StaticChecks:
-    """What was found when the model was built.
+    """Checks made when the model was built.
 
     Parameters
     ----------
@@ -224,9 +224,9 @@ def interface_model(
     if moving.is_fixed:
         raise InputError(
             f"interface model: body '{moving.name}'",
-            got="a moving body that is held",
+            got="a supported moving body",
             expected="a body that is free along z",
-            hint="give the needle first and take its supports away.",
+            hint="give the needle first and remove its supports.",
         )
     rows = [len(contact.space.gap) for contact in contacts]
     last = np.cumsum(rows).astype(np.int64)
@@ -424,7 +424,7 @@ def _require_sound(checks: StaticChecks) -> None:
         )
     if checks.reciprocity > _RECIPROCITY or checks.static_limit > _STATIC_LIMIT:
         raise ConvergenceError(
-            f"interface model: the statics miss reciprocity by {checks.reciprocity:.2g} and the "
-            f"exact answer by {checks.static_limit:.2g}.\n"
-            "Try: look for distorted elements; solve the statics with another back end."
+            f"interface model: the statics miss reciprocity by {checks.reciprocity:.2g} and "
+            f"the exact solution by {checks.static_limit:.2g}.\n"
+            "Try: look for distorted elements; solve the statics with another solver."
         )

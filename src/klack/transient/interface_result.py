@@ -1,4 +1,4 @@
-"""What an interface-level run leaves behind."""
+"""Result of an interface-level run."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ class RigidMotion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InterfaceEnergy:
-    """Books of a whole run.
+    """Energy balance of a whole run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class InterfaceEnergy:
         Of constant forces.
     debt : float [J]
         Energy that the contact steps have given too much and not yet taken back; the residual
-        of the books but for round-off.
+        of the balance except for round-off.
     """
 
     initial: float

@@ -77,7 +77,7 @@ def simulate_interface(
     points: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> InterfaceResult:
-    """Let the moving body fly in -z and follow it through one or several impacts.
+    """Simulate the moving body in -z through one or several impacts.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ class _Run:
         self.gap0 = fresh - self.model.traces[:, :r] @ self.q[:r]
 
     def touch(self) -> float:
-        """Way of the moving body along -z until the first gap closes [m]."""
+        """Travel of the moving body along -z until the first gap closes [m]."""
         facing = self.model.axial > 1e-6
         gap = self.gap0 + self.model.traces @ self.q
         return float(np.min(gap[facing] / self.model.axial[facing]))
@@ -309,7 +309,7 @@ class _Run:
             progress(1.0)
 
     def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
-        """Jump until a gap may close soon; take the gaps anew on the way."""
+        """Jump until a gap may close soon; recompute the gaps meanwhile."""
         empty = np.zeros((0, self.model.mode_count))
         while self.time < duration:
             stale = self.stale()
@@ -332,7 +332,7 @@ class _Run:
                 progress(min(self.time / duration, 1.0))
 
     def stale(self) -> float:
-        """Tell by how much the gaps may differ from those of the geometry [m].
+        """Largest possible difference of the gaps from those of the geometry [m].
 
         Surfaces that enclose an angle slide past each other: a share of the way is missing.
         """
@@ -350,7 +350,7 @@ class _Run:
         )
 
     def unguided(self, time: float) -> bool:
-        """Tell whether the shaft surely stays clear of its guide for so long."""
+        """Whether the shaft surely stays clear of its guide for this time."""
         if self.guide is None:
             return True
         if np.any(self.guide_force):
@@ -578,7 +578,7 @@ class _Run:
         return name, side, min(met, default=None)
 
     def approach(self) -> float:
-        """Largest way to -z after the first touch below [m]."""
+        """Largest travel to -z after the first touch below [m]."""
         return 0.0 if self.touched_at is None else max(0.0, self.touched_at - self.lowest)
 
     def check_rim(self) -> None:
@@ -595,9 +595,10 @@ class _Run:
         at = ", ".join(f"{x * 1e3:.4g}" for x in self.model.points[np.argmax(at_rim)])
         raise ReachError(
             "interface level: contact",
-            got=f"a contact point at the rim of the candidates, at ({at}) mm, that carried",
-            expected="contact only inside of the candidates",
-            hint="enlarge contact.reach, or make eccentricity and tilt smaller.",
+            got=f"a contact point at the edge of the candidate area, at ({at}) mm, that carried "
+            "load",
+            expected="contact only inside the candidate area",
+            hint="increase contact.reach, or reduce eccentricity and tilt.",
         )
 
     def result(self, wall_time: float) -> InterfaceResult:

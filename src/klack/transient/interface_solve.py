@@ -57,12 +57,12 @@ class InterfaceSolve(Protocol):
         ...
 
     def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
-        """S^-1 (b + G^T lam) for forces at the selected points; may be asked more than once."""
+        """S^-1 (b + G^T lam) for forces at the selected points; may be called more than once."""
         ...
 
 
 def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolve:
-    """Choose the cheapest way that the factorisation offers.
+    """Choose the cheapest method of the factorisation.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a full-order impact leaves behind."""
+"""Result of a full-order impact."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -103,7 +103,7 @@ class MotionOfBody:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Snapshots:
-    """Asks a run for its fields while it goes on; nothing is kept but by the one who asks.
+    """Reads fields of a run in progress; they are kept only by the caller.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class FullOrderResult:
     Parameters
     ----------
     history : ImpactHistory
-        Contact force, gap and centre-of-mass velocities; the ledger's contact dissipation is the
+        Contact force, gap and centre-of-mass velocities; its contact dissipation is the
         numerical loss of the scheme.
     point_force : float32 array, shape (n, nc) [N]
         Force of every contact point, mean over each step.

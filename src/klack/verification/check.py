@@ -85,7 +85,7 @@ class Check:
 
     @property
     def unit(self) -> str:
-        """What stands in brackets at the end of the name; empty for pure numbers.
+        """Unit in brackets at the end of the name; empty for pure numbers.
 
         >>> compare("a", "time [s]", expected=1, computed=1, tolerance=0, source="").unit
         's'
@@ -102,7 +102,7 @@ class Check:
 
     @property
     def headroom(self) -> float:
-        """How many times the present deviation the tolerance lets pass.
+        """Ratio of the tolerance to the present deviation.
 
         Deviations below round-off count as round-off; nan for a check that did not run.
         """

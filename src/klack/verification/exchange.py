@@ -1,7 +1,7 @@
 """Into other programs and back: meshes, matrices, reduced models, FMUs, results.
 
 One small body goes through every file form, and the numbers that come back are compared with those
-that left.  Programs and packages that are not installed are passed over.
+that left.  Programs and packages that are not installed are skipped.
 """
 
 import shutil

@@ -333,7 +333,7 @@ def _spring_of_fluid() -> list[Check]:
             expected=wh / 4,
             computed=damping,
             tolerance=5e-4,
-            source="implicit Euler of the pressure: omega h/4, booked as loss",
+            source="implicit Euler of the pressure: omega h/4, counted as loss",
         ),
         compare(
             GROUP,
@@ -357,7 +357,7 @@ def _spring_of_fluid() -> list[Check]:
             expected=0.0,
             computed=hard.books.relative_residual,
             tolerance=5e-12,
-            source="conservation: kinetic, pressure energy, booked loss",
+            source="conservation: kinetic energy, pressure energy, loss",
         ),
     ]
 

@@ -98,7 +98,7 @@ def blocked_bar(
 
 
 def drop_blocked_bar(length: float, elements: int, speed: float) -> FullOrderResult:
-    """Let the blocked bar of steel (radius 2 mm) fall on a rigid wall."""
+    """Drop the blocked bar of steel (radius 2 mm) on a rigid wall."""
     body, space = blocked_bar(length, 2e-3, elements, STEEL)
     c = bulk_wave_speed(STEEL)
     return simulate_full_order(

@@ -149,7 +149,7 @@ def _energy() -> list[Check]:
     out.append(
         compare(
             GROUP,
-            "energy residual, Hunt-Crossley loss booked [-]",
+            "energy residual with Hunt-Crossley loss [-]",
             expected=0.0,
             computed=ledger.residual,
             tolerance=1e-13,

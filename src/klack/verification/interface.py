@@ -77,7 +77,7 @@ def _face(upper: str, lower: str, space) -> InterfaceContact:  # type: ignore[no
 
 
 def _free_blocks() -> list[Check]:
-    """Statics, and the momenta of a pair that meets off axis, tilted, sliding and spinning."""
+    """Statics, and the momenta of an off-axis, tilted, sliding and spinning pair."""
     a, b, space = free_blocks()
     model, items = reduce_bodies((a, b), [_face("upper", "lower", space)], (10, 10))
     load = np.random.default_rng(1).uniform(0.0, 1.0, space.count) ** 4

@@ -222,7 +222,7 @@ def lateral_guide(
 def reduce_bodies(
     bodies: Sequence[ElasticBody], contacts: Sequence[InterfaceContact], counts: Sequence[int]
 ) -> tuple[InterfaceModel, tuple[InterfaceBody, ...]]:
-    """Undamped model of finite-element bodies with so many of their lowest modes, or none."""
+    """Undamped model of finite-element bodies with some of their lowest modes, or none."""
     items = []
     for body, count in zip(bodies, counts, strict=True):
         flexibility = Flexibility(body)

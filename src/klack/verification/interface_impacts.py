@@ -173,7 +173,7 @@ def block_on_pad(
 
 
 def free_blocks() -> tuple[ElasticBody, ElasticBody, ContactSpace]:
-    """Two free steel blocks, the upper one crowned (R 50 mm) and off the axis of the lower one."""
+    """Two free steel blocks, the upper one crowned (R 50 mm) and off-axis."""
     upper, lower = _crowned(4e-3), _plate(8e-3, 5e-3).moved(np.array([0.7e-3, 0.4e-3, 0.0]))
     faces = upper.surface("bottom"), lower.surface("top")
     return (

@@ -21,7 +21,7 @@ NO_FILM = FilmRow(cubic=0.0, linear=0.0, cut_off=1e-6, suction=0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterfaceMotion:
-    """What two bodies did.
+    """Motion of two bodies.
 
     Parameters
     ----------
@@ -36,7 +36,8 @@ class InterfaceMotion:
     kinetic : float [J]
         Modal energy of both bodies at the start.
     residual : float [-]
-        Energy that the books miss, over ``kinetic`` or what the force added, whichever is larger.
+        Residual of the energy balance, over ``kinetic`` or the work of the force, whichever is
+        larger.
     upper_speed : float [m/s]
         Of the centre of mass of the upper body at the end.
     state : array (2 m,)

@@ -38,7 +38,7 @@ STEP = DELAY / STEPS
 
 
 def checks() -> list[Check]:
-    """Joukowsky, echoes, slow closure, piston, friction, cavities, books."""
+    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy balance."""
     return [
         *_closure(),
         *_slow_closure(),

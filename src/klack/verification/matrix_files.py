@@ -18,7 +18,7 @@ __all__ = ["MATRIX_WRITERS", "MatrixFiles", "write_matrices"]
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixFiles:
-    """What a case needs to read the matrices again.
+    """Input of a case to read the matrices again.
 
     Parameters
     ----------

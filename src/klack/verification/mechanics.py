@@ -83,7 +83,7 @@ def _falls() -> list[Check]:
         # 30 000 to 500 000 additions, each to round-off
         _check("thrown mass, height after 10 ms [m]", drop, float(_place(fall)[-1]), 1e-11, NEWTON),
         _check(
-            "mass pulled by 40 N, booked work after 1 ms [J]",
+            "mass pulled by 40 N, supplied work after 1 ms [J]",
             work,
             pulled.books.supplies["part work"],
             1e-12,
@@ -145,7 +145,7 @@ def _rubs() -> list[Check]:
             "viscous friction, speed after 6 ms [m/s]", slowed, _speed(viscous)[-1], 1e-9, NEWTON
         ),
         _check("dry friction, way to rest [m]", way, float(_place(dry)[-1]), 5e-9, NEWTON),
-        _check("dry friction, booked loss [J]", 0.5 * MASS * v**2, lost, 5e-12, "all of it"),
+        _check("dry friction, loss [J]", 0.5 * MASS * v**2, lost, 5e-12, "all of it"),
     ]
 
 

@@ -1,4 +1,4 @@
-"""The time loop of a network: books, momentum, repetition, step sizes, and laws seen through it."""
+"""The time loop of a network: energy balance, momentum, repetition, step sizes, laws."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

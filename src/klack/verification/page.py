@@ -51,12 +51,12 @@ class Section:
 
     @property
     def failed(self) -> int:
-        """How many of the checks failed."""
+        """Number of failed checks."""
         return sum(not check.passed for _, check, _ in self.rows)
 
     @property
     def wide(self) -> int:
-        """How many of the tolerances are wide without a reason."""
+        """Number of wide tolerances without a reason."""
         return sum(check.is_wide for _, check, _ in self.rows)
 
 

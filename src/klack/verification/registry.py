@@ -41,8 +41,8 @@ COVERS = {
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
     "ladders, a published lifting magnet.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
-    "network": "A whole valve in one time loop: books of all domains, restart, step sizes, one "
-    "law after the other.",
+    "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
+    "sizes, one law after the other.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
     "FMI.",
 }
@@ -63,7 +63,7 @@ def run_checks(groups: Iterable[str] | None = None) -> list[Check]:
 def iterate_checks(
     groups: Iterable[str] | None = None, started: Callable[[str], None] = lambda group: None
 ) -> Iterator[tuple[str, list[Check]]]:
-    """Yield group after group with its checks, as they finish; ``started`` is told each name."""
+    """Yield group after group with its checks, as they finish; ``started`` receives each name."""
     for group in _known(groups):
         started(group)
         module = import_module(f"klack.verification.{group}")
@@ -92,7 +92,7 @@ def _known(groups: Iterable[str] | None) -> tuple[str, ...]:
 
 
 def _place(error: Exception) -> str:
-    """Where an error that should not be came from: the innermost lines of this package."""
+    """Origin of an unexpected error: the innermost lines of this package."""
     frames = extract_tb(error.__traceback__)
     return " < ".join(f"{Path(f.filename).name}:{f.lineno}" for f in reversed(frames[-4:]))
 

@@ -50,7 +50,7 @@ class RunConditions:
 
 
 def run_conditions() -> RunConditions:
-    """Those of this process."""
+    """Conditions of this process: versions, platform and cores."""
     numpy, scipy, numba = (version(name) for name in _LIBRARIES)
     return RunConditions(
         klack=__version__,

@@ -1,4 +1,4 @@
-"""A coil with a driver and an armature on a prescribed course: the smallest world it needs."""
+"""A coil with a driver and an armature on a prescribed course: in the smallest set-up."""
 
 from dataclasses import dataclass
 

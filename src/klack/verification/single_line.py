@@ -1,4 +1,4 @@
-"""Lines between prescribed pressures or flows: the smallest world that a delay line needs."""
+"""Lines between prescribed pressures or flows: in the smallest set-up of a delay line."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class End:
-    """What holds one end: ``pressure`` [Pa, about ambient] or ``flow`` into the line [m^3/s].
+    """Condition at one end: ``pressure`` [Pa, about ambient] or ``flow`` into the line [m^3/s].
 
     Means over the steps, or one number for all of them.
     """

@@ -76,11 +76,11 @@ def _rod_on_wall() -> list[Check]:
         ),
         compare(
             _GROUP,
-            "rod on rigid wall: energy ledger, residual over impact energy",
+            "rod on rigid wall: energy residual over impact energy",
             expected=0.0,
             computed=history.ledger.residual,
             tolerance=5e-14,
-            source="energy theorem of the scheme: losses -lam.g0 and -2 mu.g1 / h^2 are booked",
+            source="energy theorem of the scheme: losses -lam.g0 and -2 mu.g1 / h^2 are counted",
         ),
         compare(
             _GROUP,

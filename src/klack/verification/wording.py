@@ -1,4 +1,4 @@
-"""Checks in words and numbers that people read: on the terminal and on the page."""
+"""Texts of checks for the terminal and the page."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -9,7 +9,7 @@ __all__ = ["deviation_text", "headroom_text", "number_text", "summary", "toleran
 
 
 def summary(checks: Sequence[Check]) -> str:
-    """How many passed, and how many tolerances are wide without a reason."""
+    """Number of passed checks, and of wide tolerances without a reason."""
     passed = sum(check.passed for check in checks)
     wide = sum(check.is_wide for check in checks)
     return f"{passed} of {len(checks)} checks passed" + (

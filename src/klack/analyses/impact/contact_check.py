@@ -1,9 +1,9 @@
-"""Whether the meshes and the named surfaces hold the contact, and what to change where they do not.
+"""Check that meshes and named surfaces resolve the contact, and advice where they do not.
 
 The numbers of one mesh cannot tell: a contact on one row of elements is as wide as that row, all
 levels agree on it, and the energy is kept.  So the shape of the two surfaces is asked: how wide
 the contact should be (:mod:`klack.contact.hertz`), whether it lies on a sharp corner, and whether
-it runs over the end of a named surface (:mod:`klack.contact.surface_edges`).
+it reaches the edge of a named surface (:mod:`klack.contact.surface_edges`).
 """
 
 import warnings
@@ -60,12 +60,12 @@ _SHALLOW = sin(0.5 * pi / 180.0)
 """Slope on both sides of a corner above which it is the corner that touches, not a face."""
 
 _SECTORS = 6
-_OVER_THE_END = "it runs over the end of a named surface"
+_OVER_THE_END = "it reaches the edge of a named surface"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactCheck:
-    """What was found.
+    """Findings on a contact.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def check_contact(
         doubts.append("it lies on a sharp edge")
         _warn(corner)
     elif ratio > COARSE:
-        doubts.append("its elements are too coarse")
+        doubts.append("its mesh is too coarse")
         _warn(_coarse(case, pair, static, force, ratio, expected))
     if across < FEWEST_POINTS:
         few = "1 contact point across is" if across == 1 else f"{across} contact points across are"
@@ -280,7 +280,7 @@ def _edges(pair: BodyPair) -> tuple[_Side, _Side]:
 def _corner(
     pair: BodyPair, sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.float64]
 ) -> str | None:
-    """Words for a corner that carries more than half of the force on one row of elements."""
+    """Text for a corner that carries more than half of the force on one row of elements."""
     others = (
         (pair.lower.mesh, pair.lower_surface),
         (pair.upper.mesh, pair.upper_surface),
@@ -298,9 +298,9 @@ def _corner(
         return (
             f"contact: more than half of the force acts on a sharp edge of '{body.name}' "
             f"({body.name}.{surface.name}, at {_at(edges, nearest)}, {angle:.0f} deg). Such a "
-            "contact is as narrow as its elements: its width, its pressure and in part its force "
-            "follow the mesh, and no element size settles them. Try: give the edge the radius "
-            "that it really has (an arc or fillet; 10 to 100 um for most turned or ground "
+            "contact is as narrow as its elements: its width, its pressure and partly its force "
+            "depend on the mesh, and do not converge with the element size. Try: give the edge "
+            "its real radius (an arc or fillet; 10 to 100 um for most turned or ground "
             "parts), with five elements along it."
         )
     return None
@@ -358,10 +358,10 @@ def _end(body: ElasticBody, surface: Surface, name: str, at: str, surfaces: str)
     where = f"in '{name}'" if name else "in a face without a name"
     what = f"'{body.name}.{name}'" if name else "that face"
     return (
-        f"contact {surfaces}: it reaches the end of '{body.name}.{surface.name}' at {at}, but the "
-        f"body goes on there {where}, which takes no part: the force comes out too low. Try: add "
-        f"{what} to '{surface.name}' (a profile: give both edges the same name; STEP: both faces "
-        "the same name in the CAD program; a mesh: one set that holds both)."
+        f"contact {surfaces}: it reaches the edge of '{body.name}.{surface.name}' at {at}, but "
+        f"the body continues there {where}, which is not included: the force is too low. Try: "
+        f"add {what} to '{surface.name}' (a profile: give both edges the same name; STEP: both "
+        "faces the same name in the CAD program; a mesh: one set that holds both)."
     )
 
 
@@ -389,7 +389,7 @@ def _coarse(
     )
     advised = _rounded_down(_SIZE * expected)
     if not advised < size:
-        return text + " Try: 'klack advise', which measures what finer elements change."
+        return text + " Try: 'klack advise', which measures the effect of finer elements."
     return text + (
         f" Its shape and load make {expected * 1e6:.2g} um: refine both contact surfaces to "
         f"{format_si(advised, 'm', 2)}{_extent(case, pair, expected)}."

@@ -237,7 +237,7 @@ def averaged(values: Floats, cells: Cells) -> Floats:
 
 
 def closed(carries: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
-    """What carries, with holes and notches of single cells filled, shape (ny, nx)."""
+    """Loaded cells, with holes and notches of single cells filled, shape (ny, nx)."""
     rows, columns = (2 * (width // 2) + 3 for width in _cell_size(cells))  # a little more than one
     # beyond the ends of a ring is its other end, beyond all others nothing
     wide = np.pad(carries, [(rows, rows), (0, 0)])

@@ -1,4 +1,4 @@
-"""What an impact report says, before it is laid out: the same words for screen and paper.
+"""Content of an impact report before its layout: the same texts for screen and paper.
 
 Everything here is plain text; each renderer escapes it in its own way, because titles, names and
 the text of the case come from the user.
@@ -81,7 +81,7 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
     title = "The bodies at peak force"
     if study.sections:
         return Section(title=title, picture=section_figure(study))
-    text = "No picture: the displacement of the whole bodies is known at the level 'full' only, "
+    text = "No picture: the displacement of the whole bodies is only available at level 'full', "
     if "full" in study.failures:
         text += "which failed; see the warnings."
     else:
@@ -96,7 +96,7 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
 
 
 def _number_table(study: ImpactStudy) -> Table:
-    """Quantities down, levels across; the deviation from the reference stands below the value."""
+    """Quantities down, levels across; the deviation from the reference is below the value."""
     results = study.ordered
     names = [result.level for result in results]
     rows = [
@@ -116,7 +116,7 @@ def _number_table(study: ImpactStudy) -> Table:
 
 
 def _standing(study: ImpactStudy, name: str) -> str:
-    """What a level is for the others, below its name."""
+    """Role of a level, below its name."""
     result = study.levels[name]
     if result.measures.cut_off:
         return "\n(cut off)"
@@ -126,7 +126,7 @@ def _standing(study: ImpactStudy, name: str) -> str:
 
 
 def _number(study: ImpactStudy, measure: Measure[LevelResult], result: LevelResult) -> str:
-    """Value of a level, and below it how far it is from the reference."""
+    """Value of a level, with its deviation from the reference below."""
     cell = measure.on_page(result)
     found = study.deviations.get(result.level)
     apart = next((item for item in DEVIATION_MEASURES if item.key == measure.key), None)
@@ -134,7 +134,7 @@ def _number(study: ImpactStudy, measure: Measure[LevelResult], result: LevelResu
 
 
 def _apart(study: ImpactStudy, measure: Measure[Deviation], name: str) -> str:
-    """What is no number of one level alone."""
+    """Rows that do not belong to one level alone."""
     found = study.deviations.get(name)
     return "–" if found is None else measure.on_page(found)
 
@@ -159,13 +159,13 @@ def _computed(study: ImpactStudy) -> Section:
         ]
     facts.append(("local law", law.kind))
     return Section(
-        title="What was computed from what",
+        title="Input",
         tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
     )
 
 
 def _estimates(study: ImpactStudy) -> Section:
-    title = "How good is the reduced level?"
+    title = "Accuracy of the reduced level"
     if reason := no_estimate(study):
         return Section(title=title, paragraphs=(sentence(reason),))
     if not study.estimates:
@@ -275,7 +275,7 @@ def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         (
             "local law",
             "Force over indentation of the reduced contact. The consistent law is the static "
-            "approach of the complete bodies minus what the kept modes already yield.",
+            "approach of the complete bodies minus the compliance of the kept modes.",
         ),
         *_definitions_point_by_point(study),
     )
@@ -288,9 +288,10 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
         found.append(
             (
                 "interface level",
-                "Both bodies as modes, what the modes miss as a static compliance between all "
-                "contact points, and the contact decided point by point in every step: open, or "
-                "closed and never pulling. It covers eccentric, tilted and partial contact.",
+                "Both bodies as modes, their residual compliance between "
+                "all contact points, and the contact solved point by point in every step: "
+                "open, or closed and never pulling. It covers eccentric, tilted and partial "
+                "contact.",
             )
         )
     if study.estimates:
@@ -298,8 +299,8 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
             (
                 "estimated error",
                 "Deviation of a reduced level from one interface-level run at the same condition, "
-                "with more modes than the reduced level keeps. It holds the error of the local law "
-                "and of the modes left out, not that of the mesh.",
+                "with more modes than the reduced level keeps. It includes the error of the "
+                "local law and of the omitted modes, not that of the mesh.",
             )
         )
     if any(result.pressure is not None for result in study.levels.values()):
@@ -329,14 +330,14 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         (
             "Reduced level",
             "Motion and force along the axis, with one pressure pattern. Eccentric, tilted or "
-            "partial contact is outside its assumption, and no number of modes makes up for that: "
-            "the interface level is made for it.",
+            "partial contact is outside its assumption, and no number of modes corrects "
+            "that: use the interface level.",
         ),
         (
             "Resolution",
             f"The elements across the contact are {study.contact.size_ratio:.2g} half widths long; "
-            "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: agreement "
-            "between them says nothing about the error of the meshes themselves."
+            "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: "
+            "their agreement does not show the error of the meshes."
             if isfinite(study.contact.size_ratio)
             else "The bodies meet at ports, without contact points: neither their models nor the "
             "local law are checked against a mesh.",
@@ -347,15 +348,15 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
             (
                 "Frequency",
                 f"The highest kept modes lie at {listed(tops)}. Above the lower of them the "
-                "reduced level follows the bodies only through their static compliance.",
+                "reduced level represents the bodies only by their static compliance.",
             )
         )
     limits.append(
         (
             "Damping",
-            "Losses in joints, fluid and material are contained only as far as the case gives "
-            "modal damping; the energy left in vibration therefore rings longer than in a real "
-            "valve.",
+            "Losses in joints, fluid and material are included only as far as the case "
+            "gives modal damping; the energy left in vibration therefore rings longer than in a "
+            "real valve.",
         )
     )
     return tuple(limits)

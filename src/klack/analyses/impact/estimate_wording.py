@@ -1,4 +1,4 @@
-"""How good a reduced level is: its estimated error, beside the true one where that is known."""
+"""Accuracy of a reduced level: its estimated error, and the true one where known."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -31,7 +31,7 @@ def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def estimate_sentence(study: ImpactStudy) -> str:
-    """Say in plain words whether the reduced level can be used here; empty without an estimate."""
+    """Sentence on whether the reduced level can be used here; empty without an estimate."""
     if not study.estimates:
         return ""
     name = "reduced" if "reduced" in study.estimates else next(iter(study.estimates))
@@ -74,4 +74,4 @@ def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
         return "good enough to rely on"
     if worst <= _FAIR:
         return "good enough for comparisons, not for the last per cent"
-    return "too far off; use the interface level for this condition"
+    return "too large an error; use the interface level for this condition"

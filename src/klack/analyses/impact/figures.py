@@ -136,7 +136,7 @@ def force_chart(study: ImpactStudy) -> Chart:
         )
         note += (
             f" Below: difference from '{reference.label}', in per cent of its peak force; "
-            "a level that is far off leaves the panel."
+            "a level with a large deviation leaves the panel."
         )
     return Chart(
         name="force",
@@ -157,7 +157,7 @@ def _span(curves: list[Curve], least: float, most: float) -> tuple[float, float]
 
 
 def motion_chart(study: ImpactStudy) -> Chart:
-    """Velocity of the needle's centre of mass and the way it has gone."""
+    """Velocity and displacement of the needle's centre of mass."""
     velocities, ways = [], []
     for result in study.ordered:
         history = result.history
@@ -322,7 +322,7 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
         note=(
             "Above: displacement of the contact per harmonic force on it. Below: magnitude of the "
             "level difference from the full body, averaged over a sliding third octave; the level "
-            f"line is at {comparison.tolerance:g} dB, an upright line marks where a reduced body "
+            f"line is at {comparison.tolerance:g} dB, a vertical line marks where a reduced body "
             "first exceeds it. Structural damping with a loss factor of "
             f"{comparison.loss_factor:g} in every curve. {sentence(comparison.reference_note)}"
         ),
@@ -370,9 +370,9 @@ def law_chart(study: ImpactStudy) -> Chart:
             )
         )
     note = (
-        "The law carries exactly the compliance that the kept modes leave out. "
+        "The law carries exactly the residual compliance of the kept modes. "
         if study.contact.points
-        else "The law of the case, in series with what the modes of both bodies miss. "
+        else "The law of the case, in series with the residual compliance of both bodies. "
     )
     note += f"The straight line is fitted between {low:.3g} and {high:.3g} N."
     if len(curves) == 3 or np.isfinite(law.classical_stiffness):
@@ -430,8 +430,8 @@ def approach_chart(study: ImpactStudy) -> Chart:
         panels=tuple(panels),
         note=(
             "Frictionless static contact of the two complete bodies, counted from first touch. "
-            "What the local law does not carry, the kept modes carry; between 20 and 80 % for the "
-            "law is a good division."
+            "The rest of the compliance is in the kept modes; 20 to 80 % in "
+            "the law is a good division."
             if contact.points
             else "Local law and modes of both bodies at their ports, in series."
         ),
@@ -457,7 +457,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
             parts.append(BarPart(label=name, values=values, colour=colour, hatch=hatch))
     return BarChart(
         name="energy",
-        title="Where the energy went",
+        title="Energy balance",
         x=AxisSpec(label="share of the initial kinetic energy", unit="%"),
         rows=tuple(result.label for result in results),
         parts=tuple(parts),

@@ -1,6 +1,6 @@
 """One dry impact of bodies that have no common surfaces: each meets the other at a port.
 
-There is no static contact problem to solve, hence no consistent law and no estimate of the error:
+There is no static contact problem to solve, hence no consistent law and no error estimate:
 the law is the one of the case, and what the modes miss of both bodies lies in series with it.
 """
 
@@ -105,7 +105,8 @@ def _checked(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
                 f"{case.path or 'case'}: level",
                 got=f"'{level}', and {one_of(names)} without surfaces",
                 expected=f"levels among: {one_of(GIVEN_LEVELS)}",
-                hint="a reduced model meets at its port; point by point contact needs a mesh.",
+                hint="a reduced model has contact at its port; point-resolved contact needs a "
+                "mesh.",
             )
     return wanted
 

@@ -50,7 +50,7 @@ __all__ = [
 _Result = TypeVar("_Result")
 
 CONTACT, OPPOSITE = "contact", "opposite"
-"""Names of the contact of a case and of that with the stop above."""
+"""Names of the contact of a case and of that with the upper stop."""
 
 _FEWEST = 30
 _RICHER = 2.0
@@ -58,7 +58,7 @@ _MOST_RECORDS = 30_000_000
 
 
 def certificate_modes(case: Case) -> int:
-    """Modes of each body that the estimate of the error takes: twice those kept, or their pool.
+    """Modes of each body that the error estimate takes: twice those kept, or their pool.
 
     Thirty at least.
     """
@@ -152,7 +152,7 @@ def within_reach(
     Raises
     ------
     ReachError
-        Where the case gives the reach, or has a stop above.
+        Where the case gives the reach, or has an upper stop.
     """
     space: ContactSpace | None = None
     compliance: NDArray[np.float64] | None = None
@@ -207,7 +207,7 @@ class ExactGaps:
     seat : RigidGaps
         The moving body is body a.
     stop : RigidGaps or None
-        Stop above: the moving body is body b, so body a is moved the opposite way.
+        Upper stop: the moving body is body b, so body a is moved the opposite way.
     """
 
     seat: RigidGaps
@@ -318,9 +318,9 @@ def simulate_case(
 
 
 def _compile(case: Case, model: InterfaceModel, guide: Guide | None) -> None:
-    """Take one step out of reach of the contact, so that the next run takes its own time only.
+    """Take one step away from contact, to compile before the timed run.
 
-    A run that ends within a contact leaves books that the next step would settle.
+    A run that ends within a contact leaves an energy balance that the next step would close.
     """
     step, speed = case.run.interface_step, case.motion.speed
     simulate_interface(

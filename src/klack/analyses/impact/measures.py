@@ -63,8 +63,8 @@ RESTITUTION = Measure[LevelResult](
     unit="1",
     definition="Velocity of the centre of mass after the impact over that before it (relative "
     "velocity of both centres where both are free).",
-    note="It is a result of the waves that stay in the bodies, never an input, and not the "
-    "velocity of a point on the surface.",
+    note="It is a result of the vibration left in the bodies, never an input, and not "
+    "the velocity of a point on the surface.",
     page=True,
     source=_THEORY,
     read=lambda level: level.measures.restitution,
@@ -119,7 +119,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
         title="vibration left behind",
         symbol="E_v/E_0",
         unit="1",
-        definition="Share of the energy of approach that is left in vibration.",
+        definition="Share of the energy of approach that remains as vibration.",
         page=True,
         source=_THEORY,
         read=lambda level: level.measures.vibration_share,
@@ -132,7 +132,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
         title="contacts in the impact",
         symbol="n_c",
         unit="1",
-        definition="Times that the bodies touch during the impact.",
+        definition="Number of contacts during the impact.",
         page=True,
         source=_THEORY,
         read=lambda level: level.measures.sub_contacts,
@@ -216,9 +216,9 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
         symbol="r_E",
         unit="1",
         definition="Energies at the end and losses, minus the energies at the start and the work "
-        "done, over the initial energy: round-off in a sound run.",
-        note="The time scheme of the full order loses a little energy by itself; that counts as "
-        "contact dissipation.",
+        "done, over the initial energy: round-off in a correct run.",
+        note="The time scheme of the full order loses a little energy by itself; this is counted "
+        "as contact dissipation.",
         page=True,
         source=_THEORY,
         read=lambda level: level.energy_residual,
@@ -282,7 +282,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
         title="preparation",
         symbol="",
         unit="s",
-        definition="Wall time of everything that the level needs before it can run.",
+        definition="Wall time of all preparations of the level.",
         page=True,
         source=_THEORY,
         read=lambda level: level.setup_time if level.setup_time else None,
@@ -293,7 +293,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = (
 
 
 def _of_level(measure: Measure[LevelResult]) -> Measure[Deviation]:
-    """How far two levels are apart in one of their measures."""
+    """Deviation of two levels in one of their measures."""
     relative = measure.deviation == "relative"
     return Measure(
         key=measure.key,
@@ -353,4 +353,4 @@ DEVIATION_MEASURES: tuple[Measure[Deviation], ...] = (
         digits=3,
     ),
 )
-"""How far one level is from another."""
+"""Deviation of one level from another."""

@@ -1,4 +1,4 @@
-"""Contact forces point by point, as much of them as a picture needs."""
+"""Contact forces point by point, reduced to the needs of a picture."""
 
 import numpy as np
 from numpy.typing import NDArray

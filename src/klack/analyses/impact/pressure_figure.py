@@ -50,7 +50,7 @@ class PressureFigure:
 
 
 def pressure_figure(views: Sequence[PressureView]) -> PressureFigure:
-    """Draw one or more runs of one shape side by side, and say what is seen."""
+    """Draw one or more runs of one shape side by side, with a caption."""
     return PressureFigure(draw_pressure(views), pressure_note(views))
 
 

@@ -38,7 +38,7 @@ _MARGIN = 0.18
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PressureView:
-    """One run: what stands above its picture, and what its contact points carry.
+    """One run: title of its picture, and the forces of its contact points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the pictures of the contact pressure show, in words and numbers."""
+"""Texts and numbers for the pictures of the contact pressure."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ _EVEN = 0.02
 
 
 def pressure_note(views: Sequence[PressureView]) -> str:
-    """How to read the picture."""
+    """Note on how to read the picture."""
     shape = views[0].places.shape
     side_by_side = " All runs have the same scale." if len(views) > 1 else ""
     common = f" White: no contact. Dashed: the instant of the peak force.{side_by_side}"

@@ -1,4 +1,4 @@
-"""What one impact study leaves behind: everything that a report or a comparison needs.
+"""Record of an impact study: everything that a report or a comparison needs.
 
 The numbers are plain arrays and small frozen records, so that a stored study can be reported again
 without the solver.
@@ -147,7 +147,7 @@ class LevelResult:
         After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
         entry is ``"initial kinetic"``.
     energy_residual : float [-]
-        Ledger residual over the initial kinetic energy.
+        Residual of the energy balance over the initial kinetic energy.
     modal_energy : tuple of ModalEnergy
     pressure : PressureRecord or None
         Of levels that resolve the contact point by point.
@@ -250,7 +250,7 @@ class ImpactStudy(CaseRecord):
 
     @property
     def estimates_settled(self) -> bool:
-        """Tell whether the estimates can be trusted."""
+        """Whether the estimates are reliable."""
         return self.estimate_spread <= SETTLED and not self.estimate_doubt
 
     @property
@@ -261,6 +261,6 @@ class ImpactStudy(CaseRecord):
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
 
     def why_missing(self, name: str) -> str:
-        """Words behind "no result of this name": why it failed; empty if it was not asked for."""
+        """Reason for "no result of this name": why it failed; empty if it was not requested."""
         text = self.failures.get(name, "")
         return f": it failed ({' '.join(text.split())})" if text else ""

@@ -1,4 +1,4 @@
-"""``klack impact``: one dry impact at the levels asked for, overlaid."""
+"""``klack impact``: one dry impact at the requested levels, overlaid."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -168,7 +168,7 @@ def run_impact(
         certificate = None
         if certify and reduced:
             certificate = for_comparison(
-                "the estimate of the error",
+                "the error estimate",
                 lambda: _certificate(problem, pools, results, clock),
             )
         certificate = certificate or _Certificate()
@@ -258,7 +258,7 @@ def _run_interface(
 
 @dataclass(frozen=True, kw_only=True)
 class _Certificate:
-    """Estimated errors, the run that they refer to, and how far that has settled itself."""
+    """Estimated errors, their reference run, and its own convergence."""
 
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     basis: str = ""
@@ -277,28 +277,28 @@ def _certificate(
 
     The same run with half as many modes tells whether it can serve as a reference.
     """
-    clock("estimate of the error", 0.0)
+    clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
     count = certificate_modes(problem.case)
 
     def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
-        setup = clock.spent((*_SET_UP[:-1], "estimate of the error"))
+        setup = clock.spent((*_SET_UP[:-1], "error estimate"))
         return model, run_interface(problem, model, None, setup_time=setup)
 
     def run_again(model: InterfaceModel) -> ImpactHistory:
         return simulate_case(problem.case, model).history
 
-    with warnings_of(f"estimate of the error, {count} modes"):
+    with warnings_of(f"error estimate, {count} modes"):
         model, level = within_reach(problem, pools, run, count=count)
     history = level.history
-    clock("estimate of the error", 0.5)
-    with warnings_of(f"estimate of the error, {count // 2} modes"):
+    clock("error estimate", 0.5)
+    with warnings_of(f"error estimate, {count // 2} modes"):
         fewer = within_reach(problem, pools, run_again, count=count // 2)
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
-    clock("estimate of the error", 1.0)
+    clock("error estimate", 1.0)
     return _Certificate(
         estimates={name: compare_histories(history, results[name].history) for name in whole},
         basis=f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points",

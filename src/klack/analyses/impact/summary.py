@@ -1,4 +1,4 @@
-"""The few numbers of a study that a script or a terminal wants."""
+"""Main numbers of a study for scripts and terminals."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -66,7 +66,7 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
 
 
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: the levels side by side, the answer, how good the others are."""
+    """Terminal output: the levels side by side, the answer, the error of the others."""
     yield TextTable(title=study.title, columns=SUMMARY_COLUMNS, rows=summary_rows(study))
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
@@ -81,7 +81,7 @@ def study_measured(study: ImpactStudy) -> Iterator[Measured]:
 
 
 def answer_line(study: ImpactStudy) -> str:
-    """Say in one line which level is the answer, and what it says."""
+    """Line with the level of the answer and its numbers."""
     level = study.levels[study.reference]
     m = level.measures
     begin = f"Answer (level '{study.reference}'): "
@@ -100,20 +100,20 @@ def answer_line(study: ImpactStudy) -> str:
 
 
 def no_estimate(study: ImpactStudy) -> str:
-    """Why the error of reduced levels was not estimated; empty where it was, or not asked for."""
+    """Why the error of reduced levels was not estimated; empty where it was, or not requested."""
     if study.estimate_doubt:
-        return f"No estimate of the error: {study.estimate_doubt}"
+        return f"No error estimate: {study.estimate_doubt}"
     if study.estimates and not study.estimates_settled:
         return (
-            "No estimate of the error: the interface level itself has not settled (its force "
-            f"history changes by {100 * study.estimate_spread:.0f} % when the modes are doubled), "
-            "as when flat faces meet all at once. Compare with --level full."
+            "No error estimate: the interface level itself has not converged "
+            f"(its force history changes by {100 * study.estimate_spread:.0f} % when the modes "
+            "are doubled), as when flat faces meet all at once. Compare with --level full."
         )
     return ""
 
 
 def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
-    """Say how good every reduced level is, one line each."""
+    """Error of every reduced level, one line each."""
     if reason := no_estimate(study):
         return (reason,)
     return tuple(

@@ -68,7 +68,7 @@ def disagreement(deviation: Deviation) -> float:
 def trust_notes(
     results: Mapping[str, LevelResult], answer: str, deviations: Mapping[str, Deviation]
 ) -> tuple[str, ...]:
-    """Say what speaks against levels, which of them is the answer, and which it puts right.
+    """Objections to levels, the level of the answer, and the levels it corrects.
 
     Parameters
     ----------
@@ -85,10 +85,11 @@ def trust_notes(
     notes = [f"{_named(names)}: {doubt}" for doubt, names in doubted.items()]
     finer = [name for name in _BEST[: _rank(answer)] if name in results]
     if results[answer].doubts and len(results) > 1:
-        notes.append("no level can be a reference: deviations of the others are not given.")
+        notes.append("no level can be a reference: no deviations are given.")
     elif finer:
         notes.append(
-            f"the answer is that of level '{answer}'; {_named(finer)} is no reference, see above."
+            f"the answer is that of level '{answer}'; {_named(finer)} is not a reference, see "
+            "above."
         )
     others = {name: result for name, result in results.items() if name != answer}
     second = best_level(others) if others else answer
@@ -154,7 +155,7 @@ def doubts_of_history(
     """
     if measures.cut_off:
         return (
-            "the run ends before the bodies have parted: peak force, contact time and impulse are "
+            "the run ends before separation: peak force, contact time and impulse are "
             "cut off, and there is no restitution. Try: a longer run.duration, two to three times "
             "the contact time.",
         )
@@ -169,7 +170,7 @@ def doubts_of_history(
     if period < _STEPS_PER_PERIOD * step:
         return (
             f"the time step is too coarse: {period / step:.3g} steps of {format_si(step, 's')} in "
-            f"a vibration of {format_si(1.0 / period, 'Hz', 3)} that takes part of the energy; "
+            f"a vibration of {format_si(1.0 / period, 'Hz', 3)} with part of the energy; "
             f"{_STEPS_PER_PERIOD:.0f} keep its period within 0.5 %. Try: {key}: "
             f"{_rounded(period / _STEPS_PER_PERIOD)}.",
         )
@@ -177,8 +178,8 @@ def doubts_of_history(
         return (
             f"the force rises within {rise / step:.2g} steps of {format_si(step, 's')}, as where "
             "flat faces meet all at once: its peak depends on step and mesh, impulse and "
-            f"restitution hardly do. Try: {key}: {_rounded(step / 4)}, and look whether the peak "
-            "settles.",
+            f"restitution hardly do. Try: {key}: {_rounded(step / 4)}, and check whether "
+            "the peak converges.",
         )
     return ()
 

@@ -12,7 +12,7 @@ _SAME_SPEED = 5e-4
 
 
 def answer(study: ImpactStudy) -> str:
-    """Say what happened in plain words, and how close the reduced level comes to the reference."""
+    """Course of the impact as text, with the deviation of the reduced level from the reference."""
     needle, partner = study.bodies[0], study.bodies[1]
     reference = study.levels[study.reference]
     numbers = reference.measures
@@ -34,13 +34,13 @@ def answer(study: ImpactStudy) -> str:
             f"{which_contact(numbers, numbers.strongest)}, stays in contact for "
             f"{quantity(numbers.contact_time, 's', 3)}{which_contact(numbers, 1)} and rebounds "
             f"with {share(numbers.restitution, 2)} of its speed at first touch; "
-            f"{share(numbers.vibration_share)} of the impact energy is left behind as vibration. "
+            f"{share(numbers.vibration_share)} of the impact energy remains as vibration. "
         )
     text += f"These numbers come from the {_called(study.reference)} run"
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
     elif study.reference == "interface":
-        text += ", which keeps the bodies as modes and decides the contact point by point"
+        text += ", which has the bodies as modes and a point-resolved contact"
     text += "."
     if doubt := contact_doubt(study.contact):
         text += f" {doubt}"
@@ -59,14 +59,14 @@ def which_contact(numbers: ImpactMeasures, number: int) -> str:
 
 
 def _started(study: ImpactStudy, numbers: ImpactMeasures) -> str:
-    """Speed at the start, where forces have changed it on the way."""
+    """Speed at the start, where forces have changed it before touch."""
     if abs(numbers.approach_speed / study.speed - 1.0) < _SAME_SPEED:
         return ""
     return f", {study.speed:.3g} m/s at the start"
 
 
 def verdict(result: LevelResult, deviation: Deviation) -> str:
-    """How far one level is from the reference, in one sentence."""
+    """Deviation of one level from the reference, in one sentence."""
     return (
         f"The {_called(result.level)} model ({count(result.degrees_of_freedom)} degrees of "
         f"freedom, computed in {quantity(result.wall_time, 's', 2)}) deviates from them by "

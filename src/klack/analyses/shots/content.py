@@ -1,4 +1,4 @@
-"""What a report of shots says, before it is laid out: the same words for screen and paper."""
+"""Content of a shots report before its layout: the same texts for screen and paper."""
 
 from collections.abc import Callable
 
@@ -46,8 +46,8 @@ def shots_content(study: ShotsStudy) -> Content:
             paragraphs=(_rule(study),),
             charts=tuple(rebound_chart(study, shown) for shown in _explaining(study)),
         ),
-        Section(title="Where the shots were", picture=shots_map(study)),
-        Section(title="How the rebounds are distributed", charts=(distribution_chart(study),)),
+        Section(title="Placement of the shots", picture=shots_map(study)),
+        Section(title="Distribution of the rebounds", charts=(distribution_chart(study),)),
         Section(title="Force and time of the first impact", charts=(peak_chart(study),)),
         Section(title="Over time", charts=(height_traces_chart(study), force_traces_chart(study))),
         _pressure(study),
@@ -70,7 +70,7 @@ def shots_content(study: ShotsStudy) -> Content:
 
 
 def _rule(study: ShotsStudy) -> str:
-    """How special the centred impact is, and what the rebound goes with."""
+    """Position of the centred impact among the shots, and the correlation of the rebound."""
     rank, text = study.rule.rank, "No shot rebounds as high as the centred impact."
     if rank:
         text = f"{_shots_of(rank)} at least as high as the centred impact."
@@ -82,14 +82,14 @@ def _rule(study: ShotsStudy) -> str:
     if abs(related[strongest]) > _RELATED:
         grows = "rises" if related[strongest] > 0 else "falls"
         text += (
-            f" Of all that was drawn, the rebound height goes most with the {strongest}: it "
-            f"{grows} with it (rank correlation {signed(related[strongest], 2)})."
+            f" Of the drawn quantities, the rebound height correlates most with the {strongest}: "
+            f"it {grows} with it (rank correlation {signed(related[strongest], 2)})."
         )
     return text
 
 
 def _rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Spearman's coefficient of what both columns know; 0 where one of them is constant."""
+    """Spearman's coefficient over the values present in both columns; 0 where one is constant."""
     from scipy.stats import rankdata  # half a second to load, which every other report saves
 
     known = np.isfinite(one) & np.isfinite(other)
@@ -104,7 +104,7 @@ def _shots_of(number: int) -> str:
 
 
 def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
-    """What varies from shot to shot and may explain the rebound, as axes."""
+    """Quantities that vary from shot to shot and may explain the rebound, as axes."""
     candidates = (
         Shown("eccentricity", "eccentricity", *length_unit(study.shots.eccentricity)),
         Shown("tilt", "tilt", "°", np.degrees(1.0)),
@@ -117,7 +117,7 @@ def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
 
 
 def _explaining(study: ShotsStudy) -> list[Shown]:
-    """Eccentricity and tilt, and what else the rebound height goes with."""
+    """Eccentricity, tilt, and other correlates of the rebound height."""
     height = study.shots.rebound_height
     return [
         shown
@@ -179,10 +179,10 @@ def _drawn(study: ShotsStudy) -> Section:
         ),
     ]
     if study.resumed:
-        facts.append(("taken over from an interrupted run", f"{count(study.resumed)} shots"))
+        facts.append(("resumed from an interrupted run", f"{count(study.resumed)} shots"))
     drawn = Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items()))
     fixed = Table(columns=("what all shots share", ""), rows=tuple(facts))
-    return Section(title="What was drawn from what", tables=(drawn, fixed))
+    return Section(title="Distributions", tables=(drawn, fixed))
 
 
 def _shots(study: ShotsStudy) -> Section:
@@ -210,7 +210,7 @@ def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
     """Head, text, column, and whether it stands there even if it never varies."""
     unit, factor = length_unit(study.shots.rebound_height)
     return (
-        ("off axis\n[µm]", _plain("eccentricity", 1e6, 2), "eccentricity", True),
+        ("eccentricity\n[µm]", _plain("eccentricity", 1e6, 2), "eccentricity", True),
         ("towards\n[°]", _angle("direction"), "direction", False),
         ("tilt\n[°]", _plain("tilt", np.degrees(1.0), 4), "tilt", True),
         ("towards\n[°]", _angle("tilt_direction"), "tilt_direction", False),
@@ -300,9 +300,9 @@ def _range_of(values: NDArray[np.float64], text: Callable[[float], str]) -> str:
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "shot",
-        "One drop of the moving body onto its seat, with its bounces, at the interface level: both "
-        "bodies as modes, the contact decided point by point, six rigid degrees of freedom of the "
-        "moving body. Only what is listed under 'What was drawn from what' differs between shots.",
+        "One drop of the moving body onto its seat, with its bounces, at the interface "
+        "level: both bodies as modes, a point-resolved contact, six rigid degrees of freedom of "
+        "the moving body. Only what is listed under 'Distributions' differs between shots.",
     ),
     (
         "centred impact",
@@ -312,8 +312,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "the rule, its bias",
         "Rebounds of dry shots scatter, and the highest one is usually taken as that of a centred "
-        "impact. The bias is the highest value minus the centred one: what the rule gets wrong for "
-        "this valve. It depends on the number of shots and on what was drawn.",
+        "impact. The bias is the highest value minus the centred one: the error of the rule "
+        "for this valve. It depends on the number of shots and on the distributions.",
     ),
     *glossary((*DRAWN, *FIRST_IMPACT, ROCKING)),
     (

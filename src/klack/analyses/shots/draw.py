@@ -1,4 +1,4 @@
-r"""What differs between the drops of one valve, drawn at random.
+r"""Random draws of the quantities that vary between drops of one valve.
 
 Each shot has its own stream of numbers, seeded by (seed, index): its draw depends neither on how
 many shots there are nor on who computes them.  Every quantity always takes the same members of that
@@ -172,7 +172,7 @@ def shots_of(case: Case) -> Shots:
         raise InputError(
             f"{case.path or 'case'}: shots",
             got="no section 'shots'",
-            expected="what differs from shot to shot",
+            expected="what varies from shot to shot",
             hint="add 'shots: {count: 50}' and a 'guide', or 'eccentricity' and 'tilt'.",
         )
     return case.shots
@@ -201,7 +201,7 @@ def _placement(
         f"{case.path or 'case'}: shots",
         got=f"eccentricity and tilt that left the guide in {_ATTEMPTS} draws",
         expected="placements inside the radial clearance at all guiding heights",
-        hint="make them smaller, or leave both out: the guide then says how far the body may go.",
+        hint="make them smaller, or leave both out: the guide then limits the placement.",
     )
 
 

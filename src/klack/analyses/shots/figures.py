@@ -63,8 +63,8 @@ def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
         x=AxisSpec(label=over.label, unit=over.unit),
         panels=tuple(panel for panel in panels if panel is not None),
         note=(
-            "Every point is one shot. Dashed: the centred impact; dotted: how far the highest "
-            "rebound of all shots is from it, the bias of the rule."
+            "Every point is one shot. Dashed: the centred impact; dotted: the bias of "
+            "the rule, the highest rebound of all shots minus it."
         ),
     )
 
@@ -209,7 +209,7 @@ def peak_chart(study: ShotsStudy) -> Chart:
 
 
 def height_traces_chart(study: ShotsStudy) -> Chart:
-    """Height of the centre of mass over time, as long as the shots that stand out go on."""
+    """Height of the centre of mass over time, as long as the highlighted shots last."""
     unit, factor = length_unit(study.shot_traces.height)
     bold = _bold(study)
     ends = [_last(line.traces.time, line.traces.height[line.row]) for line in bold]
@@ -229,8 +229,8 @@ def height_traces_chart(study: ShotsStudy) -> Chart:
             ),
         ),
         note=(
-            "Of the centre of mass, above its height at first touch; an eccentric body goes "
-            f"deeper, because it leans into its seat.{_thinned_note(study)}"
+            "Of the centre of mass, above its height at first touch; an eccentric body "
+            f"goes deeper, because it tilts in its seat.{_thinned_note(study)}"
         ),
     )
 

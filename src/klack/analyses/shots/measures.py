@@ -1,4 +1,4 @@
-"""Measures of one shot: what was drawn, and what came out."""
+"""Measures of one shot: drawn quantities and results."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ DRAWN: tuple[Measure[Shot], ...] = (
         name="direction",
         symbol="phi_e",
         unit="rad",
-        definition="To which side the axis is off, counted from x to y.",
+        definition="Direction of the eccentricity, from x to y.",
         source=_THEORY,
         read=lambda shot: shot["direction"],
     ),
@@ -45,7 +45,7 @@ DRAWN: tuple[Measure[Shot], ...] = (
         name="tilt direction",
         symbol="phi_t",
         unit="rad",
-        definition="Where the upper end leans to, counted from x to y.",
+        definition="Direction in which the upper end is tilted, from x to y.",
         source=_THEORY,
         read=lambda shot: shot["tilt_direction"],
     ),
@@ -91,8 +91,8 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = (
         source=_THEORY,
         read=lambda shot: shot["restitution"],
         form="fixed",
-        note="It is a result, never an input. A closing force goes on working while the "
-        "bodies touch: a strong one lifts the restitution of an eccentric impact, even "
+        note="It is a result, never an input. A closing force also works during "
+        "the contact: a strong one raises the restitution of an eccentric impact, even "
         "above one.",
     ),
     Measure(
@@ -137,16 +137,16 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = (
 
 ROCKING = Measure[Shot](
     key="rocking",
-    name="motion across the axis after it",
+    name="lateral motion after it",
     symbol="E_r/E_0",
     unit="1",
-    definition="Kinetic energy of rotation and sideways motion right after the first impact, "
+    definition="Kinetic energy of rotation and lateral motion right after the first impact, "
     "over the energy of approach.",
     source=_THEORY,
     read=lambda shot: shot["rocking"],
     form="share",
     digits=2,
-    note="What an eccentric or tilted impact takes from the rebound.",
+    note="The loss of rebound by an eccentric or tilted impact.",
 )
 
 SHOT_MEASURES: tuple[Measure[Shot], ...] = (
@@ -198,8 +198,8 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = (
         name="energy residual",
         symbol="r_E",
         unit="1",
-        definition="Energy from nowhere over the initial energy, of the whole shot: round-off in a"
-        " sound run.",
+        definition="Residual of the energy balance over the initial energy, of the whole shot: "
+        "round-off in a correct run.",
         source=_THEORY,
         read=lambda shot: shot["energy_residual"],
         form="power",

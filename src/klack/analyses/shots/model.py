@@ -32,7 +32,7 @@ _SPAN_OVER_CONTACT = 3.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShotModel:
-    """What :func:`build_shots` returns.
+    """Result of :func:`build_shots`.
 
     Parameters
     ----------

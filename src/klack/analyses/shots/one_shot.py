@@ -41,11 +41,11 @@ class ShotSetup:
     guide : Guide or None
     gaps : RigidGaps
     about : array, shape (3,) [m]
-        Point of the axis at the height of first touch, about which the moving body leans.
+        Point of the axis at the height of first touch, about which the moving body is tilted.
     inertia : array, shape (3, 3) [kg m^2]
         Of the moving body about its centre of mass.
     opposite_gap : array, shape (m,) [m]
-        Gaps of the contact points of a stop above, at the placement of the model.
+        Gaps of the contact points of an upper stop, at the placement of the model.
     opposite_slope : array, shape (m, 6)
         Their change per unit of a rigid placement; there the gaps stay linear.
     radial : array, shape (nc - m,) [-]
@@ -135,7 +135,7 @@ class ShotGaps:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShotOutcome:
-    """What came out of one shot.
+    """Result of one shot.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class ShotOutcome:
 def simulate_shot(
     setup: ShotSetup, draw: ShotDraw, *, impacts: int | None = None, points: bool = False
 ) -> InterfaceResult:
-    """Let the moving body fly as drawn.
+    """Simulate the moving body as drawn.
 
     Parameters
     ----------

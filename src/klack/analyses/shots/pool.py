@@ -17,7 +17,7 @@ _FEWEST = 3  # shots that make up for the start of a second process
 def run_shots_on(
     workers: int, setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
 ) -> None:
-    """Run the shots that the log does not hold yet, and put them there.
+    """Run the shots missing in the log, and add them.
 
     The numbers do not depend on ``workers``: every shot is computed by one thread, from the same
     arrays.

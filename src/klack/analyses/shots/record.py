@@ -1,4 +1,4 @@
-"""What ``klack shots`` leaves behind: many drops of one valve, and the drop that is centred.
+"""Record of ``klack shots``: many drops of one valve, and the centred drop.
 
 The numbers are plain columns, one row per shot, so that a stored study can be reported again
 without the solver.
@@ -25,7 +25,7 @@ Column = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShotColumns:
-    """Shots in rows: what was drawn, and what came out.
+    """Shots in rows: drawn quantities and results.
 
     Every field is an array of shape (n,).
 
@@ -35,7 +35,7 @@ class ShotColumns:
         Distance of the axis of the moving body from that of the seat at the height of first touch,
         and where to (from x towards y), at the start.
     tilt, tilt_direction : array [rad]
-        Angle between the axes, and where the upper end leans to.
+        Angle between the axes, and direction in which the upper end is tilted.
     force : array [N]
         Closing force at first touch.
     friction : array [-]
@@ -160,7 +160,7 @@ class ShotsStudy(CaseRecord):
     step : float [s]
         Of the time loop.
     distributions : mapping of str to str
-        What was drawn from what, in words.
+        Distributions, in words.
     surfaces : str
         For example ``"needle.tip on housing.seat"``.
     guide : str

@@ -139,7 +139,7 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
     restitution, height = e / e0 - 1.0, h / h0 - 1.0
     holds = abs(restitution) < _RULE_HOLDS
     found = (
-        f"Of {shots.count} shots, shot {highest}, {format_si(aside, 'm', 2)} off the axis, "
+        f"Of {shots.count} shots, shot {highest}, {format_si(aside, 'm', 2)} off-axis, "
         f"rebounds highest: {format_si(h, 'm', 3)} at a restitution of {e:.4f}; "
         f"the centred shot has {format_si(h0, 'm', 3)} and {e0:.4f}."
     )
@@ -164,7 +164,7 @@ def _highest(shots: ShotColumns) -> int:
     complete = np.isfinite(shots.rebound_height) & np.isfinite(shots.restitution)
     if not np.any(complete):
         raise ConvergenceError(
-            "shots: no shot came to the top of a rebound that follows a clear separation.\n"
+            "shots: no shot reached the top of a rebound after a clear separation.\n"
             "Try: a longer shots.duration, or another closing force: rebounds of less than 50 us "
             "belong to one impact."
         )
@@ -193,7 +193,7 @@ def _distributions(case: Case) -> dict[str, str]:
         words["tilt"] = shots.tilt.text("rad")
     if shots.eccentricity is None and shots.tilt is None and case.guide is not None:
         words["eccentricity and tilt"] = (
-            f"axis anywhere in the clearance of {format_si(case.guide.clearance, 'm')} at "
+            f"axis uniformly within the clearance of {format_si(case.guide.clearance, 'm')} at "
             "the lowest and the highest guiding height"
         )
     if shots.friction is not None:
@@ -223,7 +223,7 @@ def _guide_in_words(guide: CaseGuide | None) -> str:
 
 
 def _notes(model: ShotModel, shots: ShotColumns) -> tuple[str, ...]:
-    """What a reader of the numbers should know."""
+    """Notes on the results."""
     notes = []
     unfinished = int(np.sum(~np.isfinite(shots.rebound_height)))
     if unfinished:

@@ -1,4 +1,4 @@
-"""The few numbers of a study of shots that a script or a terminal wants."""
+"""Main numbers of a study of shots for scripts and terminals."""
 
 from collections.abc import Iterator
 from math import isfinite
@@ -78,7 +78,7 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
 
 
 def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: the distribution of each measure, and the rule."""
+    """Terminal output: the distribution of each measure, and the rule."""
     title = f"{study.title}: {study.shots.count} shots, seed {study.seed}"
     yield TextTable(title=title, columns=DISTRIBUTION_COLUMNS, rows=distribution_rows(study))
     yield study.rule.sentence

@@ -1,4 +1,4 @@
-"""What came out of many shots, in plain words."""
+"""Result of many shots, as text."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ _SMALL = 1e-4
 
 
 def shots_answer(study: ShotsStudy) -> str:
-    """Say whether the rule holds, and how far the shots spread."""
+    """Text on whether the rule holds, and on the spread of the shots."""
     shots = study.shots
     spread = [
         f"{measure.name} {measure.printed(float(np.nanmin(values)))} to "

@@ -1,4 +1,4 @@
-"""What a stroke report says, before it is laid out: the same words for screen and paper."""
+"""Content of a stroke report before its layout: the same texts for screen and paper."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -167,7 +167,7 @@ def _impacts(study: StrokeStudy) -> Section:
         if len(events) > _MOST_IMPACTS:
             paragraphs.append(
                 f"Variant '{variant.name}' has {len(events)} impacts; the first {_MOST_IMPACTS} "
-                "are listed, the result and klack stroke --json hold all of them."
+                "are listed, the result and klack stroke --json have all of them."
             )
         rows = [
             (f"{i + 1}. {event.stop}", *(measure.on_page(event) for measure in _SHOWN))
@@ -203,16 +203,16 @@ def _computed(study: StrokeStudy) -> Section:
                 ),
             )
         )
-    return Section(title="What was computed from what", tables=tuple(tables))
+    return Section(title="Input", tables=tuple(tables))
 
 
 def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
     rows: tuple[tuple[str, Callable[[StopSummary], str]], ...] = (
         ("surfaces", lambda stop: stop.surfaces or "none"),
         ("local law", lambda stop: stop.kind),
-        ("film beside the contact", lambda stop: "yes" if stop.film else "no"),
+        ("film in parallel with the contact", lambda stop: "yes" if stop.film else "no"),
         ("gap at the start", lambda stop: quantity(stop.gap, "m", 4)),
-        ("force that shaped the ports", lambda stop: quantity(stop.pattern_force, "N", 3)),
+        ("force of the port pattern", lambda stop: quantity(stop.pattern_force, "N", 3)),
         ("half width of the contact there", lambda stop: quantity(stop.half_width, "m", 3)),
         (
             "element size over half width",
@@ -293,7 +293,7 @@ def _row(measure: Measure[StrokeVariant], variants: list[StrokeVariant]) -> tupl
 
 
 def _energy_table(study: StrokeStudy) -> Table:
-    """Every entry of the books that is not zero in all variants."""
+    """Every entry of the energy balance that is not zero in all variants."""
     variants = list(study.variants.values())
     books = [variant.result.books for variant in variants]
     rows: list[tuple[str, ...]] = []
@@ -348,13 +348,14 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "From the start of the run to the first touch of the opening stop and of the seat, in the "
         "first stroke that passes 90 % of the lift (else in the longest). A stroke begins and ends "
         "at 10 % of the lift from where the needle was at rest; a valve that starts open closes "
-        "first. What a run does not reach, or a film cushions to the end, is not reached.",
+        "first. 'Not reached' is given where the run ends earlier or a film cushions the body "
+        "before contact.",
     ),
     (
         "impact",
         "Contacts closer together than the longest period of the needle are one impact. Its speed "
-        "is the closing speed of the centres of mass at first touch, or the highest one since its "
-        "film began to press; its peak force, impulse and restitution count contact and film "
+        "is the closing speed of the centres of mass at first touch, or the highest one since "
+        "its film force set in; its peak force, impulse and restitution count contact and film "
         "together. A touch slower than 2 % of the fastest impact on a stop does not count as its "
         "first impact.",
     ),
@@ -394,8 +395,8 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         limits.append(
             (
                 "Frequency",
-                f"Highest kept modes: {', '.join(tops)}. Above them a body follows only through "
-                "its static compliance.",
+                f"Highest kept modes: {', '.join(tops)}. Above them a body responds "
+                "only by its static compliance.",
             )
         )
     incomplete = [

@@ -72,7 +72,7 @@ _KINDS = {
     "friction": "friction in lines",
     "(stored)": "stored in bodies, springs and fluid",
 }
-"""Last word of an entry of the ledger: what the bars call its kind."""
+"""Last word of an entry of the energy balance: its kind in the bars."""
 
 
 # --------------------------------------------------------------------------- whole stroke
@@ -194,7 +194,7 @@ def _axis_over(*variants: StrokeVariant) -> AxisSpec:
 def _moments(
     study: StrokeStudy, variant: StrokeVariant
 ) -> tuple[tuple[Mark, ...], tuple[Mark, ...]]:
-    """Marks at opening, switching off and closing: with their words, and without."""
+    """Marks at opening, switching off and closing: with and without labels."""
     touches = variant.needle_times
     times = (
         (touches.opening.touch, "opening stop touched"),
@@ -268,7 +268,7 @@ def first_impact_chart(
         panels=tuple(panel for panel in panels if panel.curves),
         note=(
             "First touch of every variant is placed at zero. Contact force, film force and gap in "
-            "fine steps; a film that is squeezed pushes before the contact and pulls after it. The "
+            "fine steps; the squeeze film pushes before the contact and pulls after it. The "
             "gap of the two bodies is negative by the indentation of the local law. Velocity: "
             f"centre of mass of the {study.needle}."
         ),
@@ -395,10 +395,10 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
         note=(
             f"Variant '{variant.name}'. Upright lines every 2L/a = "
             f"{quantity(line.echo_time, 's', 3)} (L = {quantity(line.length, 'm', 3)}, "
-            f"a = {line.sound_speed:.4g} m/s) from first touch: there the pressure wave that the "
-            "impact sent into the line comes back and changes the force on the needle in steps, "
-            "the stairs of the rebound velocity. Chambers between needle and line round them off; "
-            "jumps in the shaded stretches are impacts."
+            f"a = {line.sound_speed:.4g} m/s) from first touch: there the pressure wave of "
+            "the impact returns from the line and changes the force on the needle in steps, "
+            "visible in the rebound velocity. Chambers between needle and line smooth them; "
+            "jumps in the shaded intervals are impacts."
         ),
     )
 
@@ -422,7 +422,7 @@ def _contacts(variant: StrokeVariant, zero: float, window: tuple[float, float]) 
 
 
 def _staggered(marks: Sequence[Mark]) -> tuple[Mark, ...]:
-    """Only the first marks carry words: labels stand below each other and would fill the panel."""
+    """Only the first marks have labels, which would otherwise fill the panel."""
     return tuple(mark if i < 4 else Mark(value=mark.value) for i, mark in enumerate(marks))
 
 
@@ -467,16 +467,16 @@ def stop_law_chart(stop: StopSummary) -> Chart | None:
 
 
 def energy_bars(study: StrokeStudy) -> BarChart:
-    """Where the energy of each run came from and where it went, solenoid included."""
+    """Energy supplies and losses of each run, solenoid included."""
     return _bars(
         study,
         name="energy",
         title="Energy of the whole valve",
         flows=_flows,
         note=(
-            "Over the whole run. Each pair of bars has the same length up to the residual of the "
-            f"ledger, {listed([_residual(v) for v in study.variants.values()])}. Stores count "
-            "with their change."
+            "Over the whole run. Each pair of bars has the same length up to the residual of "
+            f"the energy balance, {listed([_residual(v) for v in study.variants.values()])}. "
+            "Stores are shown by their change."
         ),
     )
 
@@ -512,7 +512,7 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
 
 
 def _flows(books: EnergyBooks) -> dict[str, float]:
-    """Every entry of the ledger over the run [J]: above zero it brought energy in."""
+    """Every entry of the energy balance over the run [J]: above zero is a supply."""
     entries = dict(books.supplies)
     for key, value in books.losses.items():
         entries[key] = entries.get(key, 0.0) - value

@@ -43,8 +43,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
         title="speed",
         symbol="v_0",
         unit="m/s",
-        definition="Closing speed of the centres of mass at first touch, or the highest one "
-        "since the film began to press.",
+        definition="Closing speed of the centres of mass at first touch, or the highest "
+        "one since the film force set in.",
         source="theory/stroke",
         read=attrgetter("approach_speed"),
         form="fixed",
@@ -113,8 +113,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
         definition="Opening speed over approach speed of the centres of mass; missing without "
         "separation.",
         note="It is a result of waves, fluid and films, never an input of the flexible "
-        "variants; a body that still vibrates from an impact before may rebound "
-        "faster than it came.",
+        "variants; a body still vibrating from an earlier impact may "
+        "rebound faster than it arrived.",
         source="theory/stroke",
         read=attrgetter("restitution"),
         form="fixed",
@@ -127,7 +127,7 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
         name="energy loss",
         symbol="W",
         unit="J",
-        definition="Kinetic energy of the centre of mass before the impact less that after it.",
+        definition="Kinetic energy of the centre of mass before the impact minus that after it.",
         source="theory/stroke",
         read=attrgetter("energy_loss"),
         digits=3,
@@ -155,8 +155,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="opening time at 10 percent",
         symbol="t_o,10",
         unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "opening.",
+        definition="From the start of the run until 10 % of the lift is passed in opening.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.opening.at_10,
         absent=NOT_REACHED,
@@ -166,8 +165,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="opening time at 50 percent",
         symbol="t_o,50",
         unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "opening.",
+        definition="From the start of the run until 50 % of the lift is passed in opening.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.opening.at_50,
         absent=NOT_REACHED,
@@ -177,8 +175,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="opening time at 90 percent",
         symbol="t_o,90",
         unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "opening.",
+        definition="From the start of the run until 90 % of the lift is passed in opening.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.opening.at_90,
         absent=NOT_REACHED,
@@ -200,8 +197,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="closing time at 10 percent",
         symbol="t_c,10",
         unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "closing.",
+        definition="From the start of the run until 10 % of the lift is passed in closing.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.closing.at_10,
         absent=NOT_REACHED,
@@ -211,8 +207,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="closing time at 50 percent",
         symbol="t_c,50",
         unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "closing.",
+        definition="From the start of the run until 50 % of the lift is passed in closing.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.closing.at_50,
         absent=NOT_REACHED,
@@ -222,8 +217,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="closing time at 90 percent",
         symbol="t_c,90",
         unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "closing.",
+        definition="From the start of the run until 90 % of the lift is passed in closing.",
         source="theory/stroke",
         read=lambda variant: variant.needle_times.closing.at_90,
         absent=NOT_REACHED,
@@ -233,7 +227,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="complete",
         symbol="",
         unit="1",
-        definition="Whether the run came to its end.",
+        definition="Whether the run reached its end.",
         source="theory/stroke",
         read=lambda variant: not variant.result.failure,
         form="count",
@@ -257,7 +251,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="end time",
         symbol="t_e",
         unit="s",
-        definition="How far the run came.",
+        definition="Time reached by the run.",
         source="theory/stroke",
         read=lambda variant: float(variant.result.time[-1]),
     ),
@@ -266,8 +260,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="energy residual",
         symbol="r_E",
         unit="1",
-        definition="Supplies less losses less the rise of all stores, over the throughput: "
-        "round-off in a sound run.",
+        definition="Supplies minus losses minus the increase of all stores, over the "
+        "throughput: round-off in a correct run.",
         source="theory/stroke",
         read=lambda variant: variant.result.books.relative_residual,
         form="power",
@@ -279,7 +273,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
         name="energy throughput",
         symbol="E",
         unit="J",
-        definition="All energy that came in or was taken from a store.",
+        definition="All energy supplied or taken from a store.",
         source="theory/stroke",
         read=lambda variant: variant.result.books.throughput,
     ),

@@ -1,4 +1,4 @@
-"""What is not in the record of a stroke, in words: runs that ended early, fine records cut off."""
+"""Missing parts of the record of a stroke: runs that ended early, truncated fine records."""
 
 from collections.abc import Mapping, Sequence
 

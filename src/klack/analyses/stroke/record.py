@@ -1,4 +1,4 @@
-"""What one stroke study leaves behind: the same valve in several variants, side by side.
+"""Record of a stroke study: the same valve in several variants.
 
 The numbers are plain arrays and small frozen records, so that a stored study can be reported again
 without the solver.
@@ -134,7 +134,7 @@ class StopSummary:
 
 @dataclass(frozen=True, kw_only=True)
 class StrokeChannels:
-    """Names of the channels that tell the story of a stroke, in every variant that has them.
+    """Names of the main channels of a stroke, in every variant that has them.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class StrokeStudy(CaseRecord):
 
 
 class IncompleteStrokeError(ConvergenceError):
-    """A variant failed on its way; ``study`` holds it until then, and all variants before it.
+    """A variant failed during the run; ``study`` has it until then, and all variants before it.
 
     Parameters
     ----------

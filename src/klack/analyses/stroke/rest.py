@@ -1,4 +1,4 @@
-"""A stroke in which nothing moves is told, with the force that was missing."""
+"""Note on a stroke in which nothing moves, with the missing force."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ __all__ = ["rest_note"]
 
 
 def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
-    """Say that the needle never left its seat; empty if it did.
+    """Note that the needle never left its seat; empty if it did.
 
     The smallest force on the seat is what was missing to lift it at the best moment.
 

@@ -1,4 +1,4 @@
-"""``klack stroke``: one actuation of a whole valve, in the variants asked for."""
+"""``klack stroke``: one actuation of a whole valve, in the requested variants."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ def run_stroke(
     variants : sequence of str
         Among :data:`klack.case.valve_sections.VARIANTS`; those of the case by default.
     after : StrokeStudy, optional
-        Go on where this study of the same case ended: time goes on, for another duration.
+        Continue from the end of this study of the same case, for another duration.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -144,7 +144,7 @@ def run_variant(
     *,
     state: State | None = None,
 ) -> NetworkResult:
-    """Run rows for the time and with the steps that the case asks for, from rest or a state."""
+    """Run rows for the duration and steps of the case, from rest or a state."""
     return simulate_network(
         rows,
         duration=case.run.duration,
@@ -164,13 +164,13 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
         raise InputError(
             "step",
             got=format_si(case.run.step, "s"),
-            expected=f"{format_si(after.step, 's')}, the step of the result to go on from",
+            expected=f"{format_si(after.step, 's')}, the step of the result to continue from",
             hint="keep the step, or run from the start.",
         )
     if name not in after.variants:
         raise InputError(
             "variant",
-            got=f"'{name}', which the result to go on from does not hold",
+            got=f"'{name}', which the result to continue from does not have",
             expected=f"one of: {', '.join(after.variants)}",
             hint="run that variant from the start first.",
         )

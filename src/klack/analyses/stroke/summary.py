@@ -1,4 +1,4 @@
-"""The few numbers of a stroke study that a script or a terminal wants."""
+"""Main numbers of a stroke study for scripts and terminals."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ VARIANT_COLUMNS = ("variant", *(measure.head for measure in _TOLD_OF_VARIANT))
 TIME_COLUMNS = (
     "variant",
     "body",
-    "way",
+    "motion",
     "lift [um]",
     "10 % [ms]",
     "50 % [ms]",
@@ -75,7 +75,7 @@ def stroke_to_json(study: StrokeStudy) -> StrokeJson:
 
 
 def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: variants side by side, times at shares of the lift, impacts."""
+    """Terminal output: variants side by side, times at shares of the lift, impacts."""
     yield TextTable(title=study.title, columns=VARIANT_COLUMNS, rows=variant_rows(study))
     if times := time_rows(study):
         title = "times at shares of the lift"
@@ -114,7 +114,7 @@ def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`TIME_COLUMNS`: both ways of every body between stops, the first one first."""
+    """Rows of :data:`TIME_COLUMNS`: opening and closing of every body between stops, in order."""
     return tuple(
         (
             variant.name,
@@ -134,7 +134,7 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
-    """Impact that ends a way; None if it does not reach its stop."""
+    """Impact that ends a passage; None if it does not reach its stop."""
     return next(
         (
             event
@@ -201,7 +201,7 @@ def _numbers(variant: StrokeVariant) -> VariantJson:
 
 
 def _start(variant: StrokeVariant) -> StartJson | None:
-    """Static start; None for a run that goes on or began free."""
+    """Static equilibrium; None for a continued or free start."""
     start = variant.result.start
     if start is None:
         return None
@@ -236,7 +236,7 @@ def _passage(passage: Passage) -> PassageJson:
 
 
 def _lift(times: LiftTimes) -> str:
-    """What the shares count from: between stops, or the largest lift of the run."""
+    """Reference of the shares: between stops, or the largest lift of the run."""
     if times.lift is None:
         return "none"
     return f"{1e6 * times.lift:.4g}{'' if times.between_stops else ' (largest)'}"

@@ -22,7 +22,7 @@ _NO_LIFT = 1e-8  # [m] less is the elasticity of what is closed
 
 @dataclass(frozen=True, kw_only=True)
 class Passage:
-    """One way between the ends of a lift; None where it does not get there within the run.
+    """One passage between the ends of a lift; None where the run does not reach it.
 
     Parameters
     ----------

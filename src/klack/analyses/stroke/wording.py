@@ -1,4 +1,4 @@
-"""What happened in a stroke, in one paragraph of plain words."""
+"""Course of a stroke, in one paragraph."""
 
 from math import isfinite
 
@@ -88,7 +88,7 @@ def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
 
 def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
     filmed = variant.wet and any(stop.film for stop in study.stops if stop.name == event.stop)
-    since = " (the highest since its film began to press)" if filmed else ""
+    since = " (the highest since its film force set in)" if filmed else ""
     text = (
         f"with {event.approach_speed:.3g} m/s{since} and a peak force of "
         f"{quantity(event.peak_force, 'N', 3)}"
@@ -99,7 +99,7 @@ def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
 
 
 def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
-    """How much later or earlier another variant opens and closes."""
+    """Difference of the opening and closing times of another variant."""
     parts = []
     here, there = reference.needle_times, other.needle_times
     for word, one, two in (

@@ -1,4 +1,4 @@
-"""Put an FMU together: sources, binaries, model description, documentation, in one zip file."""
+"""Build an FMU: sources, binaries, model description, documentation, in one zip file."""
 
 import tempfile
 import zipfile
@@ -125,7 +125,7 @@ def _binaries(
 
 
 def _write(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write beside the place first, then move: nobody finds half an FMU."""
+    """Write under another name first, then move: there is never a partial FMU."""
     with whole_file(path) as new, zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside in sorted(files):
             archive.writestr(_entry(inside), files[inside])

@@ -141,7 +141,7 @@ def _digits(name: str, value: float) -> str:
             f"export of a model: {name.removeprefix('klack_')}",
             got=f"{value}",
             expected="finite numbers",
-            hint="check the body or the law that this model was made of.",
+            hint="check the body or the law of this model.",
         )
     return f"{float(value):.17g}"
 

@@ -1,4 +1,4 @@
-"""What each output and each derivative of an FMU depends on, by value reference.
+"""Dependencies of each output and derivative of an FMU, by value reference.
 
 An importing program finds algebraic loops and the pattern of its Jacobian from these lists.  No
 output depends directly on an input: forces act on velocities, and those on displacements.

@@ -25,7 +25,7 @@ SOURCE_FILES = {2: ("klack_model.c", "klack_fmi2.c"), 3: ("klack_model.c", "klac
 _DISPLAY_UNITS = {"m": ("um", 1e6), "s": ("us", 1e6)}
 _TOLERANCE = 1e-8
 _LONGEST, _FEWEST = 50, 500
-_LICENSE = "BSD-3-Clause for the C sources; the numbers belong to who made the model"
+_LICENSE = "BSD-3-Clause for the C sources; the numbers belong to the author of the model"
 _COPYRIGHT = "C sources: (c) 2026, the klack founders"
 
 

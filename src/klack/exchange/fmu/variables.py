@@ -116,7 +116,11 @@ def _contact_outputs(model: ModalModel) -> Iterator[FmuVariable]:
     for i, contact in enumerate(model.contacts):
         end, where = contact_suffix(model, i), f"at {contact.name}"
         rows = [
-            ("gap", f"Gap between the bodies {where}, below zero where they are pressed", "m"),
+            (
+                "gap",
+                f"Gap between the bodies {where}, below zero where they are pressed together",
+                "m",
+            ),
             ("contact_force", f"Contact force {where}", "N"),
             ("mean_contact_force", f"Mean contact force {where} over a communication step", "N"),
             ("peak_contact_force", f"Largest contact force {where} in a communication step", "N"),
@@ -162,7 +166,8 @@ def _parameters(model: ModalModel) -> Iterator[FmuVariable]:
     )
     yield FmuVariable(
         name="start_rise",
-        description="Way of the moving body along +z before the start, from where the case puts it",
+        description="Displacement of the moving body along +z before the start, from its position "
+        "in the case",
         unit="m",
         causality="parameter",
         variability="fixed",

@@ -1,4 +1,4 @@
-"""What made the numbers of a study, in words: the same lines for every kind of study."""
+"""Origin of the numbers of a study, as text: the same lines for every kind of study."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""A stroke study as a table: every variant with its channels, end stops, impacts and books."""
+"""A stroke study as a table: every variant with its channels, end stops, impacts and energies."""
 
 from math import isfinite
 

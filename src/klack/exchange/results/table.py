@@ -14,7 +14,7 @@ __all__ = ["ResultAxis", "ResultChannel", "ResultRun", "ResultScalar", "ResultTa
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResultAxis:
-    """What the values of some channels are drawn over.
+    """Axis of the values of some channels.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def write_impact_series(
             "write_impact_series: frames",
             got=f"{frames}",
             expected="at least 2",
-            hint="50 make a smooth film.",
+            hint="50 give a smooth animation.",
         )
     case.require_levels([level])
     problem = build_problem(case, progress, threads=threads)

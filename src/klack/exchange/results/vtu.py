@@ -93,7 +93,7 @@ class VtuGrid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeriesFile:
-    """One file of a series: its time [s], which part it shows, and its place beside the series."""
+    """One file of a series: its time [s], its part, and its path relative to the series."""
 
     time: float
     part: int

@@ -63,7 +63,7 @@ def clock_factor(unit: str, step: float, where: str) -> tuple[float, str]:
 
 
 def unique_names(names: list[str]) -> list[str]:
-    """Number those names that come several times: ``lift #1``, ``lift #2``.
+    """Number repeated names: ``lift #1``, ``lift #2``.
 
     Examples
     --------

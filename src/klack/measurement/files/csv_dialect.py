@@ -1,4 +1,4 @@
-"""How a text table is written: encoding, separator, decimal mark, and what its header says.
+"""Dialect of a text table: encoding, separator, decimal mark and header.
 
 Separator and decimal mark are those with which the most lines, looked at in the beginning, the
 middle and the end of the file, become rows of numbers of the same length.  The header is what
@@ -59,7 +59,7 @@ class Dialect:
         return _COMMENTS.replace(self.separator, "") if self.separator else _COMMENTS
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Description as text."""
         return f"{_NAMES[self.separator]}, decimal {'point' if self.decimal == '.' else 'comma'}"
 
 
@@ -127,7 +127,7 @@ def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
 
 
 def _one_or_two(head: Sequence[str], lines: Sequence[str], found: Dialect) -> Dialect:
-    """Tell ``0,5`` as one column with a decimal comma from two columns, by the header."""
+    """Distinguish ``0,5`` as one column with a decimal comma from two columns, by the header."""
     alone = Dialect("", ",", 1)
     rows = [line for line in lines if _width(line, found.separator, found.decimal)]
     if any(_width(line, alone.separator, alone.decimal) != 1 for line in rows):

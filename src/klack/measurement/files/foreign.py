@@ -1,4 +1,4 @@
-"""What libraries of other people raise on damaged files, told as every other error."""
+"""Errors of third-party libraries on damaged files, raised as errors of klack."""
 
 import logging
 from collections.abc import Iterator

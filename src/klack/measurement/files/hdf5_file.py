@@ -45,7 +45,7 @@ class Hdf5File(ArrayRecording):
             raise
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
 
@@ -60,12 +60,12 @@ def _opened(path: Path) -> Any:
 
 def _damage(where: str) -> AbstractContextManager[None]:
     return foreign_reading(
-        where, "an HDF5 file", "it may be cut off, or still be open in the program that writes it."
+        where, "an HDF5 file", "it may be truncated, or still open in the program that writes it."
     )
 
 
 def _group(node: Any, path: str, depth: int) -> StoredGroup:
-    """What lies in a group, without following links to other files."""
+    """Content of a group, without following links to other files."""
     import h5py
 
     arrays, groups = [], []
@@ -110,7 +110,7 @@ def _check_size(name: str, item: Any) -> None:
     raise InputError(
         f"{Path(item.file.filename).name}: '{name}'",
         got=f"{item.size} values in {item.id.get_storage_size()} bytes",
-        expected="an array that was written as a whole",
+        expected="a completely written array",
         hint="the file is damaged, or this array was never filled: remove it.",
     )
 

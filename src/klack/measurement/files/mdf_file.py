@@ -104,9 +104,9 @@ class MdfFile(Recording):
         if first.size != 1 or last.size != 1:
             raise InputError(
                 where,
-                got=f"less than the {count} records that the file announces",
+                got=f"less than the {count} records declared in the file",
                 expected="a complete file",
-                hint="the recording was cut off; repair it with the program that wrote it.",
+                hint="the recording was truncated; repair it with the program that wrote it.",
             )
         return float(first[0]), float(last[0] - first[0]) / (count - 1), f"{name} of group {g + 1}"
 
@@ -153,12 +153,12 @@ class MdfFile(Recording):
                 f"{self.path.name}: channel '{channel.name}'",
                 got=f"{values.size} values from sample {first + 1} on",
                 expected=f"{last - first}",
-                hint="the recording was cut off; repair it with the program that wrote it.",
+                hint="the recording was truncated; repair it with the program that wrote it.",
             )
         return values
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._mdf.close()
         self._file.close()
 
@@ -183,7 +183,7 @@ def _damage(where: str) -> AbstractContextManager[None]:
 
 
 def _forget_half_open(error: Exception) -> None:
-    """Keep the reader that failed from complaining once more when it is thrown away."""
+    """Keep the failed reader from reporting once more when it is deleted."""
     for frame, _ in walk_tb(error.__traceback__):
         half: Any = frame.f_locals.get("self")
         if hasattr(half, "_closed"):
@@ -212,8 +212,8 @@ def _in_record(group: Any, channel: Any, old: bool) -> bool:
 def _outside(path: Path, channel: Any) -> InputError:
     return InputError(
         f"{path.name}: channel '{channel.name}'",
-        got="a place outside its record",
-        expected="a whole MDF file",
+        got="a position outside its record",
+        expected="a complete MDF file",
         hint="repair it with the program that wrote it.",
     )
 

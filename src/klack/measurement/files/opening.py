@@ -41,7 +41,7 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
             str(path),
             got=(error.strerror or "no access").lower(),
             expected="a measured file",
-            hint="check the path and the rights of the file.",
+            hint="check the path and the permissions of the file.",
         ) from error
     if not head:
         raise InputError(

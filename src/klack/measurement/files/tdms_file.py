@@ -117,7 +117,7 @@ class TdmsFile(Recording):
             return np.asarray(values, dtype=np.float64)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._tdms.close()
 
 

@@ -80,7 +80,7 @@ class UffFile(Recording):
                 f"{path.name}: set {number + 1} ({name})",
                 got=f"{count} values with steps of {step:g} s",
                 expected="at least two, and steps above 0",
-                hint="leave this set out of the file.",
+                hint="remove this set from the file.",
             )
         return ChannelInfo(
             name=name,
@@ -106,7 +106,7 @@ class UffFile(Recording):
                 f"{self.path.name}: channel '{channel.name}'",
                 got=f"{values.size} values of type {values.dtype}",
                 expected=f"{channel.count} real values",
-                hint="the file was cut off; export it again.",
+                hint="the file was truncated; export it again.",
             )
         return values[first:last].astype(np.float64)
 
@@ -127,7 +127,7 @@ def _opened(path: Path) -> Any:
         raise InputError(
             str(path),
             got=f"a universal file of {size / 2**30:.1f} GB",
-            expected="at most 2 GB (it is read as a whole)",
+            expected="at most 2 GB (it is read at once)",
             hint="export MDF4, TDMS or HDF5.",
         )
     with _damage(str(path)):

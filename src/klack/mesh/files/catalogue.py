@@ -13,7 +13,7 @@ __all__ = ["FORMATS", "MESH_FORMATS", "MeshFormat", "MeshReader", "format_of"]
 
 
 class MeshReader(Protocol):
-    """What reads a mesh file; see :func:`klack.mesh.files.mesh_file.read_mesh_file`."""
+    """Reader of a mesh file; see :func:`klack.mesh.files.mesh_file.read_mesh_file`."""
 
     def __call__(
         self,
@@ -49,7 +49,7 @@ class MeshFormat:
 
     @property
     def reader(self) -> MeshReader:
-        """The function that reads such files; imported when it is asked for."""
+        """The function that reads such files; imported on first use."""
         module, _, name = self.path.rpartition(".")
         return cast("MeshReader", getattr(import_module(f"klack.mesh.files.{module}"), name))
 
@@ -69,14 +69,14 @@ FORMATS = (
     MeshFormat("gmsh.reader.read_gmsh", "Gmsh mesh", (".msh",)),
     MeshFormat("vtk.reader.read_vtk", "VTK grid", (".vtk", ".vtu")),
 )
-"""Reader, program and endings of each format."""
+"""Reader, program and suffixes of each format."""
 
 MESH_FORMATS: Mapping[str, str] = {
     ending: " or ".join(other.program for other in FORMATS if ending in other.endings)
     for one in FORMATS
     for ending in one.endings
 }
-"""Ending of the file name, and whose files these are."""
+"""Suffix of the file name, and the program."""
 
 
 def format_of(path: Path) -> MeshFormat:

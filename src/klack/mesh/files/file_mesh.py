@@ -45,7 +45,7 @@ class FileElements:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMesh:
-    """What a mesh file holds.
+    """Content of a mesh file.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class FileMesh:
     faces_of_sets : bool
         True: a node set that holds all nodes of some outer faces is a surface as well.
     loose_faces : bool
-        True: surface elements on no solid are passed over, for they have no stiffness.
+        True: surface elements on no solid are ignored, since they have no stiffness.
     solids_only : bool
         True: surface elements on no solid are left out and counted.
     left_out : mapping of str to int
@@ -157,7 +157,7 @@ def _dimension(path: Path, solids: tuple[FileElements, ...]) -> int:
             str(path),
             got="no solid elements" if not dimensions else "solid and plane elements",
             expected="solid elements (tetrahedra, hexahedra, wedges)",
-            hint="save the volume elements too; the file may be cut off.",
+            hint="save the volume elements too; the file may be truncated.",
         )
     return dimensions.pop()
 
@@ -207,12 +207,12 @@ class _NodeNumbers:
                 f"{self._path}: element {part.numbers[row]}",
                 got=f"node {part.nodes[row, column]}, which the file does not define",
                 expected="nodes of this file",
-                hint="the file may be cut off: write it again from the preprocessor.",
+                hint="the file may be truncated: write it again from the preprocessor.",
             )
         return rows
 
     def present(self, numbers: Ints) -> Ints:
-        """Those of some nodes that the file has, counted from 0."""
+        """Selected nodes that the file defines, numbered from 0."""
         rows, found = self._find(np.asarray(numbers, dtype=np.int64))
         return np.unique(rows[found])
 

@@ -1,4 +1,4 @@
-"""Finished meshes from files of other programs; the ending of the name says which."""
+"""Finished meshes from files of other programs, selected by suffix."""
 
 import warnings
 from collections.abc import Sequence
@@ -65,8 +65,8 @@ def read_mesh_file(
     if model.left_out:
         counted = ", ".join(f"{count} {kind}" for kind, count in model.left_out.items())
         warnings.warn(
-            f"{path.name}: left out, for klack computes solids only: {counted}. Their stiffness, "
-            "mass and constraints are missing in the body.",
+            f"{path.name}: left out, since klack computes solids only: {counted}. Their "
+            "stiffness, mass and constraints are missing in the body.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -52,7 +52,7 @@ class FileMaterial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshModel:
-    """Mesh with what else the file says.
+    """Mesh with the other content of the file.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ __all__ = ["ALSO_OTHERS", "LOOSE", "MarkedFaces", "loose_faces", "named_faces"]
 Ints = NDArray[np.int64]
 
 ALSO_OTHERS = (
-    "say 'elements: solids-only' beside the file in the case to do without them, or take them "
-    "out of the file."
+    "add 'elements: solids-only' next to the file in the case to leave them out, or remove "
+    "them from the file."
 )
 """What to try with a file that holds elements besides solids."""
 LOOSE = "surface elements on no solid"

@@ -10,11 +10,11 @@ from klack.units import format_si
 
 __all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size", "require_unit"]
 
-SAY_UNIT = "add 'unit: mm' (or your unit) beside the file; for klack inspect, --unit mm."
-"""What to do about a mesh file that names no unit of length."""
+SAY_UNIT = "add 'unit: mm' (or your unit) next to the file; for klack inspect, --unit mm."
+"""Advice for a mesh file without a unit of length."""
 
 LARGEST_BODY = 2.0
-"""Largest extent [m] of a body that klack takes from a file."""
+"""Largest extent [m] of a body read from a file."""
 
 SMALLEST_BODY = 1e-5
 """Smallest one [m]."""
@@ -38,7 +38,7 @@ def require_plausible_size(where: str, mesh: Mesh, unit_length: float) -> None:
         return
     likely = _likely_unit(size / unit_length)
     hint = (
-        f"the file is probably in {likely}: say 'unit: {likely}'."
+        f"the file is probably in {likely}: use 'unit: {likely}'."
         if likely
         else "check the coordinates and the unit of the file."
     )
@@ -65,7 +65,7 @@ def require_unit(path: Path, unit_length: float | None) -> float:
         raise InputError(
             str(path),
             got="no unit of length",
-            expected="the unit of its coordinates: such files do not say",
+            expected="the unit of its coordinates, which such files do not state",
             hint=SAY_UNIT,
         )
     return unit_length

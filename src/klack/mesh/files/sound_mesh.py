@@ -1,4 +1,4 @@
-"""What a mesh from a file must meet, said with the numbers of its nodes and elements."""
+"""Requirements on a mesh from a file, reported with its node and element numbers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ _FARTHEST = 1e4  # [m] of a node from the origin
 
 
 def require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None:
-    """Raise for a node so far away that its unit or its columns must be wrong."""
+    """Raise for a node so distant that its unit or its columns must be wrong."""
     far = np.abs(points).max(axis=1) > _FARTHEST
     if far.any():
         at = int(np.argmax(far))

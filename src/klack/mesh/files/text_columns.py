@@ -133,7 +133,7 @@ class TextLines:
                 self.place(int(rows[row])),
                 got=repr(cells[row, column].tobytes().decode("latin-1").strip()),
                 expected=what,
-                hint="the file may be cut off, or its columns shifted: write it again.",
+                hint="the file may be truncated, or its columns shifted: write it again.",
             )
 
 

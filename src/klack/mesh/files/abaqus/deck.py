@@ -30,7 +30,7 @@ _END_OF_MATERIAL = {"MATERIAL", "STEP", "PART", "ASSEMBLY", "SOLID SECTION", "NO
 
 @dataclass(frozen=True, slots=True)
 class Deck:
-    """What a file holds: all instances in one scope, and the materials."""
+    """Content of a file: all instances in one scope, and the materials."""
 
     scope: Scope
     materials: dict[str, FileMaterial]
@@ -46,7 +46,7 @@ def read_deck(path: Path, *, solids_only: bool = False) -> Deck:
     Warns
     -----
     AccuracyWarning
-        Once, if the file holds *TRANSFORM or constraints between nodes, which are passed over.
+        Once, if the file holds *TRANSFORM or constraints between nodes, which are ignored.
     """
     reader = _Reader(path, Scope(solids_only=solids_only))
     in_step = False
@@ -82,7 +82,7 @@ class _Reader:
     ignored: dict[str, str] = field(default_factory=dict)
 
     def take(self, keyword: Keyword) -> None:
-        """Put one keyword where it belongs."""
+        """Process one keyword."""
         if keyword.name in _END_OF_MATERIAL:
             self.material = None
         match keyword.name:
@@ -110,7 +110,7 @@ class _Reader:
                     keyword.place,
                     got=f"*{name}",
                     expected=f"*{meant}",
-                    hint="mend the keyword; what follows it would be passed over.",
+                    hint="correct the keyword; its content would be ignored.",
                 )
             case _:
                 (self.root if self.scope is None else self.scope).take(keyword)
@@ -121,7 +121,7 @@ class _Reader:
                 f"{keyword.place}: *{keyword.name}",
                 got=f"*{self.opened.name} of {self.opened.place} without its end",
                 expected=f"*END {self.opened.name} before",
-                hint="the file may be cut off or edited by hand.",
+                hint="the file may be truncated or edited by hand.",
             )
 
     def _open(self, keyword: Keyword) -> None:
@@ -154,9 +154,9 @@ class _Reader:
         if self.scope is None or opened is None or keyword.name != f"END {opened.name}":
             raise InputError(
                 f"{keyword.place}: *{keyword.name}",
-                got="an end without a beginning",
+                got="an end without a start",
                 expected=f"*{keyword.name.removeprefix('END ')} before",
-                hint="the file may be shuffled or edited by hand.",
+                hint="the file may be reordered or edited by hand.",
             )
         _finish(self.scope)
         if opened.name == "PART":
@@ -194,7 +194,7 @@ class _Reader:
                 f"{self.opened.place}: *{self.opened.name}",
                 got="the end of the file",
                 expected=f"*END {self.opened.name} before",
-                hint="the file may be cut off: write it again from the preprocessor.",
+                hint="the file may be truncated: write it again from the preprocessor.",
             )
         if self.parts and not self.root.instances:
             self._add_only_part()
@@ -224,7 +224,7 @@ class _Reader:
         if self.ignored:
             found = ", ".join(f"*{name} ({place})" for name, place in self.ignored.items())
             warnings.warn(
-                f"passed over: {found}. Only mesh, sets and materials are read; directions of "
+                f"ignored: {found}. Only mesh, sets and materials are read; directions of "
                 "loads and constraints between nodes are not.",
                 AccuracyWarning,
                 stacklevel=4,
@@ -255,7 +255,7 @@ def _first_record(
         f"{keyword.place}: *{keyword.name}",
         got="no data line",
         expected=what,
-        hint="the file may be cut off or edited by hand.",
+        hint="the file may be truncated or edited by hand.",
     )
 
 

@@ -157,7 +157,7 @@ def _family(keyword: Keyword, kind: str) -> tuple[str, bool]:
     for family, pattern in _SURFACES.items():
         if re.fullmatch(pattern, kind):
             return family, False
-    _refuse(keyword, kind, "take elements of other kinds out of the file.")
+    _refuse(keyword, kind, "remove elements of other kinds from the file.")
 
 
 def _refuse(keyword: Keyword, kind: str, hint: str) -> NoReturn:

@@ -64,7 +64,7 @@ def read_placement(keyword: Keyword) -> Placement:
         raise InputError(
             f"{keyword.place}: *INSTANCE",
             got=f"data lines of {', '.join(str(len(row)) for row in rows[:8])} numbers",
-            expected="a translation (3 numbers) and, if it is turned, two points and an angle (7)",
+            expected="a translation (3 numbers) and, if rotated, two points and an angle (7)",
             hint="write both lines; zeros for no translation.",
         )
     shift = np.array(rows[0] if rows else [0.0, 0.0, 0.0])
@@ -76,7 +76,7 @@ def read_placement(keyword: Keyword) -> Placement:
         raise InputError(
             f"{keyword.place}: *INSTANCE",
             got=f"an axis of length {length:g}",
-            expected="two points of the axis that differ",
+            expected="two different points of the axis",
             hint="check the second data line: two points and an angle in degrees.",
         )
     return Placement(shift, rotation_matrix((b - a) / length * angle), a)
@@ -96,7 +96,7 @@ def add_instance(root: Scope, name: str, part: Scope, placement: Placement, plac
             f"{place}: *INSTANCE",
             got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
             expected=f"at most {LARGEST_NODES}",
-            hint="leave instances out that are not needed.",
+            hint="leave out unneeded instances.",
         )
     _require_revolution(part, placement, place)
     node, element = root.nodes.count, root.elements.count
@@ -121,7 +121,7 @@ def _require_revolution(part: Scope, placement: Placement, place: str) -> None:
     if flat and not placement.along_axis:
         raise InputError(
             f"{place}: *INSTANCE",
-            got="an axisymmetric part that is turned, or moved away from its axis",
+            got="an axisymmetric part that is rotated, or moved away from its axis",
             expected="a translation along y, which is the axis",
             hint="draw the part at its radius.",
         )

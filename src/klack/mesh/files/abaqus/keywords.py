@@ -1,9 +1,9 @@
 """Keyword files of Abaqus and CalculiX, taken apart into keywords and blocks of data lines.
 
 A keyword starts with one ``*``, a comment with two.  Keywords, parameters and set names do not
-care about capitals.  A keyword line that ends with a comma goes on in the next line.  Files that
+care about capitals.  A keyword line that ends with a comma continues in the next line.  Files that
 are included must lie in the folder of the main file or below it.  Text is UTF-8, or Latin-1 where
-it is no UTF-8.
+it is not UTF-8.
 
 The data lines stay bytes until they are asked for, in large pieces or line by line.
 """
@@ -29,7 +29,7 @@ _PART = re.compile(r'((?:"[^"]*"|[^,])*)(?:,|$)')  # between commas outside quot
 
 @dataclass(frozen=True, slots=True)
 class DataLine:
-    """Fields between commas, stripped, and where they stand (``file:line``)."""
+    """Fields between commas, stripped, and their position (``file:line``)."""
 
     place: str
     fields: tuple[str, ...]
@@ -164,7 +164,7 @@ def _require_short(place: str, size: int, longest: int) -> None:
             place,
             got=f"a line of {size} bytes",
             expected=f"at most {longest} bytes",
-            hint="the file is no keyword file, or its line ends are lost.",
+            hint="the file is not a keyword file, or its line endings are lost.",
         )
 
 
@@ -239,7 +239,8 @@ class _Source:
                 str(path)[:200],
                 got=(error.strerror or str(error)).lower(),
                 expected="an Abaqus or CalculiX input file (.inp)",
-                hint="check the path; that of an *INCLUDE is relative to the file it stands in.",
+                hint="check the path; that of an *INCLUDE is relative to the file that contains "
+                "it.",
             ) from None
         raise InputError(
             str(path),
@@ -264,14 +265,14 @@ class _Source:
             raise InputError(
                 f"{place}: *INCLUDE",
                 got=f"'{file}', which is included from itself or {len(above)} levels deep",
-                expected=f"includes without a circle and up to {_DEEPEST} levels deep",
+                expected=f"includes without a loop and up to {_DEEPEST} levels deep",
                 hint="write the model into one file.",
             )
         return path
 
 
 def _keyword_line(text: bytes, position: int, line: int, place: str) -> tuple[int, int, str]:
-    """Where the text goes on, in which line, and the keyword line, joined; "" for a comment."""
+    """Where the text continues, in which line, and the keyword line, joined; "" for a comment."""
     words = b""
     while position < len(text):
         end = text.find(b"\n", position)

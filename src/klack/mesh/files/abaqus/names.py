@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 @dataclass
 class Names(Generic[T]):
-    """What a file defines piece by piece under a name.
+    """Named items that a file defines piece by piece.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ class Names(Generic[T]):
     _owners: dict[str, list[str]] = field(default_factory=dict)  # the other way round
 
     def copy(self) -> "Names[T]":
-        """Names that can grow on their own."""
+        """Independent copy of the names."""
         parts = {key: list(part) for key, part in self._parts.items()}
         return Names(self.kind, dict(self._shown), parts)
 
     def add(self, name: str, *parts: T) -> str:
-        """Add parts to what has this name; give back its key."""
+        """Add parts to an item by name; return its key."""
         key = name.upper()
         self._shown.setdefault(key, name)
         self._parts.setdefault(key, []).extend(parts)

@@ -51,7 +51,7 @@ def distinct(values: Integers) -> Integers:
 
 
 class Numbering:
-    """Numbers of a file that are looked up while more of them come.
+    """Numbers of a file, looked up while reading.
 
     They lie in sorted runs, each at least twice as long as the next, so that neither many small
     blocks nor few large ones are slow.
@@ -64,7 +64,7 @@ class Numbering:
         return sum(len(run.labels) for run in self._runs)
 
     def copy(self) -> "Numbering":
-        """Numbering that can grow on its own."""
+        """Independent copy of the numbering."""
         return Numbering(tuple(self._runs))
 
     def find(self, labels: Integers) -> Integers:
@@ -80,7 +80,7 @@ class Numbering:
         return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
 
     def repeated(self, labels: Integers) -> int | None:
-        """Smallest number that is known already, or stands twice among ``labels``."""
+        """Smallest number that is already known, or repeated in ``labels``."""
         ordered = labels if (labels[1:] > labels[:-1]).all() else np.sort(labels)
         twice = ordered[1:][ordered[1:] == ordered[:-1]]
         known = ordered[self.find(ordered) >= 0]

@@ -27,7 +27,7 @@ __all__ = [
     "records",
 ]
 
-CUT_OFF = "the file may be cut off or edited by hand: write it again from the preprocessor."
+CUT_OFF = "the file may be truncated or edited by hand: write it again from the preprocessor."
 
 _LARGEST = 10**15  # whole numbers up to here are exact as floats too
 _DIGITS = 18  # of a number that fits 64 bits
@@ -65,7 +65,7 @@ def is_integer(text: str) -> bool:
 def records(
     keyword: Keyword, lengths: tuple[int, int], what: str
 ) -> Iterator[tuple[DataLine, list[str]]]:
-    """Yield records with their first line; a record goes on in the next line until it is full.
+    """Yield records with their first line; a record may span several lines.
 
     Parameters
     ----------

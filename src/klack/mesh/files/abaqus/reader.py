@@ -1,7 +1,7 @@
 """Meshes from Abaqus and CalculiX input files (.inp).
 
 Read are nodes, solid and axisymmetric elements, sets, surfaces, instances of parts, and, as extra
-information, elastic materials and sections.  Steps, loads and constraints are passed over.  A set
+information, elastic materials and sections.  Steps, loads and constraints are ignored.  A set
 of surface elements (membranes, shells, plane elements: what gmsh and most preprocessors write for
 a named surface) becomes a surface, provided that every one of them lies on a solid element.
 
@@ -62,7 +62,7 @@ def read_abaqus(
     Warns
     -----
     AccuracyWarning
-        Once, if constraints between nodes (*TIE, *EQUATION, ...) or *TRANSFORM are passed over.
+        Once, if constraints between nodes (*TIE, *EQUATION, ...) or *TRANSFORM are ignored.
     """
     return read_abaqus_model(path, unit_length, solids=solids).mesh
 
@@ -228,7 +228,7 @@ def _kept(
                 f"{path}: solid '{name}'",
                 got="a name that the file does not have",
                 expected=f"one of: {', '.join(sorted(known))}",
-                hint="solids are called after the sets of *SOLID SECTION or *ELEMENT.",
+                hint="solids are named after the sets of *SOLID SECTION or *ELEMENT.",
             )
         chosen.add(solid)
     return tuple(block for block in blocks if block.elements.solid in chosen)

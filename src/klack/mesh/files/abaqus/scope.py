@@ -34,7 +34,7 @@ class Entities:
         return cls(kind, NamedSets(Names(f"{kind} set")))
 
     def copy(self) -> "Entities":
-        """Entities that can grow on their own."""
+        """Independent copy of the entities."""
         return Entities(self.kind, self.sets.copy(), self.numbering.copy(), self.count)
 
 
@@ -94,7 +94,7 @@ class Scope:
     waiting: list[Keyword] = field(default_factory=list)  # until all sets are known
 
     def copy(self) -> "Scope":
-        """Scope with the same content that can grow on its own; of a finished part."""
+        """Independent copy of the scope of a finished part."""
         return Scope(
             nodes=self.nodes.copy(),
             elements=self.elements.copy(),
@@ -109,7 +109,7 @@ class Scope:
         )
 
     def take(self, keyword: Keyword) -> None:
-        """Put in one keyword; those that are of no interest are passed over."""
+        """Process one keyword; irrelevant ones are ignored."""
         match keyword.name:
             case "NODE":
                 self._take_nodes(keyword)
@@ -146,8 +146,8 @@ class Scope:
                 line.place,
                 got=f"{kind} {text}, which the file does not define",
                 expected=f"numbers of {kind}s of this file",
-                hint="the file may be cut off or edited by hand: write it again from the "
-                "preprocessor.",
+                hint="the file may be truncated or edited by hand: write it "
+                "again from the preprocessor.",
             )
         return row + first
 
@@ -196,7 +196,7 @@ class Scope:
                 f"{keyword.place}: *ELEMENT: element {numbers[row]}",
                 got=f"node {missing}, which the file does not define above",
                 expected="nodes of this file",
-                hint="the file may be cut off, or its *NODE lines are in a file that is not "
+                hint="the file may be truncated, or its *NODE lines are in a file that is not "
                 "included.",
             )
         group = ElementGroup(

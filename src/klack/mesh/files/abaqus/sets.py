@@ -41,7 +41,7 @@ class NamedSets:
     size: int = 0
 
     def copy(self) -> "NamedSets":
-        """Sets that can grow on their own."""
+        """Independent copy of the sets."""
         return NamedSets(self.names.copy(), self.size)
 
     def members(self, key: str) -> Integers:
@@ -74,7 +74,7 @@ class NamedSets:
                 place,
                 got=f"sets of {self.size} members together",
                 expected=f"at most {LARGEST_MEMBERS}",
-                hint="take sets that are not needed out of the file.",
+                hint="remove unneeded sets from the file.",
             )
 
 
@@ -88,7 +88,7 @@ def read_members(
     keyword : Keyword
     numbering : Numbering
     resolve : function of a data line and a text to int array
-        Rows of what is no number that is known; raises if there is no such set.
+        Rows of a value that is not a number that is known; raises if there is no such set.
     """
     if "GENERATE" in keyword.parameters:
         return _collected(

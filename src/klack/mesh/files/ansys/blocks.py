@@ -19,7 +19,7 @@ from klack.mesh.files.text_columns import TextLines
 __all__ = ["Archive", "ElementTable", "read_archive"]
 
 _KIND = "an ANSYS archive (CDWRITE, DB)"
-_CUT_OFF = "the file may be cut off: write it again with CDWRITE, DB."
+_CUT_OFF = "the file may be truncated: write it again with CDWRITE, DB."
 _NODES_PER_ELEMENT = 20
 
 
@@ -223,7 +223,7 @@ class _Block:
         """Number of items that the command declares, where it does."""
         text = _field(self._fields, position)
         if text.isdecimal() and int(text[:18]) != came:
-            self._cut_off(self._row, f"{came} lines of items", f"{text}, as the command says")
+            self._cut_off(self._row, f"{came} lines of items", f"{text}, according to the command")
 
     def nodes(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Numbers and global Cartesian coordinates of the nodes."""
@@ -242,7 +242,7 @@ class _Block:
         return numbers, points
 
     def elements(self) -> ElementTable:
-        """Elements; those with more than eight nodes go on in a second line."""
+        """Elements; those with more than eight nodes continue in a second line."""
         form, rows = self._open()
         width, lines = int(form["width"]), self._lines
         rows = self._until_mark(rows, width)

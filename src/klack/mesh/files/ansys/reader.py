@@ -2,7 +2,7 @@
 
 Read are SOLID185, SOLID186, SOLID187 and SOLID285 (and the older 45, 95 and 92), with their
 degenerate forms, components, linear elastic materials and the /UNITS command.  Loads, constraints
-and contact settings are passed over.
+and contact settings are ignored.
 
 Read by hand: mapdl-archive (0.4.2) takes 222 of 300 damaged archives, this reader 17.
 """
@@ -44,7 +44,7 @@ _MAY_BE_LEFT_OUT = {
     **{171: "CONTA", 172: "CONTA", 179: "PRETS", 201: "FOLLW", 42: "PLANE", 82: "PLANE"},
     **{151: "SURF", 152: "SURF", 156: "SURF", 182: "PLANE", 183: "PLANE"},
 }
-"""Elements without a volume of their own that carry stiffness or mass."""
+"""Elements without a volume that have stiffness or mass."""
 
 
 def read_ansys_archive(

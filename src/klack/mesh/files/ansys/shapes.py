@@ -95,7 +95,7 @@ def shapes_of(lines: TextLines, table: ElementTable, kind: Ints) -> Ints:
             lines,
             table,
             strange,
-            "corner nodes that repeat in no known way, or are missing",
+            "corner nodes with an unknown repetition, or missing ones",
             "mesh with tetrahedra, hexahedra and wedges.",
         )
     return shapes

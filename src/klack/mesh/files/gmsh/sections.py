@@ -48,7 +48,7 @@ class GmshElements:
 
 @dataclass
 class GmshContent:
-    """What the sections hold."""
+    """Content of the sections."""
 
     node_parts: list[Ints] = field(default_factory=list)
     point_parts: list[NDArray[np.float64]] = field(default_factory=list)
@@ -199,7 +199,7 @@ class _Reader:
 
     def _take_nodes(self, place: str, numbers: Ints, points: NDArray[np.float64]) -> None:
         if not np.isfinite(points).all():
-            refuse(place, "what is no finite number", "coordinates")
+            refuse(place, "a value that is not a finite number", "coordinates")
         self._content.node_parts.append(numbers)
         self._content.point_parts.append(points)
 
@@ -288,7 +288,7 @@ class _Reader:
 
 
 def _alike(values: Ints, width: int, most: int) -> int:
-    """How many rows from the start have the type and number of tags of the first one."""
+    """Number of rows from the start with the type and number of tags of the first one."""
     done, step = 1, 64
     while done < most:
         last = min(done + step, most)

@@ -33,23 +33,23 @@ class TextStream:
         self._place = place
         values = plain_numbers(text)
         if values is None:
-            refuse(place, "what is no number", "numbers between blanks")
+            refuse(place, "a value that is not a number", "numbers between blanks")
         self._values = values
         self._at = 0
 
     @property
     def left(self) -> int:
-        """How many numbers are left."""
+        """Number of remaining numbers."""
         return len(self._values) - self._at
 
     def real(self, count: int) -> NDArray[np.float64]:
         """Give the next finite numbers."""
         if not 0 <= count <= self.left:
-            refuse(self._place, f"{self.left} numbers more", f"{count}, as its counts say")
+            refuse(self._place, f"{self.left} numbers more", f"{count}, according to its counts")
         self._at += count
         values = self._values[self._at - count : self._at]
         if not np.isfinite(values).all():
-            refuse(self._place, "what is no finite number", "finite numbers")
+            refuse(self._place, "a value that is not a finite number", "finite numbers")
         return values
 
     def whole(self, count: int) -> Ints:
@@ -72,7 +72,7 @@ class BinaryStream:
         """Items of one type."""
         left = len(self._data) - self.at
         if not 0 <= count * kind.itemsize <= left:
-            refuse(self._place, f"{left} bytes more", f"{count} items, as its counts say")
+            refuse(self._place, f"{left} bytes more", f"{count} items, according to its counts")
         values = np.frombuffer(self._data, dtype=kind, count=count, offset=self.at)
         self.at += count * kind.itemsize
         return values
@@ -96,7 +96,7 @@ class BinaryStream:
         """Give the next finite numbers."""
         values = self.take(self._real, count).astype(np.float64)
         if not np.isfinite(values).all():
-            refuse(self._place, "what is no finite number", "finite numbers")
+            refuse(self._place, "a value that is not a finite number", "finite numbers")
         return values
 
 
@@ -108,7 +108,10 @@ def whole_of(place: str, values: NDArray[np.float64]) -> Ints:
 
 
 def refuse(place: str, got: str, expected: str) -> NoReturn:
-    """Raise for a file that is cut off or damaged."""
+    """Raise for a truncated file or damaged."""
     raise InputError(
-        place, got=got, expected=expected, hint="the file may be cut off: save it again from Gmsh."
+        place,
+        got=got,
+        expected=expected,
+        hint="the file may be truncated: save it again from Gmsh.",
     )

@@ -2,7 +2,7 @@
 
 A card has a name and data fields; eight of them stand in one line of small fields (8 columns each)
 or of free fields (between commas), four in one of large fields (16 columns; the name or the mark
-of the continuation has a ``*``).  A line goes on in the next one if that has no name, but blanks
+of the continuation has a ``*``).  A line continues in the next one if that has no name, but blanks
 or a mark that starts with ``+`` or ``*``.  ``$`` starts a comment.
 """
 
@@ -66,7 +66,7 @@ class Card:
             f"{self.place}: {self.name}",
             got=got,
             expected=expected,
-            hint="the file may be cut off: write it again from the preprocessor.",
+            hint="the file may be truncated: write it again from the preprocessor.",
         )
 
 
@@ -304,7 +304,7 @@ def _require_marks_in_order(
     continued: NDArray[np.int64],
     names: NDArray[np.bytes_],
 ) -> None:
-    """A mark at the end of a line must come again at the start of the next one."""
+    """Require the mark at the end of a line at the start of the next one."""
     for begin in range(0, len(continued), _CHUNK):
         part = continued[begin : begin + _CHUNK]
         mark = np.char.lstrip(names[part], b"+*")
@@ -338,7 +338,7 @@ def _names(cells: NDArray[np.uint8]) -> NDArray[np.bytes_]:
 
 
 def _without_comments(lines: TextLines) -> tuple[TextLines, NDArray[np.int64]]:
-    """Cut lines at ``$``, and tell which lines are comments."""
+    """Cut lines at ``$``, and mark comment lines."""
     at = np.flatnonzero(lines.text == ord("$"))
     row = np.searchsorted(lines.start, at, side="right") - 1
     end = lines.end.copy()

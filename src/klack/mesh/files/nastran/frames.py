@@ -67,9 +67,10 @@ class Frames:
         if label not in self._known or depth > _DEEPEST:
             raise InputError(
                 f"{place}: coordinate system {label}",
-                got="no CORD1 or CORD2 card for it" if depth <= _DEEPEST else "a circle of systems",
+                got="no CORD1 or CORD2 card for it" if depth <= _DEEPEST else "a loop of systems",
                 expected="a system that the file defines, or 0",
-                hint="the file may be cut off, or the card may be in a file that is not included.",
+                hint="the file may be truncated, or the card may be in a file that is not "
+                "included.",
             )
         own = self._known[label]
         if own.nodes is not None:

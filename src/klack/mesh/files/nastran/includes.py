@@ -14,7 +14,7 @@ _INCLUDE = re.compile(rb"^[ \t]*INCLUDE[ \t]+['\"]?([^'\"\r\n$]+)", re.IGNORECAS
 
 
 def text_with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], ...]]:
-    """Text of the file with its includes put in, and which lines come from where.
+    """Text of the file with its includes, and the origin of its lines.
 
     Returns
     -------

@@ -2,8 +2,8 @@
 
 Read are GRID in any coordinate system, the solids CTETRA, CHEXA and CPENTA (linear and
 quadratic), PSOLID, MAT1, the surface elements CTRIA3, CTRIA6, CQUAD4 and CQUAD8 (each property of
-theirs becomes a surface), and sets of nodes.  Loads, constraints and solution control are passed
-over.
+theirs becomes a surface), and sets of nodes.  Loads, constraints and solution control are
+ignored.
 
 Read by hand: meshio (5.3.5) takes points in a local coordinate system for global ones without a
 word, and reads no sets and names.
@@ -145,7 +145,7 @@ def _refuse_elements(bulk: BulkData, *, solids_only: bool) -> None:
     for name in bulk.known:
         if name in refused:
             card = next(bulk.cards(name))
-            hint = "take elements of other kinds out of the file."
+            hint = "remove elements of other kinds from the file."
             if name in _MAY_BE_LEFT_OUT:
                 hint = ALSO_OTHERS
             raise InputError(
@@ -172,7 +172,7 @@ def _refuse_field(
         f"{bulk.place(row)}: {name}",
         got=repr(text),
         expected=expected,
-        hint="the file may be cut off, or its columns shifted: write it again.",
+        hint="the file may be truncated, or its columns shifted: write it again.",
     )
 
 
@@ -212,7 +212,7 @@ def _in_basic(
                 f"{bulk.lines.file}: CORD1: node {number}",
                 got="a node that the file does not define",
                 expected="nodes of this file",
-                hint="the file may be cut off: write it again from the preprocessor.",
+                hint="the file may be truncated: write it again from the preprocessor.",
             )
         at = found[0]
         place = bulk.place(int(line[at]))
@@ -259,7 +259,7 @@ def _solids_of(
                 f"{bulk.place(int(rows[first]))}: {name} {table[first, 0]}",
                 got=f"{np.count_nonzero(nodes[first] > 0)} nodes",
                 expected=f"{corners} corners, and all or none of {most - corners} mid nodes",
-                hint="the file may be cut off; else let the mesher put a node on every edge.",
+                hint="the file may be truncated; else let the mesher put a node on every edge.",
             )
         for full, family in ((middle == 0, linear), (middle > 0, quadratic)):
             for label in np.unique(table[full, 1]).tolist():

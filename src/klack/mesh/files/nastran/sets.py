@@ -110,7 +110,7 @@ _SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=\s*(.*)", re.IGNORECASE)
 
 
 def _of_case_control(head: tuple[str, ...]) -> Iterator[tuple[int, Ranges]]:
-    """Sets of integers; those of real numbers and of names are passed over."""
+    """Sets of integers; those of real numbers and of names are ignored."""
     lines = iter(head)
     for line in lines:
         match = _SET.match(line)
@@ -129,7 +129,7 @@ def _of_case_control(head: tuple[str, ...]) -> Iterator[tuple[int, Ranges]]:
                 f"SET {match[1]} of the case control",
                 got=" ".join(words)[:60],
                 expected="numbers, or 'first THRU last'",
-                hint="correct the set, or take it out of the file.",
+                hint="correct the set, or remove it from the file.",
             ) from None
 
 

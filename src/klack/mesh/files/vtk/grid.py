@@ -38,12 +38,12 @@ class VtkGrid:
 
 
 def refuse(where: str, got: str, expected: str, hint: str = "") -> NoReturn:
-    """Raise for a file that is cut off or damaged."""
+    """Raise for a truncated file or damaged."""
     raise InputError(
         where,
         got=got,
         expected=expected,
-        hint=hint or "the file may be cut off: save it again as an unstructured grid.",
+        hint=hint or "the file may be truncated: save it again as an unstructured grid.",
     )
 
 
@@ -51,5 +51,5 @@ def numbers_in_text(where: str, text: bytes, kind: np.dtype) -> np.ndarray:
     """Numbers between blanks; raise for anything else."""
     values = plain_numbers(text, float if kind.kind == "f" else int)
     if values is None:
-        refuse(where, "what is no number", f"numbers of type {kind.name}")
+        refuse(where, "a value that is not a number", f"numbers of type {kind.name}")
     return values

@@ -120,7 +120,7 @@ class _Reader:
             values = numbers_in_text(self._where, self._data[self._at : end], kind)
             self._at = end
             if len(values) != count:
-                refuse(self._where, f"{len(values)} numbers", f"{count}, as its count says")
+                refuse(self._where, f"{len(values)} numbers", f"{count}, according to its count")
             return self._finite(values)
         packed = name.lower() == "bit"
         size = -(-count // 8) if packed else count * kind.itemsize
@@ -134,7 +134,7 @@ class _Reader:
 
     def _finite(self, values: np.ndarray) -> np.ndarray:
         if self._where.endswith("POINTS") and not np.isfinite(values).all():
-            refuse(self._where, "what is no finite number", "coordinates")
+            refuse(self._where, "a value that is not a finite number", "coordinates")
         return values
 
     def _cells_of(self, words: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

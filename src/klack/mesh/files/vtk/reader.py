@@ -152,7 +152,7 @@ def _require_fitting(path: Path, grid: VtkGrid) -> None:
     if len(grid.connectivity) and not 0 <= grid.connectivity.min() <= grid.connectivity.max() < (
         n_points
     ):
-        refuse(str(path), "a cell with a point that is not there", f"points 0 to {n_points - 1}")
+        refuse(str(path), "a cell with a point that does not exist", f"points 0 to {n_points - 1}")
     for kind, data, items in (
         ("cell", grid.cell_data, count),
         ("point", grid.point_data, n_points),
@@ -217,7 +217,7 @@ def _cells(grid: VtkGrid) -> Iterator[FileElements]:
 
 
 def _chosen(data: Mapping[str, Ints], words: Sequence[str]) -> str:
-    """Name of the array that tells parts apart, or ""."""
+    """Name of the array that distinguishes parts, or ""."""
     plain: dict[str, str] = {}
     for name in data:
         word = "".join(letter for letter in name.lower() if letter.isalpha())

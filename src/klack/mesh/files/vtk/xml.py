@@ -97,10 +97,10 @@ class _Reader:
             refuse(str(self._path), "no Points or Cells", "connectivity, offsets and types")
         ends = self._array(cells["offsets"], n_cells).astype(np.int64)
         if len(ends) and ((np.diff(ends) < 0).any() or ends[0] < 0):
-            refuse(f"{self._path}: offsets", "offsets that go back", "ascending offsets")
+            refuse(f"{self._path}: offsets", "decreasing offsets", "ascending offsets")
         x = self._array(points[0], 3 * n_points).astype(np.float64).reshape(-1, 3)
         if not np.isfinite(x).all():
-            refuse(f"{self._path}: Points", "what is no finite number", "coordinates")
+            refuse(f"{self._path}: Points", "a value that is not a finite number", "coordinates")
         return VtkGrid(
             points=x,
             connectivity=self._array(cells["connectivity"], int(ends[-1])).astype(np.int64),
@@ -130,14 +130,14 @@ class _Reader:
         if form == "ascii":
             values = numbers_in_text(where, (array.text or "").encode(), kind)
             if len(values) != count:
-                refuse(where, f"{len(values)} numbers", f"{count}, as the piece says")
+                refuse(where, f"{len(values)} numbers", f"{count}, according to the piece")
             return values
         if count * kind.itemsize > _LARGEST:
             refuse(where, f"{count} items", f"at most {_LARGEST} bytes in an array")
         if form == "appended":
             offset = array.get("offset", "")
             if not offset.isdecimal() or int(offset[:15]) >= len(self._tail):
-                refuse(where, f"offset '{offset[:40]}'", "a place in the appended data")
+                refuse(where, f"offset '{offset[:40]}'", "a position in the appended data")
             source = _Source(where, self._tail, int(offset[:15]), self._encoding == "raw")
         elif form == "binary":
             text = (array.text or "").strip().encode("ascii", "replace")
@@ -154,12 +154,12 @@ class _Reader:
             raw = source.take(0, h + size)
             came = int(np.frombuffer(raw[:h], dtype=self._header)[0])
             if came != size:
-                refuse(where, f"{came} bytes", f"{size}, as the piece says")
+                refuse(where, f"{came} bytes", f"{size}, according to the piece")
             return raw[h:]
         blocks, block, last = np.frombuffer(source.take(0, 3 * h), dtype=self._header).tolist()
         total = blocks * block if last == 0 else (blocks - 1) * block + last
         if total != size or (blocks == 0 and size):
-            refuse(where, f"{total} bytes", f"{size}, as the piece says")
+            refuse(where, f"{total} bytes", f"{size}, according to the piece")
         if blocks * h > source.left or size > _HIGHEST_RATIO * source.left:
             refuse(where, f"{source.left} bytes more", f"{blocks} blocks of {block} bytes")
         head = (3 + blocks) * h
@@ -214,7 +214,7 @@ class _Source:
         try:
             decoded = base64.b64decode(piece, validate=True)
         except (binascii.Error, ValueError):
-            refuse(self._where, "what is no base64 text", "binary data in base64")
+            refuse(self._where, "data that are not base64", "binary data in base64")
         if len(decoded) < size:
             refuse(self._where, f"{len(decoded)} bytes", f"{size}")
         return decoded[:size]
