@@ -93,7 +93,7 @@ def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
     assert abs(seat["above_median_m"]) < 3.0 * seat["rebound_height_error_m"]
 
     assert "highest rebound" in out
-    assert "over scatter" in out
+    assert "in std. dev." in out
     assert "opening stop #1" in out
     assert f"Excellent agreement of 'wet' with {STROKES} measured strokes" in out
     assert "Rule: the agreement is excellent if" in out
@@ -140,7 +140,7 @@ def test_one_stroke_has_no_scatter(result, tmp_path):
 
     assert found["strokes"] == 1
     assert "times the reading error" in found["verdict"]
-    assert "one stroke cannot tell" in found["verdict"]
+    assert "does not show the scatter of strokes" in found["verdict"]
     for impact in found["impacts"]:
         assert impact["time_scatter_s"] is None
         expected = impact["time_difference_s"] / impact["time_reading_error_s"]

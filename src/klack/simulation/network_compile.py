@@ -146,7 +146,7 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
 
 
 class _Books:
-    """Collects the entries of the ledger."""
+    """Collects the entries of the energy balance."""
 
     def __init__(self) -> None:
         self.kinds: list[int] = []

@@ -8,11 +8,11 @@ One step of length ``h`` (or ``M h`` while nothing touches):
    again, until no port moves by more than a small share of the way in the step.  Elements and
    fluid live on the displacements that they saw last, so what is left of that change costs energy
    in second order: the change of their forces times it, a small share of the work of the step.
-3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
+3. States, masses, waves and energies are updated; the forces stay pending for the next pass over
    the modes.
 
 A coarse step is tried when all interfaces are far apart or at rest; if it ends in a contact, in a
-release or in a noticeable film, it is thrown away and done again in fine steps.
+release or in a noticeable film, it is discarded and repeated in fine steps.
 """
 
 from typing import Any

@@ -23,7 +23,7 @@ __all__ = ["energy_books", "energy_stores", "reset_books"]
 
 
 def reset_books(network: CompiledNetwork) -> None:
-    """Begin new books: all supplies and losses are zero, works what elements have still to see."""
+    """Start a new energy balance: supplies and losses are zero, works those still to come."""
     nodes, interfaces = network.nodes, network.interfaces
     work = network.bodies.at[WORK : WORK + PORTS]
     accounts = (network.books, network.line_books, work, nodes.numeric)
@@ -81,7 +81,7 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
 
 
 def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
-    """Books from the moment of ``before`` until now.
+    """Energy balance from the moment of ``before`` until now.
 
     The damping of modes is what is missing in the balance of its body.
     """

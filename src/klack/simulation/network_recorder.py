@@ -168,7 +168,7 @@ class Recorder:
         self._begun = True
 
     def last(self, records: int) -> Vector:
-        """Return the values with which a run that goes on begins: see :meth:`first`."""
+        """Return the first values of a continued run: see :meth:`first`."""
         return np.concatenate([self._means[:, records], self._peaks[:, records]])
 
     def take(self, time: Vector, finder: ImpactFinder) -> None:
@@ -216,7 +216,7 @@ class Recorder:
         return result
 
     def first_not_finite(self, count: int) -> tuple[int, str] | None:
-        """First look of a chunk of ``count`` with a number that is none, and the channel's name."""
+        """First sample of a chunk of ``count`` that is not finite, and the channel's name."""
         found: tuple[int, str] | None = None
         recording = self.recording
         for columns, values in (
@@ -258,7 +258,7 @@ def _require_memory(records: int, columns: int) -> None:
         "record",
         8.0 * (records + 1) * columns,
         what=f"{records} records of {columns} channels",
-        hint="take a longer record, or a shorter duration.",
+        hint="use a longer record interval, or a shorter duration.",
     )
 
 

@@ -1,4 +1,4 @@
-"""What a run of a network leaves behind: channels, impacts, books, and the state to go on from."""
+"""Result of a network run: channels, impacts, energy balance, and the state to continue from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -151,7 +151,7 @@ class EnergyBooks:
           passes its energy on twice in every period, but after whole periods its stores are as
           they were, and the throughput is zero.
         - Hence what the bodies held at the start or at the end, kinetic and strain: they move, so
-          it is turned over.  The ledger of an impact counts in the same way.
+          it is turned over.  The energy balance of an impact counts in the same way.
         - A thousandth of all that is stored: a valve at rest turns no energy over, but the
           round-off of what it stores is left.
         """
@@ -215,12 +215,12 @@ class NetworkResult:
     wall_time : float [s]
         Of the time loop.
     state : mapping of str to array
-        Everything needed to go on: the run continues to the same bits.  An impact that is not over
-        is reported again, whole, by the run that goes on, with the same stop and time.
+        Everything needed to continue: the continued run is bit-identical.  An impact that is not
+        over is reported again, whole, by the continued run, with the same stop and time.
     failure : str
         Why the run ended before its time, all else is the record up to there; empty if it did not.
     start : StaticStart or None
-        The equilibrium from which it began; None for a run that goes on or began free.
+        The equilibrium from which it began; None for a continued or free start.
     """
 
     time: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Run a network: static start, time loop, channels, impacts, energy balance."""
+"""Run a network: static equilibrium, time loop, channels, impacts, energy balance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -82,14 +82,14 @@ def simulate_network(
         Fine steps of a coarse step, taken while nothing touches; 1 switches them off.
     record : float [s]
         Spacing of the records; rounded to whole coarse steps.  Impacts do not depend on it: they
-        are found while the run goes on, at most 1.5 us (or a coarse step) apart.  The memory of a
+        are found during the run, at most 1.5 us (or a coarse step) apart.  The memory of a
         run is that of its records, eight bytes per channel, and 50 MB.
     start : "rest" or "free"
         ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
         ``"free"``: undeformed, with the speeds of their rows.
     state : mapping of str to array, optional
-        :attr:`NetworkResult.state` of a former run of the same network and steps, to go on from;
-        ``start`` then has no meaning, time goes on, and the books count from there.
+        :attr:`NetworkResult.state` of a former run of the same network and steps, to continue from;
+        ``start`` then has no meaning, time continues, and the energy balance starts there.
     progress : callable
         Told the fraction done.
 
@@ -416,20 +416,20 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         words = failed.failures.get(code, f"status {code} of its step function")
         return ConvergenceError(
             f"{failed.component}: {words}, {when}.\nState: {_numbers(values)}.\n"
-            "Try: a smaller step, and look whether its parameters and start values make sense."
+            "Try: a smaller step, and check its parameters and start values."
         )
     if status == STATUS_PRESSURES:
         handle = network.node_order[row]
         name = network.rows.nodes[handle].component
         return ConvergenceError(
-            f"{name}: the pressures did not settle {when}.\n"
+            f"{name}: the pressures did not converge {when}.\n"
             f"State: {_numbers(network.nodes.p)} Pa.\n"
-            "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
+            "Try: a smaller step; a volume that stays above 0 (V_0 + A y); some "
             "entrained gas."
         )
     return ConvergenceError(
-        f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
-        f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
+        f"the forces at the ports did not converge {when} (ports still move by {report[0]:.2g} "
+        f"m).\nState: interface gaps {_numbers(network.interfaces.gap)} m.\n"
         "Try: a smaller step; look for a stiffness far above 1e10 N/m."
     )
 
@@ -437,7 +437,7 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
 def _not_a_number(name: str, time: float) -> ConvergenceError:
     return ConvergenceError(
         f"{name}: not a finite number at {format_si(time, 's', 8)}.\n"
-        "Try: look whether the parameters of this component make sense; a smaller step."
+        "Try: check the parameters of this component; a smaller step."
     )
 
 
@@ -567,6 +567,6 @@ def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -
                 f"state: {key}",
                 got=came,
                 expected=f"shape {target.shape}",
-                hint="go on with the same network, step and coarse that the state was made with.",
+                hint="continue with the same network, step and coarse as those of the state.",
             )
         target[...] = state[key]

@@ -1,4 +1,4 @@
-r"""The static start: the equilibrium of bodies, pressures and flows at time zero.
+r"""Static equilibrium of bodies, pressures and flows at time zero.
 
 Unknown are the rigid coordinates :math:`z` of the bodies, the displacements :math:`y` of their
 ports, the pressures :math:`p` that the case does not state, and the flows :math:`\dot m` of
@@ -100,7 +100,7 @@ class _RunawayError(Exception):
 
 
 def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
-    """Find the static start and put the network there, in place.
+    """Find the static equilibrium and put the network there, in place.
 
     Bodies with a speed at the start do not rest: they stay where they are.  Volumes with a stated
     pressure keep it; where nothing flows in or out, so do those without, at ambient pressure.
@@ -548,8 +548,8 @@ class _Balance:
             raise errors.pop(0)
         words = failed.failures.get(status, f"status {status} of its step function")
         return ConvergenceError(
-            f"static start: {failed.component}: {words}.\n"
-            "Try: look whether its parameters and start values make sense."
+            f"static equilibrium: {failed.component}: {words}.\n"
+            "Try: check its parameters and start values."
         )
 
     def left_on_bodies(self) -> dict[str, float]:
@@ -572,11 +572,11 @@ class _Balance:
         name = max(left, key=lambda key: abs(left[key])) if left else "the network"
         force = format_si(abs(left.get(name, 0.0)), "N", 3)
         return ConvergenceError(
-            f"static start: no equilibrium was found; {force} are left on '{name}' at a "
+            f"static equilibrium not found: {force} remain on '{name}' at a "
             f"displacement of {format_si(float(np.max(np.abs(state.y))), 'm', 3)}.\n"
-            "Try: look for a body that nothing holds in the direction of its force, a magnet that "
-            "is stronger than what holds against it, or a gap outside its map; in Python, "
-            "start='free' leaves the static start out."
+            "Try: check for an unsupported body, a magnet stronger "
+            "than its counterforce, or a gap outside its map; in Python, "
+            "start='free' skips the equilibrium."
         )
 
     def put(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
@@ -601,10 +601,10 @@ class _Balance:
             way = row.gap + Travel.of(rows).highest(factors)[0]
             if depth > _DEEP * way > 0.0:
                 raise InputError(
-                    f"static start: components.{row.component}",
+                    f"static equilibrium: components.{row.component}",
                     got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
-                    expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, all that the "
-                    "stops let them move apart",
+                    expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, the whole "
+                    "clearance between the stops",
                     hint="check the stiffness of the stop and the forces at time zero, with their "
                     "units.",
                 )
@@ -710,8 +710,8 @@ class _Balance:
             column = self.by_pressure[first + i, j] != 0.0 or bool(np.any(self.ends == i))
             if not column and not self.given[i]:
                 told.append(
-                    f"'{names[i]}' is closed at the start: it begins at ambient pressure; "
-                    "state its 'pressure' if it holds another."
+                    f"'{names[i]}' is closed at the start: it starts at ambient "
+                    "pressure; give its 'pressure' if that differs."
                 )
         return tuple(told)
 
@@ -742,30 +742,30 @@ def _contact(kind: int, law: Vector, first: int, series: float, gap: float) -> t
 def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
     names = [f"'{network.rows.bodies[b].component}'" for b in bodies]
     return InputError(
-        "static start",
-        got=f"{' and '.join(names)}, which nothing holds against the forces at time zero",
+        "static equilibrium",
+        got=f"{' and '.join(names)}, unsupported against the forces at time zero",
         expected="a spring, a stop or enclosed fluid in the direction of the force",
-        hint="look at the signs of preloads and forces (positive opens; the preload of a spring "
-        "closes), add a stop, let the force begin later, or give the body a 'speed': then it "
-        "starts in flight.",
+        hint="check the signs of preloads and forces (positive opens; the preload of a "
+        "spring closes), add a stop, let the force start later, or give the body a 'speed': then "
+        "it starts in flight.",
     )
 
 
 def _out_of_range(limit: LimitRow, value: float) -> ConvergenceError:
     return ConvergenceError(
-        f"static start: {limit.component}: no equilibrium was found with a {limit.quantity} in the "
+        f"static equilibrium: {limit.component}: none found with a {limit.quantity} in the "
         f"range of {limit.law}, {range_text(limit)}; the forces at time zero lead to "
         f"{value_text(value, limit.unit)} and beyond.\n"
-        f"Try: {limit.advice} Or look for a magnet that is stronger at the start than the stop "
-        "that holds it."
+        f"Try: {limit.advice} Or check for a magnet that is stronger at the start than the "
+        "stop that supports it."
     )
 
 
 def _no_pressure(network: CompiledNetwork, node: int) -> str:
     name = network.rows.nodes[network.node_order[node]].component
     return (
-        f"'{name}' has no steady pressure: what flows there at time zero cannot flow on. It starts "
-        "at ambient pressure; state its 'pressure' if it holds another."
+        f"'{name}' has no steady pressure: the flow into it at time zero has no outlet. It "
+        "starts at ambient pressure; give its 'pressure' if that differs."
     )
 
 
@@ -773,7 +773,7 @@ def _emptied(network: CompiledNetwork, node: int, volume: float) -> InputError:
     name = network.rows.nodes[network.node_order[node]].component
     return InputError(
         f"components.{name}.volume",
-        got=f"{format_si(volume, 'm^3', 3)} with its walls where they start",
+        got=f"{format_si(volume, 'm^3', 3)} with its walls at their start positions",
         expected="more than 0 m^3",
-        hint="enlarge it: it is the volume while all faces are at displacement 0.",
+        hint="enlarge it: it is the volume with all faces at displacement 0.",
     )

@@ -45,7 +45,7 @@ def _written(now: object, value: float, unit: str) -> str:
 def advice_yaml(tree: CaseTree, advice: Advice) -> str:
     """Sections of the case with the advice in them: whole meshes and modes, single other keys.
 
-    Laid over the case, key by key, they give the advised case.  Empty if nothing changes.
+    Merged into the case, key by key, they give the advised case.  Empty if nothing changes.
     """
     safe = YAML(typ="safe")
     data: Any = {}

@@ -33,7 +33,7 @@ __all__ = [
     "verdict",
 ]
 
-CURVE_COLUMNS = ("over the whole record", "difference, rms", "scatter, rms", "over scatter")
+CURVE_COLUMNS = ("over the whole record", "difference, rms", "scatter, rms", "in std. dev.")
 IMPACT_COLUMNS = (
     "impact",
     "number",
@@ -43,7 +43,7 @@ IMPACT_COLUMNS = (
     "reading error",
     "strokes",
     "difference",
-    "over scatter",
+    "in std. dev.",
 )
 
 RULE = (
@@ -107,15 +107,15 @@ def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
     strokes = f"{variant.count} measured stroke{'s' if variant.count != 1 else ''}"
     if found == "unknown":
         return (
-            f"'{variant.variant}' beside {strokes}: no scatter, no impact to compare; look at the "
+            f"'{variant.variant}' against {strokes}: no scatter, no impact to compare; see the "
             "curves."
         )
-    width = "the scatter" if variant.count > 1 else "the reading error"
+    width = "standard deviations" if variant.count > 1 else "times the reading error"
     called = {"excellent": "Excellent agreement", "fair": "Fair agreement", "none": "No agreement"}
     return (
         f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference that "
-        f"counts is {worst:.1f} times {width}, in the {words}."
-        + ("" if variant.count > 1 else " What strokes scatter, one stroke cannot tell.")
+        f"counts is {worst:.1f} {width}, in the {words}."
+        + ("" if variant.count > 1 else " One stroke does not show the scatter of strokes.")
     )
 
 

@@ -1,1 +1,1 @@
-"""What is heard of an impact or a stroke."""
+"""Sound of an impact or a stroke."""

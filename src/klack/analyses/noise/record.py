@@ -160,7 +160,7 @@ class BodyNoise:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClickSound:
-    """What is heard of one stroke, an estimate.
+    """Estimated sound of one stroke.
 
     Parameters
     ----------
