@@ -78,7 +78,7 @@ def test_given_meshes_are_left_alone_and_said_to_be(tmp_path, capsys):
     assert told["meshes_given"] == ["plunger", "ring"]
     assert {item["kind"] for item in told["settings"]} == {"modes", "step"}
     assert all(not key.startswith("bodies.") for key in told["changes"])
-    assert "Modes and step alone can be advised here." in said
+    assert "Only modes and step can be advised here." in said
     assert "sum, without the mesh of plunger, ring" in said
     assert "Meshes of 'plunger' and 'ring' are given" in said
     assert "half widths long: fine enough." in said

@@ -390,7 +390,7 @@ def test_an_armature_rests_before_its_pole_and_not_beyond():
 
 @pytest.mark.slow
 def test_a_magnet_that_is_stronger_than_its_stop_is_named():
-    said = r"static start: coil: no equilibrium was found with a gap in the range of the magnet of"
+    said = r"static equilibrium: coil: none found with a gap in the range of the magnet of"
     with pytest.raises(ConvergenceError, match=said):
         pulled_onto_a_stop(1e7)
 

@@ -50,6 +50,6 @@ def advise_case(
                 option,
                 got=f"{value} for the case of a whole valve",
                 expected="no such option: a stroke is judged by its first impacts",
-                hint="take it for a case of two bodies, e.g. klack advise demo-valve-axisymmetric.",
+                hint="use it for a case of two bodies, e.g. klack advise demo-valve-axisymmetric.",
             )
     return advise_stroke(case, error=error, confirm=confirm, progress=progress, threads=threads)

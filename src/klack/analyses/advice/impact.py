@@ -236,9 +236,10 @@ def _require_surfaces(case: Case) -> None:
             f"{case.path or 'case'}: bodies.{names[0]}",
             got="a body without surfaces (a reduced model, or nodes alone)",
             expected="two bodies with meshed surfaces",
-            hint="such a body brings its mesh error and its missing modes along, and nothing here "
-            "can measure them: compare klack impact of two such models, one from a finer mesh and "
-            "with more modes; for the step run the case again with half of run.reduced_step.",
+            hint="such a body has a mesh error and missing modes that "
+            "cannot be measured here: compare klack impact of two such models, one from a finer "
+            "mesh and with more modes; for the step run the case again with half of "
+            "run.reduced_step.",
         )
 
 
@@ -282,9 +283,9 @@ def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
     if not np.isfinite(measures.restitution):
         raise InputError(
             f"{base.case.path or 'case'}: run.duration",
-            got=f"{format_si(base.case.run.duration, 's')}, and the bodies do not part before",
-            expected="a time that holds the impact and the rebound",
-            hint="enlarge run.duration until klack impact prints a restitution.",
+            got=f"{format_si(base.case.run.duration, 's')}, and the bodies do not separate before",
+            expected="a time that covers the impact and the rebound",
+            hint="increase run.duration until klack impact prints a restitution.",
         )
     if measures.sub_contacts > 1:
         raise InputError(
@@ -292,8 +293,8 @@ def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
             got=f"an impact of {measures.sub_contacts} contacts: the force rings on the modes",
             expected="one contact, whose peak and history converge",
             hint="where faces meet all at once, only impulse, restitution and the plateau of the "
-            "full order converge: compare klack impact --level full on two meshes; where they do "
-            "not, take correction: consistent, or --level interface.",
+            "full order converge: compare klack impact --level full on two meshes; where they "
+            "do not, use correction: consistent, or --level interface.",
         )
 
 
@@ -359,7 +360,7 @@ def _modes_and_step(
             Fixed(
                 name="one pressure pattern",
                 errors=impact_errors(points, histories[-1], judged),
-                remedy="klack impact --level interface, which resolves the contact point by point",
+                remedy="klack impact --level interface, which has a point-resolved contact",
             )
         )
     progress("modes and steps", 1.0)

@@ -143,7 +143,7 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
     if meshes:
         notes.append(
             f"{_mesh_of(meshes)} given: klack cannot refine a finished mesh, so its error is not "
-            "in the sums, and modes and step alone are advised there. Try: export a second mesh "
+            "in the sums, and only modes and step are advised there. Try: export a second mesh "
             "of half the element size and compare both runs."
         )
         if not isnan(size_ratio):
@@ -159,8 +159,8 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
         )
     if reduced:
         notes.append(
-            f"Reduced models ({_names(reduced)}): neither their meshes nor the modes that they "
-            "left out can be measured here. Try: ask their source for a second one, reduced from a "
+            f"Reduced models ({_names(reduced)}): neither their meshes nor their omitted "
+            "modes can be measured here. Try: get a second one from their source, reduced from a "
             "finer mesh with more modes, and compare both runs."
         )
     return notes

@@ -130,7 +130,7 @@ def advise_stroke(
             f"{case.path or 'case'}: run.duration",
             got="no impact within it",
             expected="a run that reaches a stop",
-            hint="look at the lift with klack stroke, and enlarge run.duration.",
+            hint="check the lift with klack stroke, and increase run.duration.",
         )
     case = _shortened(case, now)
     with collected_warnings():

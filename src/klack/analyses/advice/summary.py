@@ -116,8 +116,8 @@ def _verdict(advice: Advice) -> str:
         return _verdict_of_sums(advice)
     meshes = "a mesh that was given" if len(advice.unmeshed) == 1 else "meshes that were given"
     whole = any(item.measured.setting.group == "mesh" for item in advice.counsels)
-    what = "" if whole else "Modes and step alone can be advised here. "
-    return f"{what}But for the error of {meshes}: {_lowered(_verdict_of_sums(advice))}"
+    what = "" if whole else "Only modes and step can be advised here. "
+    return f"{what}Apart from the error of {meshes}: {_lowered(_verdict_of_sums(advice))}"
 
 
 def _lowered(text: str) -> str:
@@ -127,12 +127,12 @@ def _lowered(text: str) -> str:
 def _verdict_of_sums(advice: Advice) -> str:
     if advice.is_good:
         text = "The case meets the target as it is"
-        return f"{text}; the advice makes it cheaper." if advice.changes else f"{text}: keep it."
+        return f"{text}; the advice reduces its cost." if advice.changes else f"{text}: keep it."
     if advice.meets:
         return "The case is expected to miss the target, and the advised one to meet it."
     return (
-        "By the sum of expected errors the target is not reached: the advice goes as far as runs "
-        "can be extrapolated and larger models be afforded."
+        "By the sum of expected errors the target is not reached: the advice is limited "
+        "by extrapolation and by the size of the models."
         + _narrower(advice)
         + (" Run again, the advised case is within it." if _within(advice) else "")
     )
@@ -185,8 +185,8 @@ def _reaches(advice: Advice) -> list[str]:
             )
         if not item.reached and item.measured.ladder.scattered:
             lines.append(
-                f"Note: '{name}' scatters by more than its share of the target: refining it "
-                "changes no less than it did before, so nothing finer is advised."
+                f"Note: '{name}' scatters by more than its share of the target: refining "
+                "it does not reduce the changes, so nothing finer is advised."
             )
         elif not item.reached:
             lines.append(
@@ -202,8 +202,8 @@ def _reaches(advice: Advice) -> list[str]:
         limits = np.array([measure.limit for measure in advice.measures])
         if np.max(fixed.errors / limits) > 0.5:
             lines.append(
-                f"Note: '{fixed.name}' takes more than half of the target, and no setting changes "
-                f"it. Try: {fixed.remedy}."
+                f"Note: '{fixed.name}' uses more than half of the target, and no "
+                f"setting changes it. Try: {fixed.remedy}."
             )
     return lines
 

@@ -33,7 +33,7 @@ def calibration_content(study: CalibrationStudy) -> Content:
         ),
         _correlations(study),
         _profiles(study),
-        Section(title="What was fitted to what", tables=(_key_table(study), _fact_table(study))),
+        Section(title="Input", tables=(_key_table(study), _fact_table(study))),
     ]
     return page_of(
         study,
@@ -58,7 +58,7 @@ def _answer(study: CalibrationStudy) -> str:
         "with the values of the case)"
     )
     judged = "no more than" if study.misfit <= 1.5 else f"{study.misfit:.1f} times"
-    text += f", {judged} what the scatter of the strokes and their noise allow."
+    text += f", {judged} the value expected from the scatter of the strokes and their noise."
     if study.warnings:
         text += " Read the notes below before you use the numbers."
     return text
@@ -166,7 +166,7 @@ def _fact_table(study: CalibrationStudy) -> Table:
 
 
 def _correlations(study: CalibrationStudy) -> Section:
-    title = "Which parameters the data tell apart"
+    title = "Correlation of the parameters"
     if len(study.parameters) < 2:
         return Section(title=title)
     figure = correlation_figure(
@@ -175,9 +175,9 @@ def _correlations(study: CalibrationStudy) -> Section:
             ("of the estimates, from the scatter of the strokes", study.correlation),
             ("of the sensitivities alone", study.design_correlation),
         ),
-        "Near +1 or −1 two parameters do the same to the data. Left: of the values found, as the "
-        "strokes scatter. Right: what the measured windows can tell apart in principle, if all "
-        "samples scattered independently.",
+        "Near +1 or −1 two parameters have the same effect on the data. Left: of the fitted "
+        "values, from the scatter of the strokes. Right: separable in principle from the measured "
+        "windows, if all samples scattered independently.",
     )
     return Section(title=title, picture=figure)
 
@@ -202,52 +202,53 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "standard error",
-        "Of the mean of all strokes. Every stroke alone asks for its own value (one Gauss-Newton "
-        "step); the standard error is the standard deviation of these over the root of their "
-        "number. Residuals of one stroke move together, so samples are not counted as independent.",
+        "Of the mean of all strokes. Every stroke alone has its own value (one "
+        "Gauss-Newton step); the standard error is the standard deviation of these over the root "
+        "of their number. Residuals of one stroke are correlated, so samples are not counted as "
+        "independent.",
     ),
     (
         "95 % interval",
         "Value plus and minus the standard error times Student's quantile for one degree of "
         "freedom less than strokes. 'Profile' is the interval of the profile likelihood, which "
-        "does not take the model for linear.",
+        "does not assume a linear model.",
     ),
     (
         "scatter of strokes",
-        "Standard deviation of what the single strokes ask for. It holds the true scatter of the "
-        "valve and the noise of one record.",
+        "Standard deviation of the values of single strokes. It includes the true scatter "
+        "of the valve and the noise of one record.",
     ),
     (
         "misfit",
         "Weighted root mean square residual of the mean stroke in standard errors of the mean: "
-        "about 1 or less if only scatter is left; far above, something in the model is wrong.",
+        "about 1 or less if only scatter remains; far above, something in the model is wrong.",
     ),
     (
         "first impact",
-        "Where the fitted approach meets the level of the stop, read off the mean measured stroke "
-        "and the computed ones in the same way.",
+        "Time at which the fitted approach reaches the level of the stop, read off the mean "
+        "measured stroke and the computed ones in the same way.",
     ),
     (
         "windows",
         "Free flights and first impacts, up to the impact after the last one that is fitted. "
-        "Samples count with the inverse variance between strokes.",
+        "Samples are weighted with the inverse variance between strokes.",
     ),
 )
 
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "model",
-        "The errors are those of the strokes. What the model leaves out moves the parameters that "
-        "are fitted, and no interval tells: look at the residual over time.",
+        "The errors are those of the strokes. Effects missing in the model shift the fitted "
+        "parameters, which no interval shows: check the residual over time.",
     ),
     (
         "sensor",
-        "A wrong calibration or bandwidth of the sensor is taken for the valve, unless its numbers "
-        "are among the parameters.",
+        "A wrong calibration or bandwidth of the sensor is attributed to the valve, unless its "
+        "values are among the parameters.",
     ),
     (
         "trigger",
         "Jitter of the trigger counts as scatter of the strokes; a constant delay of the recorder "
-        "between channels does not show and moves the result.",
+        "between channels is not visible and shifts the result.",
     ),
 )

@@ -35,7 +35,7 @@ def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
         title=f"{channel.role.capitalize()}, measured and computed",
         span=(float(study.time[0]), float(study.time[-1])),
         note=(
-            "Shaded: what was fitted. Outside, bounces magnify the differences between strokes. "
+            "Shaded: fitted range. Outside, bounces magnify the differences between strokes. "
             "Below: mean of the measured strokes less computed."
         ),
     )
@@ -54,7 +54,7 @@ def window_chart(study: CalibrationStudy, channel: FittedChannel, window: FitWin
         name=f"window-{channel.role}-{window.what.split(',')[0]}",
         title=f"{channel.role.capitalize()}, {window.what.split(',')[0]}",
         span=(max(first - 0.15 * length, window.first), window.last + 0.03 * length),
-        note="The same from near.",
+        note="The same, enlarged.",
     )
 
 

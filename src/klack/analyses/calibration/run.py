@@ -192,7 +192,7 @@ def _require_written(tree: CaseTree, parameters: Sequence[FreeParameter]) -> Non
                 value = place.written(place.value)
                 raise InputError(
                     f"{tree.path}:{line}: {place}",
-                    got="nothing in the file (the default holds)",
+                    got="nothing in the file (the default applies)",
                     expected=f"the start value of the parameter '{parameter.name}'",
                     hint=f"write '{place.key[-1]}: {value}' there.",
                 )
@@ -358,8 +358,8 @@ def _repeatable(
         return windows, ()
     return (opening,), (
         f"The needle still bounces on the opening stop {1e3 * last:.3g} ms after the trigger, "
-        f"shortly before it closes: bounces too low to be measured decide when that is, so only "
-        "the opening was fitted. Try: a longer stroke, or the wet valve.",
+        f"shortly before it closes: bounces too low to be measured determine that time, "
+        "so only the opening was fitted. Try: a longer stroke, or the wet valve.",
     )
 
 
@@ -537,24 +537,25 @@ def _doubts(
     notes = []
     if not fit.converged:
         notes.append(
-            f"The search stopped after {fit.iterations} iterations before it had settled. "
+            f"The search stopped after {fit.iterations} iterations before convergence. "
             "Try: closer bounds, or fewer parameters."
         )
     if misfit > _POOR:
         notes.append(
-            f"The model does not explain the strokes: what is left is {misfit:.1f} times what "
-            "their scatter allows, so the intervals are too narrow. Look at the residual over "
-            "time; something that is not among the parameters is wrong."
+            f"The model does not explain the strokes: the residual is {misfit:.1f} times what "
+            "their scatter allows, so the intervals are too narrow. Check the residual "
+            "over time; something other than the parameters is wrong."
         )
     if count == 1:
         notes.append(
-            "A single stroke shows its noise but no scatter from stroke to stroke: the true "
+            "A single stroke shows noise but no scatter between strokes: the true "
             "uncertainty is larger than the intervals. Measure ten strokes or more."
         )
     elif count < _FEW or count < parameters + 2:
         notes.append(
-            f"{count} strokes tell the scatter of {parameters} parameters roughly: the single "
-            "errors hold (with Student's t), the correlations do not. Measure ten strokes or more."
+            f"{count} strokes give the scatter of {parameters} parameters roughly: the single "
+            "errors are valid (with Student's t), the correlations are not. Measure ten strokes "
+            "or more."
         )
     for impact in impacts:
         inside = [w for w in windows if w.first <= impact.measured <= w.last]

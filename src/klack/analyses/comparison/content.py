@@ -83,7 +83,7 @@ def measured_shots_content(study: MeasuredShotsStudy) -> Content:
         tables.append(Table(columns=("discarded", "why"), rows=aside))
     return page_of(
         study,
-        "Shots beside measured drops",
+        "Shots against measured drops",
         answer=f"{drop_verdict(study)} {bias_sentence(study)} {drop_rule(study)}",
         numbers=Table(columns=DROP_COLUMNS, rows=drop_rows(study)),
         sections=(
@@ -206,7 +206,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "scatter",
         "Of a number: standard deviation from stroke to stroke. Of a curve: root mean square of "
-        "the single strokes about their median, over all times; the noise of the sensor is in it. "
+        "the single strokes about their median, over all times, including the noise of the sensor. "
         "Of a single stroke: the reading error.",
     ),
     (
@@ -217,10 +217,10 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "time, approach speed, restitution",
-        "From smooth flights fitted to the lift before and after an impact, carried on to the "
-        "level at which the needle rests on the stop; read off the computed lift in the same way, "
-        "with as much noise on it as the measured one has (median of some readings). "
-        "They are not those of the centre of mass that a table of klack stroke gives: vibration of "
+        "From smooth flights fitted to the lift before and after an impact, extrapolated to "
+        "the rest level of the needle on the stop; read off the computed lift in the same "
+        "way, with the same noise as the measured one (median of some readings). "
+        "They are not those of the centre of mass in a table of klack stroke: vibration of "
         "the needle, squeeze films and the level of rest make a difference.",
     ),
     (
@@ -232,9 +232,9 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "Scatter",
-        "A good bench has little scatter, and then a small difference counts much. A difference "
-        "over the scatter says whether a single stroke could be told from the model, not whether "
-        "the model is good enough for a purpose.",
+        "A good test rig has little scatter, so small differences weigh much. A difference "
+        "in standard deviations shows whether a single stroke can be distinguished from the "
+        "model, not whether the model is good enough for a purpose.",
     ),
     (
         "Late bounces",
@@ -248,15 +248,15 @@ _DROP_DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "highest rebound",
         "Rebounds of dry drops scatter, and the highest of many is usually taken for that of a "
-        "centred impact. The highest of more drops is higher: 'mean highest' is what the highest "
-        "of as many computed shots as were measured has on average, and its bias is that minus "
-        "the centred shot.",
+        "centred impact. The more drops, the higher the highest: 'mean highest' is what the "
+        "highest of as many computed shots as were measured has on average, and its bias is that "
+        "minus the centred shot.",
     ),
     (
         "restitution, rebound height",
         "From smooth flights fitted to the height before and after the first impact, computed and "
-        "measured alike. The restitution of klack shots is another number: it holds at the end of "
-        "the impact, before friction in the guide takes its share of the rebound.",
+        "measured alike. The restitution of klack shots differs: it is that at the "
+        "end of the impact, before friction in the guide reduces the rebound.",
     ),
     (
         "reading error",

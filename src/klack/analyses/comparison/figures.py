@@ -112,7 +112,7 @@ def side_by_side_chart(variants: Sequence[ComparedVariant]) -> Chart:
     high = max(_moving(variant)[1] for variant in variants)
     return Chart(
         name="side-by-side",
-        title="What the fluid does, computed and measured",
+        title="Effect of the fluid, computed and measured",
         x=AxisSpec(label="time from the trigger", unit="ms", range=(low, high)),
         panels=tuple(panels),
         note="; ".join(f"{v.variant}: {v.label}, {v.count} measured strokes" for v in variants)
@@ -289,7 +289,7 @@ def drops_chart(study: MeasuredShotsStudy) -> Chart:
             Panel(y=AxisSpec(label="height", unit="µm"), curves=tuple(curves), marks=(_ZERO,)),
         ),
         note=(
-            "Computed: centre of mass, without a sensor. Measured: as the sensor shows it. At most "
+            "Computed: centre of mass, without a sensor. Measured: sensor signal. At most "
             f"{_MOST} shots of each."
         ),
     )

@@ -149,16 +149,16 @@ def _first_impacts(
             names.append(drop.name)
             impacts.append(hit)
         else:
-            why = "; ".join(measures.notes) or "no impact with a whole rebound"
+            why = "; ".join(measures.notes) or "no impact with a complete rebound"
             unread.append(Rejection(name=drop.name, reason=why))
     if len(impacts) < _FEWEST:
         raise InputError(
             f"measurement {drops.source}",
-            got=f"{len(impacts)} of {drops.count} drops with an impact and a whole rebound"
+            got=f"{len(impacts)} of {drops.count} drops with an impact and a complete rebound"
             + (f" ({unread[0].name}: {unread[0].reason})" if unread else ""),
             expected=f"at least {_FEWEST}",
-            hint="with 'measurement: {zero: none}' the lift counts from first touch; else the "
-            "needle has to come to rest on its seat in the record.",
+            hint="with 'measurement: {zero: none}' the lift is measured from first touch; "
+            "otherwise the needle must come to rest on its seat in the record.",
         )
     return tuple(names), tuple(impacts), tuple(unread)
 

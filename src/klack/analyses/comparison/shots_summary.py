@@ -44,7 +44,7 @@ def drop_verdict(study: MeasuredShotsStudy) -> str:
     if not apart:
         return f"The distributions of the computed shots and of {both} agree."
     words = " and ".join(
-        f"the {d.name} (by {100 * d.statistic:.0f} % of the shots where they are farthest apart)"
+        f"the {d.name} (by {100 * d.statistic:.0f} % of the shots at their largest difference)"
         for d in apart
     )
     return f"The distributions of the computed shots and of {both} differ in {words}."

@@ -27,7 +27,7 @@ __all__ = ["ASSUMED_DAMPING", "Surroundings", "body_noise", "port_transfers"]
 Floats = NDArray[np.float64]
 
 ASSUMED_DAMPING = 0.005
-"""Damping ratio of modes that sound, where the case gives none: a loss factor of 1 %."""
+"""Damping ratio of radiating modes, where the case gives none: a loss factor of 1 %."""
 _LOWEST, _HIGHEST = 20.0, 400e3  # [Hz] of mobilities
 _AUDIBLE = 24e3  # [Hz]
 _LINES, _ROUND_A_PEAK = 1200, 40

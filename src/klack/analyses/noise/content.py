@@ -381,19 +381,19 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "unbalanced force",
         "Springs, magnet and fluid push the needle from the housing that it hits; below about one "
-        "over the time of flight they balance the contact forces. What is left is mass times "
-        "acceleration of the needle. Sound and surface motion have this share of every band; "
-        "injected energy, mobility and blocked force have the contact forces alone.",
+        "over the time of flight they balance the contact forces. The rest is mass times "
+        "acceleration of the needle. Sound and surface motion include this share of every "
+        "band; injected energy, mobility and blocked force the contact forces alone.",
     ),
     (
         "structure-borne energy",
         "Work of the contact and film forces on the modes of the rigidly held bodies, ∫ F v dt. "
-        "The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df. What a valve "
-        "as a whole passes on to its mount and plate comes on top.",
+        "The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df. The energy "
+        "that the valve as a whole passes to its mount and plate is additional.",
     ),
     (
         "blocked force",
-        "Axial force of the body on a rigid support. A softer structure takes up less.",
+        "Axial force of the body on a rigid support. A softer structure receives less.",
     ),
     (
         "radiated sound energy",
@@ -402,11 +402,11 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "sound pressure",
         "All radiated power as a monopole in a free field, with minimum phase. Reflections, "
-        "directivity and the travel time are left out.",
+        "directivity and the travel time are neglected.",
     ),
     (
         "peak level, sound exposure level",
-        "Largest pressure re 20 µPa; ∫ p² dt re (20 µPa)² s. Without weighting where none is said.",
+        "Largest pressure re 20 µPa; ∫ p² dt re (20 µPa)² s. Unweighted unless stated.",
     ),
     (
         "loudness, sharpness",

@@ -1,6 +1,6 @@
 """Surfaces of the bodies in the air, coloured by how fast they move in one band.
 
-A body of revolution is shown as its half section: the lines are the surfaces that meet the air.  A
+A body of revolution is shown as its half section: the lines are the radiating surfaces.  A
 solid is shown in parallel projection, seen from the front and above; faces that look away are left
 out.  One row per design, all colours to one scale.
 """
@@ -225,7 +225,7 @@ def _note(designs: list[NoiseDesign], octaves: ThirdOctaves, bands: tuple[int, .
     seen = (
         "Solids are seen from above or from below, where more of the motion is seen."
         if solid
-        else "Half sections, mirrored; the lines are the surfaces that meet the air."
+        else "Half sections, mirrored; the lines are the radiating surfaces."
     )
     return (
         f"Normal velocity of the surfaces in the third octaves {names}: {which}, of the first "

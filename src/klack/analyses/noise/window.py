@@ -53,7 +53,7 @@ def first_part(result: NetworkResult, most: int = _MOST_STEPS) -> tuple[NetworkR
         )
     note = (
         f"Only the first {format_si(end - float(result.time[0]), 's')} of the run of "
-        f"{format_si(whole, 's')} are followed, with {len(events)} of its {len(result.events)} "
+        f"{format_si(whole, 's')} are evaluated, with {len(events)} of its {len(result.events)} "
         "impacts: forces, energies and sound are those of this part. For a later part run "
         "the stroke up to there, continue with klack stroke --continue for some ms, and evaluate "
         "the noise of that."
