@@ -1,6 +1,6 @@
 """Random axisymmetric impacts: ``python benchmarks/random_impacts.py --count 300 --seed 17``.
 
-Each draw is a case that somebody could write: a needle with a spherical, conical, toroidal or flat
+Each draw is a possible case: a needle with a spherical, conical, toroidal or flat
 tip on a conical seat, a rounded edge or a flat one, 0.1 to 20 mm in radius, of steel, ceramic,
 polymer or copper, at 0.01 to 10 m/s, on meshes from coarse to fine.  Each runs at the reduced and
 the interface level on one mesh.  A line of JSON per draw says what came: failures, energy

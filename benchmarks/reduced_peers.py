@@ -3,7 +3,7 @@
 Two rods with 20 + 40 modes fall together (:func:`kernel.two_rods`); the equations for the others
 are written here without klack, from the textbook modes of rods, with a compiled right-hand side.
 Each takes its best method and the loosest tolerance whose state at the end is as exact as klack's
-at 20 ns; the reference is DOP853 at 1e-12.  Nobody is told when the contact closes.  The FMU is
+at 20 ns; the reference is DOP853 at 1e-12.  No program is given the time of contact.  The FMU is
 klack's own export, called by ``fmpy.simulate_fmu`` with outputs every 1 us.  Processor time, one
 thread each.
 """

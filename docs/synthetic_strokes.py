@@ -230,7 +230,7 @@ DROP_RATE, DROP_SPAN = 250e3, 1.1e-3  # [1/s], [s] after first touch
 DROP_BEFORE = 0.24e-3  # [s] of the fall
 DROP_NOISE = 0.2e-6  # [m] rms: a range of some 100 um only
 FINE = 0.2e-6  # [s] for the sensor
-# Scatter of the drops, other than in the case: nobody knows that of a real valve.
+# Scatter of the drops, other than in the case: that of a real valve is unknown.
 DROP_VALUES = {
     "clearance": "4.6 um",
     "force": {"normal": ["6.1 N", "0.1 N"]},

@@ -35,7 +35,8 @@ def try_lock(handle: int | None) -> bool | None:
     -------
     bool or None
         True if this process has the lock, False if another one has it; None on systems and file
-        systems that know no such locks: then nobody is kept out, and nothing is known of others.
+        systems that know no such locks: then no process is kept out, and nothing is known of
+        others.
     """
     try:
         import fcntl
@@ -56,8 +57,8 @@ def try_lock(handle: int | None) -> bool | None:
 def locked(folder: HeldFolder, patience: float = _PATIENCE) -> Iterator[None]:
     """Do something while no other process of this user does so in this folder; wait for it.
 
-    Where a lock cannot be had, since there is none or something of somebody else has its name,
-    nobody is kept out.
+    Where a lock cannot be had, since there is none or its name is taken by another user,
+    no process is kept out.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Files that klack reopens: regular files of the caller, never links, pipes or planted files.
 
 In a folder that others may write to, a name that klack expects may be a symbolic link to a file of
-the caller, a named pipe that waits for ever, or a second name (hard link) of something else.
+the caller, a named pipe that blocks, or a second name (hard link) of something else.
 """
 
 import os

@@ -10,7 +10,7 @@ A stage is a folder of the caller alone (mode 0700) with a random name::
         moves           what they replace, and what goes
         old/            what was replaced, until all is in its place
 
-No archive and no copy can bring a seal that fits its manifest, since nobody chooses the number and
+No archive and no copy can bring a seal that fits its manifest, since no user chooses the number and
 the time of change of a file.  So a stage whose seal fits, of the caller, closed to others, is one
 that a klack of the caller has made in this place.  All others are left alone, and named.
 """
@@ -206,7 +206,7 @@ class Stage(Closing):
     def finish(self) -> None:
         """Bring to its end what a process had made ready that was killed then.
 
-        Nothing moves where somebody has replaced one of the files since.
+        Nothing is moved if one of the files has been replaced since.
         """
         moves = self._read_moves()
         if moves is not None and self.held.has_folder(_READY) and self.held.has_folder(_OLD):

@@ -1,8 +1,8 @@
 """Quantities with units on input: text such as ``80 um`` in, SI numbers inside.
 
 Inside klack every number is SI; only case files and tables meet units.  A number without a unit is
-refused where a unit matters, because a wrong guess there is a factor of a thousand that nobody
-sees.  Units that differ by 2 pi (rad/s and Hz) or are all "without dimension" (deg, rad, %) are
+refused where a unit matters, because a wrong guess there is a factor of a thousand that is never
+noticed.  Units that differ by 2 pi (rad/s and Hz) or are all "without dimension" (deg, rad, %) are
 taken from short tables instead of by dimension, so that one cannot pass for the other.
 """
 

@@ -9,7 +9,7 @@ New files are written into a hidden folder beside their place (:mod:`klack.stage
 
 A process that is killed before step 2 changes nothing.  Killed after it, the next klack of the same
 user that reads or writes the folder brings step 3 to its end first (:func:`completed`), unless
-somebody has replaced the files since.  What stands in the folder is the one truth for all readers:
+the files have been replaced since.  What stands in the folder is the one truth for all readers:
 nothing is ever read from a stage.
 
 Written by hand: packages for atomic writing replace one file; here several that belong together

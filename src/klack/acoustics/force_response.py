@@ -108,7 +108,7 @@ def modal_response(
         Rigidly held, or on a mount (:func:`klack.acoustics.mount.mounted`).
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals whose middles are their times, all on one grid.  The first
-        value has acted for ever.
+        value has always acted.
     sample : float [s], optional
         Spacing of recorded states; none are recorded without.
     """

@@ -54,7 +54,7 @@ class WorkerPool(Closing):
     Each has a connection of its own, of which this process holds one end only: a worker that dies
     is seen at once, also while it starts.  (The pool of the standard library hands what is shared
     to a new process through a pipe of which it holds both ends; where that is more than the pipe
-    takes, 64 kB, and the process is gone, it waits for ever.)
+    takes, 64 kB, and the process is gone, it waits endlessly.)
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ __all__ = ["CacheContent", "ResultCache"]
 
 _NAME = re.compile(r"[0-9a-f]{64}\.entry")
 _UNFINISHED = re.compile(r"new-[^.]*\.entry\.part")
-_FORGOTTEN = 3600.0  # s after which a file that nobody finished is taken away
+_FORGOTTEN = 3600.0  # s after which an unfinished file is deleted
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to delete.\n"
 
 
@@ -80,7 +80,7 @@ class ResultCache:
         try:
             try:
                 self._write(key, entry)
-            except FileNotFoundError:  # somebody deleted the folder just now
+            except FileNotFoundError:  # the folder was deleted just now
                 self._write(key, entry)
             self._own.add(key)
             self._keep_within_limit()

@@ -6,7 +6,7 @@ __all__ = ["printable"]
 def printable(text: str) -> str:
     r"""Text with its signs that steer a terminal made visible: ``\x1b`` for an escape.
 
-    A name in a file of somebody else could otherwise clear the screen or fake an answer.
+    A name in an untrusted file could otherwise clear the screen or fake an answer.
     """
     if text.isprintable():
         return text

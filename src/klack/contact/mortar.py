@@ -590,7 +590,7 @@ def _node_size(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
 def check_initial_gap(space: ContactSpace, expected_approach: float) -> None:
     """Refuse bodies that overlap before the impact.
 
-    A negative initial gap is stored energy that nobody put in.
+    A negative initial gap is spurious stored energy.
 
     Parameters
     ----------

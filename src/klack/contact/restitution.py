@@ -11,7 +11,7 @@ them.
 Times are found inside the records: the impulse gathered since first touch grows like a power ``1
 + n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the
 exponent and the instant of touch.  The same rule, backwards, gives the end.  Where the force
-fades out instead of ending (rods do, in theory for ever), the end is where it crosses the
+fades out instead of ending (rods do, in theory without end), the end is where it crosses the
 threshold: that is the rule when the way from the threshold to zero takes more than half the time
 of the fall from ten times the threshold to the threshold.
 """

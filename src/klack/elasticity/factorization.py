@@ -170,7 +170,7 @@ _BACKENDS: dict[str, tuple[str, str, str]] = {
 def _loadable(name: str) -> bool:
     try:
         return find_spec(_BACKENDS[name][0]) is not None
-    except ValueError:  # sys.modules[name] is None: an import that somebody blocked
+    except ValueError:  # sys.modules[name] is None: a blocked import
         return False
 
 

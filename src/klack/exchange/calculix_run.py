@@ -103,7 +103,7 @@ def run_calculix(
     log = deck.with_suffix(".log")
     environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
     begin = monotonic()
-    with log.open("xb") as stream:  # not through a link that somebody has put there since
+    with log.open("xb") as stream:  # not through a link put there since
         process = subprocess.Popen(
             [program, "-i", deck.stem],
             cwd=deck.parent,

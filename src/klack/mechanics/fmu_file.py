@@ -1,6 +1,6 @@
 """Functional mock-up unit (FMU) as a file: its description and safe unpacking.
 
-The archive is a file of somebody else: no member may leave the folder it is unpacked to, and sizes
+The archive is an untrusted file: no member may leave the folder it is unpacked to, and sizes
 are checked before anything is written.  Its binary, though, is native code that runs with the
 rights of the user: take FMUs only from people that you would take a program from.
 """

@@ -68,7 +68,7 @@ def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> ty
     Raises
     ------
     CaseProblem
-        For an unknown word, or one of somebody's own class that was not let in.
+        For an unknown type, or a user class that was not allowed.
     """
     if word in own:
         return own[word]

@@ -19,7 +19,7 @@ rises with a slope of 1 or more.
 
 ``theta`` is 1/2 (second order, no loss) while the contact is closed.  While it is open, the
 compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
-1/2 would let ``e`` change its sign in every step for ever.  ``theta = 1 - D c / h`` is the smallest
+1/2 would let ``e`` change its sign in every step.  ``theta = 1 - D c / h`` is the smallest
 value that does not; without a film it is 1, and a compression left at release vanishes with its
 energy counted as a loss.
 

@@ -131,7 +131,7 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
     ----------
     bodies : mapping of str to CaseBody
     size_ratio : float [-]
-        Element size across the contact over its half width; nan where nobody knows.
+        Element size across the contact over its half width; nan if unknown.
     """
     names = unmeshed(bodies)
     reduced = [name for name in names if bodies[name].reduced is not None]

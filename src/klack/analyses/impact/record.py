@@ -48,7 +48,7 @@ class ContactSummary:
     size_ratio : float [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
     points_across : int
-        Contact points that carry across the whole width then; 0 where nobody knows.
+        Loaded contact points across the whole width then; 0 if unknown.
     doubts : tuple of str
         Why no error can be judged on these meshes, each in a few words.
     approach, force, area : array, shape (n,) [m], [N], [m^2]

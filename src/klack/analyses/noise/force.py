@@ -40,10 +40,10 @@ def impact_force(history: ImpactHistory) -> TimeSeries:
 
 
 def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) -> ImpactEvent | None:
-    """Impact in which a run ends, if it does: its force would seem to stay for ever.
+    """Impact in which a run ends, if it does: its force would seem to persist.
 
-    A needle that rests on its stop does not accelerate; without damping it may ring there for ever,
-    but has then stayed closed for longer than any impact before.
+    A needle that rests on its stop does not accelerate; without damping it may ring there
+    endlessly, but has then stayed closed for longer than any impact before.
 
     Parameters
     ----------

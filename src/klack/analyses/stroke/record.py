@@ -109,7 +109,7 @@ class StopSummary:
     size_ratio : float [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
     points_across : int
-        Contact points that carry across the whole width then; 0 where nobody knows.
+        Loaded contact points across the whole width then; 0 if unknown.
     doubts : tuple of str
         Why no error of impacts on this stop can be judged, each in a few words.
     """
