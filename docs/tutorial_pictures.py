@@ -1,8 +1,7 @@
 """Make the pictures of the tutorials: ``python docs/tutorial_pictures.py FOLDER``.
 
-``FOLDER`` holds one folder for each tutorial, called after its page, in which the tutorial has
-been followed that page to its end: ``FOLDER/own-step/pin`` and so on.  Pages that are not there
-are left out.
+``FOLDER`` holds one folder for each tutorial, called after its page, in which that page has
+been followed to its end: ``FOLDER/own-step/pin`` and so on.  Pages that are not there are left out.
 """
 
 import json
