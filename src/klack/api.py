@@ -233,7 +233,7 @@ class Result:
         """
         from klack.exchange.results.dataset import dataset_of
 
-        return dataset_of(self.record, run)
+        return dataset_of(self.record, self.analysis.measured(self.record), run)
 
     def __repr__(self) -> str:
         lines = [f"{self.analysis.form.command}: {self.record.title or self.record.case}"]
