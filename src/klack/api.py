@@ -5,6 +5,7 @@ returned it, and returns a :class:`Result`.
 """
 
 import json
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +27,6 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.progress import Progress, silent
-from klack.report.chart import BarChart
 
 __all__ = [
     "CaseOnHand",
@@ -131,6 +131,9 @@ class CaseOnHand:
             raise InputError(
                 where, got=problem.got, expected=problem.expected, hint=problem.hint
             ) from None
+
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.title} ({self.tree.path.name})"
 
     def _repr_html_(self) -> str:
         return (
@@ -252,11 +255,10 @@ class Result:
         charts = [chart for section in content.sections for chart in section.charts]
         figure = ""
         if charts:
-            from klack.report.printed import svg_bars, svg_chart
+            from klack.report.printed import png_chart
 
-            first = charts[0]
-            drawn = svg_bars(first) if isinstance(first, BarChart) else svg_chart(first)
-            figure = drawn.decode()[drawn.decode().index("<svg") :]
+            pixels = b64encode(png_chart(charts[0])).decode()
+            figure = f'<img alt="{escape(charts[0].title)}" src="data:image/png;base64,{pixels}">'
         return (
             f"<b>{escape(content.title)}</b><br>{escape(content.subtitle)}"
             f"<p>{escape(content.answer)}</p>"

@@ -17,7 +17,8 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
     """Variables and coordinates of a design: forces of the stops, bodies, sound of one click.
 
     Over ``band``, the middles of third octaves: energies of force, radiated energy, sound
-    exposure.  Every stop and every sound has a time axis of its own, every stop a frequency axis.
+    exposure.  Forces share the axis ``time`` where they are sampled alike; every stop has a
+    frequency axis of its own.
 
     Parameters
     ----------
@@ -37,10 +38,12 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
         )
     }
 
+    sampled: dict[tuple[float, float, int], str] = {}
+
     def add_series(name: str, series: TimeSeries, meaning: str) -> None:
-        axis = f"{name}_time"
-        about = {"units": "s", "long_name": "time"}
-        coordinates[axis] = Variable((axis,), series.time, about)
+        new = f"{name}_time" if sampled else "time"
+        axis = sampled.setdefault((series.start, series.step, series.values.size), new)
+        coordinates[axis] = Variable((axis,), series.time, {"units": "s", "long_name": "time"})
         variables[name] = Variable(
             (axis,), series.values, {"units": series.unit, "long_name": meaning}
         )
@@ -59,10 +62,7 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
         variables[f"{name}_force_level"] = Variable(
             (axis,),
             stop.level,
-            {
-                "units": "dB",
-                "long_name": f"strongest impact on '{stop.stop}', re 1 uN s",
-            },
+            {"units": "dB", "long_name": f"strongest impact on '{stop.stop}', re 1 uN s"},
         )
     bodies = identifiers([body.name for body in design.bodies], stops)
     for name, body in zip(bodies, design.bodies, strict=True):
