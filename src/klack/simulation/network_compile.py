@@ -29,9 +29,12 @@ from klack.simulation.network_arrays import (
     ROWS_AT,
     STORE,
     SUPPLY,
+    Accounts,
     Bodies,
     Interfaces,
+    InterfaceState,
     Nodes,
+    NodeState,
     StepRows,
 )
 from klack.simulation.propagator import modal_propagator
@@ -71,12 +74,14 @@ class CompiledNetwork:
 
     Parameters
     ----------
-    bodies, elements, branches, nodes, lines, line_state, interfaces
-        See :mod:`klack.simulation.network_kernel`.
-    books : array [J]
+    bodies, elements, branches, nodes, lines, interfaces
+        What stays, with the states of bodies, elements and branches.
+    node_state, line_state, interface_state
+        What changes from step to step.
+    accounts : Accounts
     book_kind : array of int
+        ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.books``.
     book_names : tuple of str
-    line_books : array, shape (lines, 3) [J]
     ports : tuple of PortName
     node_order : tuple of int
         Handle of every node of the loop.
@@ -89,11 +94,12 @@ class CompiledNetwork:
     elements: StepRows
     branches: StepRows
     nodes: Nodes
+    node_state: NodeState
     lines: Lines
     line_state: LineState
-    line_books: NDArray[np.float64]
     interfaces: Interfaces
-    books: Vector
+    interface_state: InterfaceState
+    accounts: Accounts
     book_kind: Index
     book_names: tuple[str, ...]
     ports: tuple[PortName, ...]
@@ -114,28 +120,36 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
     port_of, names = _number_ports(rows.bodies)
     bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
     books = _Books()
-    elements = _step_rows(rows.elements, books, port_of, {})
+    elements = _step_rows(rows.elements, 0, books, port_of, {})
     node_order = _order_nodes(rows)
     node_of = {handle: i for i, handle in enumerate(node_order)}
-    branches = _step_rows(rows.branches, books, port_of, node_of)
+    branches = _step_rows(rows.branches, 3, books, port_of, node_of)
     lines, line_state = compile_lines(
         rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
     )
-    nodes = _nodes(rows, node_order, port_of, bodies, lines)
-    ends = nodes.end_node
-    if len(ends):
-        start_lines(lines, line_state, nodes.density * nodes.g[ends])
+    nodes, node_state = _nodes(rows, node_order, port_of, bodies, lines)
+    if nodes.ends:
+        start_lines(lines, line_state, nodes.density * node_state.g[nodes.end_node])
+    interfaces, interface_state = _interfaces(rows, port_of, bodies)
     return CompiledNetwork(
         rows=rows,
         bodies=bodies,
         elements=elements,
         branches=branches,
         nodes=nodes,
+        node_state=node_state,
         lines=lines,
         line_state=line_state,
-        line_books=np.zeros((max(len(rows.lines), 1), 3)),
-        interfaces=_interfaces(rows, port_of, bodies),
-        books=np.zeros(len(books.kinds)),
+        interfaces=interfaces,
+        interface_state=interface_state,
+        accounts=Accounts(
+            books=np.zeros(len(books.kinds)),
+            lines=np.zeros((max(len(rows.lines), 1), 3)),
+            implicit=np.zeros(nodes.volumes),
+            supply=np.zeros(nodes.nodes - nodes.volumes),
+            contact=np.zeros(interfaces.interfaces),
+            film=np.zeros(interfaces.interfaces),
+        ),
         book_kind=np.array(books.kinds, dtype=np.int64),
         book_names=tuple(books.names),
         ports=names,
@@ -220,6 +234,8 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         blocks.append(len(count))
         first_port += own
     bodies = Bodies(
+        ports=ports,
+        blocks=len(count),
         fine=np.concatenate(fine),
         coarse=np.concatenate(coarse),
         start=np.array(start, dtype=np.int64),
@@ -236,6 +252,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
 
 def _step_rows(
     rows: Sequence[ElementRow | BranchRow],
+    head: int,
     books: _Books,
     port_of: Mapping[int, int],
     node_of: Mapping[int, int],
@@ -252,9 +269,7 @@ def _step_rows(
     numbers["supply"][:] = numbers["loss"][:] = -1
     parameters, state, ports = [np.zeros(0)], [np.zeros(0)], list[int]()
     for k, row in enumerate(rows):
-        head = 0
         if isinstance(row, BranchRow):
-            head = 3
             numbers["a"][k], numbers["b"][k] = node_of[row.a], node_of[row.b]
         numbers["function"][k] = address_of(row.step)
         numbers["states"][k] = len(row.state)
@@ -282,6 +297,8 @@ def _step_rows(
         if head and numbers["supply"][k] < 0:
             numbers["loss"][k] = books.add(f"{label} flow", LOSS)
     return StepRows(
+        rows=count,
+        head=head,
         function=numbers["function"],
         parameters=np.append(np.concatenate(parameters), 0.0),
         parameter0=offsets["parameter0"],
@@ -311,7 +328,7 @@ def _order_nodes(rows: Rows) -> tuple[int, ...]:
 
 def _nodes(
     rows: Rows, order: Sequence[int], port_of: Mapping[int, int], bodies: Bodies, lines: Lines
-) -> Nodes:
+) -> tuple[Nodes, NodeState]:
     node_of = {handle: i for i, handle in enumerate(order)}
     given = [rows.nodes[handle] for handle in order]
     volumes = sum(node.volume > 0.0 for node in given)
@@ -336,21 +353,16 @@ def _nodes(
         for j, b, area_b in walls:
             if i == j and i < volumes:
                 gamma[:, i] += area_a * G[:, a, b] * area_b
-    return Nodes(
+    nodes = Nodes(
+        nodes=count,
         volumes=volumes,
+        walls=len(walls),
+        ends=len(lines.node),
         fluid=fluid,
         ambient=ambient,
         density=density,
-        hint=hint,
         volume=volume,
-        mass=volume * rho[:volumes],
-        held=volume.copy(),
-        p=p,
-        before=p.copy(),
-        g=g,
-        gamma=gamma,
-        numeric=np.zeros(volumes),
-        supply=np.zeros(count - volumes),
+        gamma=gamma.ravel(),
         time=np.concatenate([np.zeros(0), *(node.time for node in tables)]),
         pressure=np.concatenate([np.zeros(0), *(node.pressure for node in tables)]),
         table0=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
@@ -359,9 +371,14 @@ def _nodes(
         wall_area=np.array([w[2] for w in walls], dtype=float),
         end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
     )
+    mass = volume * rho[:volumes]
+    state = NodeState(mass=mass, held=volume.copy(), p=p, before=p.copy(), g=g, hint=hint)
+    return nodes, state
 
 
-def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Interfaces:
+def _interfaces(
+    rows: Rows, port_of: Mapping[int, int], bodies: Bodies
+) -> tuple[Interfaces, InterfaceState]:
     count = len(rows.interfaces)
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     kind = np.full(count, NO_LAW, np.int64)
@@ -384,7 +401,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
     moved, _ = compile_bodies(rows.bodies, (film_time, film_time))
     force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
     rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
-    return Interfaces(
+    interfaces = Interfaces(
+        interfaces=count,
         upper=upper,
         lower=lower,
         G=interface_compliance(bodies, upper, lower),
@@ -402,6 +420,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
         film_small=_FILM_SMALL * force,
         film_felt=_FILM_FELT * force,
         rest=np.array(rest, dtype=float),
+    )
+    state = InterfaceState(
         hint=np.zeros(count, np.int64),
         e=np.zeros(count),
         gap=gap.copy(),
@@ -411,9 +431,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
         deepest=np.zeros(count),
         since=np.full(count, np.inf),
         film_before=np.zeros(count),
-        contact_loss=np.zeros(count),
-        film_loss=np.zeros(count),
     )
+    return interfaces, state
 
 
 def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
