@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.simulation.delay_line import Lines, LineState
+
 __all__ = [
     "BEFORE",
     "ELEMENTS",
@@ -31,6 +33,7 @@ __all__ = [
     "InterfaceState",
     "InterfaceTrial",
     "Interfaces",
+    "NetworkArrays",
     "NodeState",
     "NodeTrial",
     "Nodes",
@@ -187,6 +190,22 @@ class Accounts(NamedTuple):
     supply: Vector  # (prescribed nodes,)
     contact: Vector  # (interfaces,) losses
     film: Vector
+
+
+class NetworkArrays(NamedTuple):
+    """A whole network."""
+
+    bodies: Bodies
+    elements: StepRows
+    branches: StepRows
+    nodes: Nodes
+    node_state: NodeState
+    lines: Lines
+    line_state: LineState
+    interfaces: Interfaces
+    interface_state: InterfaceState
+    accounts: Accounts
+    book_kind: Index
 
 
 class NodeTrial(NamedTuple):

@@ -33,6 +33,7 @@ from klack.simulation.network_arrays import (
     Bodies,
     Interfaces,
     InterfaceState,
+    NetworkArrays,
     Nodes,
     NodeState,
     StepRows,
@@ -106,6 +107,11 @@ class CompiledNetwork:
     port_of: Mapping[int, int]
     node_order: tuple[int, ...]
     body_blocks: Index
+
+    @property
+    def arrays(self) -> NetworkArrays:
+        """What the time loop works on."""
+        return NetworkArrays(*(getattr(self, name) for name in NetworkArrays._fields))
 
 
 def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:

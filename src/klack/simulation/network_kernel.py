@@ -15,7 +15,7 @@ A coarse step is tried when all interfaces are far apart or at rest; if it ends 
 release or in a noticeable film, it is thrown away and done again in fine steps.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -33,11 +33,9 @@ from klack.simulation.network_arrays import (
     Accounts,
     Bodies,
     Contacts,
+    FlowTrial,
     Fluid,
-    Interfaces,
-    InterfaceState,
-    Nodes,
-    NodeState,
+    NetworkArrays,
     Recording,
     Scratch,
     Step,
@@ -90,6 +88,7 @@ __all__ = ["run_network"]
 
 Index = NDArray[np.int64]
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 _SETTLED = 5e-5  # last change of a port displacement over the longest way of a port in the step
 _SETTLED_COARSE = 3e-8  # the same for a coarse step, whose forces change more
@@ -97,6 +96,24 @@ _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave o
 _FEW_SWEEPS = 8  # are enough, unless what still changes is round-off
 _MOST_SWEEPS = 200
 _COARSE_SWEEPS = 20  # without success: fine steps
+
+
+class _Loop(NamedTuple):
+    """All that the loop works on; bundles of pointers but for lines and records."""
+
+    bodies: Bodies
+    elements: StepRows
+    fluid: Fluid
+    contacts: Contacts
+    lines: Lines
+    line_state: LineState
+    ends: FlowTrial
+    accounts: Accounts
+    kind: Index
+    line_losses: Matrix
+    recording: Recording
+    sums: Vector  # of elements, then branches, then interfaces
+    peaks: Vector
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
@@ -108,17 +125,7 @@ def run_network(
     M: int,
     h: float,
     allow_coarse: bool,
-    bodies: Bodies,
-    elements: StepRows,
-    branches: StepRows,
-    nodes: Nodes,
-    node_state: NodeState,
-    lines: Lines,
-    line_state: LineState,
-    interfaces: Interfaces,
-    interface_state: InterfaceState,
-    accounts: Accounts,
-    account_kind: Index,
+    network: NetworkArrays,
     recording: Recording,
     scratch: Scratch,
     report: Vector,
@@ -128,92 +135,52 @@ def run_network(
     ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
     ``report`` gets the row of a failure, its status and its time.
     """
-    body, rows = pointers(bodies), pointers(elements)
-    fluid = Fluid(
-        pointers(nodes),
-        pointers(node_state),
-        pointers(scratch.nodes),
-        pointers(branches),
-        pointers(scratch.flows),
-    )
-    contacts = Contacts(
-        interfaces.law,
-        pointers(interfaces),
-        pointers(interface_state),
-        pointers(scratch.interfaces),
-    )
-    account, kind = pointers(accounts), first(account_kind)
-    flows, S, told = scratch.flows, body.at, first(report)
-    sums, peaks = first(scratch.sums), first(scratch.peaks)
-    sums_of_branches = shift(sums, rows.port0[rows.rows])
-    sums_of_interfaces = shift(sums_of_branches, branches.rows)
-    begin_ports(body)
-    begin_interfaces(contacts, peaks)
-    begin_fluid(fluid)
-    for k in range(scratch.sums.size):
-        sums[k] = 0.0
+    loop = _begin(network, recording, scratch)
+    bodies, contacts = loop.bodies, loop.contacts
     now, last_level = clock[0], clock[1]
     in_record, record, record_time = 0, 0, 0.0
     fine_steps, coarse_steps = 0, 0
     inverse_h = 1.0 / h
-
     for _macro in range(macros):
         level = level_of_step(contacts, now * h, M * h) if allow_coarse else 0
         if level == 1:
-            start_coarse(body)
+            start_coarse(bodies)
         done = 0
         while done < M:
             steps = M if level == 1 else 1
             rate = inverse_h if level == 0 else inverse_h / M
             step = Step(level, steps, now * h, steps * h, rate)
-            move_free(body, level)
-            if level == last_level:
-                guess_forces(body)
-            else:
-                forget_forces(body)
-            guess_pressures(fluid, step.t + step.H, level == last_level)
-            if nodes.ends > 0:
-                lines_incoming(lines, line_state, steps, flows.c, flows.Z)
-            status = _settle(step, body, rows, fluid, contacts, told)
+            status = _try_step(step, loop, level == last_level, first(report))
             if status > STATUS_DONE:
                 return status
-            S[FORCE + body.ports] = 0.0  # what pushes the ground moves nothing
             # a coarse step may not meet what it cannot see
             if level == 1 and (status == STATUS_REFUSED or not coarse_step_holds(contacts)):
                 level, last_level = 0, -1
-                forget_forces(body)
+                forget_forces(bodies)
                 forget_interfaces(contacts)
                 continue
-            _end_elements(rows, step.H, account, kind, sums)
-            if nodes.nodes > 0:
-                end_branches(fluid, S, step.H, account, kind, sums_of_branches)
-                end_ends(fluid, step.H)
-                if nodes.ends > 0:
-                    lines_commit(lines, line_state, steps, flows.q, accounts.lines)
-                end_nodes(fluid, account)
-            end_interfaces(contacts, S, step, account, recording, sums_of_interfaces, peaks)
-            end_ports(body)
+            _end_step(step, loop)
             last_level = level
             done += steps
             now += steps
             coarse_steps += level
             fine_steps += 1 - level
-        apply_pending(body, level)
+        apply_pending(bodies, level)
         in_record += 1
         record_time += M * h
         if in_record == per_record:
-            record_means(recording, record, record_time, sums, peaks)
+            record_means(recording, record, record_time, loop.sums, loop.peaks)
             record_points(
                 recording,
                 record,
-                bodies.fine,
-                bodies.start,
-                bodies.modes,
-                bodies.at,
-                node_state.p,
-                elements.state,
-                branches.state,
-                interface_state.gap,
+                network.bodies.fine,
+                network.bodies.start,
+                network.bodies.modes,
+                network.bodies.at,
+                network.node_state.p,
+                network.elements.state,
+                network.branches.state,
+                network.interface_state.gap,
             )
             record += 1
             in_record, record_time = 0, 0.0
@@ -221,6 +188,86 @@ def run_network(
     clock[2] += fine_steps
     clock[3] += coarse_steps
     return STATUS_DONE
+
+
+@phase
+def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _Loop:
+    """Begin a run: no force is pending, no density known, nothing summed."""
+    loop = _Loop(
+        bodies=pointers(network.bodies),
+        elements=pointers(network.elements),
+        fluid=Fluid(
+            pointers(network.nodes),
+            pointers(network.node_state),
+            pointers(scratch.nodes),
+            pointers(network.branches),
+            pointers(scratch.flows),
+        ),
+        contacts=Contacts(
+            network.interfaces.law,
+            pointers(network.interfaces),
+            pointers(network.interface_state),
+            pointers(scratch.interfaces),
+        ),
+        lines=network.lines,
+        line_state=network.line_state,
+        ends=scratch.flows,
+        accounts=pointers(network.accounts),
+        kind=first(network.book_kind),
+        line_losses=network.accounts.lines,
+        recording=recording,
+        sums=first(scratch.sums),
+        peaks=first(scratch.peaks),
+    )
+    begin_ports(loop.bodies)
+    begin_interfaces(loop.contacts, loop.peaks)
+    begin_fluid(loop.fluid)
+    for k in range(scratch.sums.size):
+        loop.sums[k] = 0.0
+    return loop
+
+
+@phase
+def _try_step(step: Step, loop: Any, straight: bool, report: Any) -> int:
+    """One step up to what it would change; ``straight`` guesses on the line of the last two.
+
+    Returns
+    -------
+    int
+        ``STATUS_DONE``; ``STATUS_REFUSED`` for a coarse step that does not settle; or what failed.
+    """
+    bodies, fluid = loop.bodies, loop.fluid
+    move_free(bodies, step.level)
+    if straight:
+        guess_forces(bodies)
+    else:
+        forget_forces(bodies)
+    guess_pressures(fluid, step.t + step.H, straight)
+    if fluid.nodes.ends > 0:
+        lines_incoming(loop.lines, loop.line_state, step.steps, loop.ends.c, loop.ends.Z)
+    status = _settle(step, bodies, loop.elements, fluid, loop.contacts, report)
+    bodies.at[FORCE + bodies.ports] = 0.0  # what pushes the ground moves nothing
+    return status
+
+
+@phase
+def _end_step(step: Step, loop: Any) -> None:
+    """Take over states, masses, waves and accounts; the forces stay pending."""
+    bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
+    accounts, kind, H = loop.accounts, loop.kind, step.H
+    sums_of_branches = shift(loop.sums, elements.port0[elements.rows])
+    sums_of_interfaces = shift(sums_of_branches, fluid.branches.rows)
+    _end_elements(elements, H, accounts, kind, loop.sums)
+    if fluid.nodes.nodes > 0:
+        end_branches(fluid, bodies.at, H, accounts, kind, sums_of_branches)
+        end_ends(fluid, H)
+        if fluid.nodes.ends > 0:
+            lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
+        end_nodes(fluid, accounts)
+    end_interfaces(
+        loop.contacts, bodies.at, step, accounts, loop.recording, sums_of_interfaces, loop.peaks
+    )
+    end_ports(bodies)
 
 
 @phase
