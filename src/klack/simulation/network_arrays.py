@@ -104,12 +104,12 @@ class StepRows(NamedTuple):
     output0: Index
     ports: Index  # flat list
     port0: Index  # (rows + 1,) into ``ports``
-    book0: Index
-    books: Index
+    account0: Index  # first account of each row
+    accounts: Index  # of each row
     a: Index  # nodes of branches
     b: Index
-    supply: Index  # book that takes all power of a source, or -1
-    loss: Index  # book that takes the loss of a branch, or -1
+    supply: Index  # account that takes all power of a source, or -1
+    loss: Index  # account that takes the loss of a branch, or -1
 
 
 class Nodes(NamedTuple):
@@ -184,7 +184,7 @@ class InterfaceState(NamedTuple):
 class Accounts(NamedTuple):
     """Energies [J] since the start of a run."""
 
-    books: Vector  # of elements and branches: what they store, supply and lose
+    rows: Vector  # of elements and branches: what they store, supply and lose
     lines: Matrix  # (lines, 3) losses
     implicit: Vector  # (volumes,) loss of the implicit step
     supply: Vector  # (prescribed nodes,)
@@ -205,7 +205,7 @@ class NetworkArrays(NamedTuple):
     interfaces: Interfaces
     interface_state: InterfaceState
     accounts: Accounts
-    book_kind: Index
+    account_kind: Index
 
 
 class NodeTrial(NamedTuple):

@@ -80,9 +80,9 @@ class CompiledNetwork:
     node_state, line_state, interface_state
         What changes from step to step.
     accounts : Accounts
-    book_kind : array of int
-        ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.books``.
-    book_names : tuple of str
+    account_kind : array of int
+        ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.rows``.
+    account_names : tuple of str
     ports : tuple of PortName
     node_order : tuple of int
         Handle of every node of the loop.
@@ -101,8 +101,8 @@ class CompiledNetwork:
     interfaces: Interfaces
     interface_state: InterfaceState
     accounts: Accounts
-    book_kind: Index
-    book_names: tuple[str, ...]
+    account_kind: Index
+    account_names: tuple[str, ...]
     ports: tuple[PortName, ...]
     port_of: Mapping[int, int]
     node_order: tuple[int, ...]
@@ -125,11 +125,11 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         )
     port_of, names = _number_ports(rows.bodies)
     bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
-    books = _Books()
-    elements = _step_rows(rows.elements, 0, books, port_of, {})
+    accounts = _Accounts()
+    elements = _step_rows(rows.elements, 0, accounts, port_of, {})
     node_order = _order_nodes(rows)
     node_of = {handle: i for i, handle in enumerate(node_order)}
-    branches = _step_rows(rows.branches, 3, books, port_of, node_of)
+    branches = _step_rows(rows.branches, 3, accounts, port_of, node_of)
     lines, line_state = compile_lines(
         rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
     )
@@ -149,15 +149,15 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         interfaces=interfaces,
         interface_state=interface_state,
         accounts=Accounts(
-            books=np.zeros(len(books.kinds)),
+            rows=np.zeros(len(accounts.kinds)),
             lines=np.zeros((max(len(rows.lines), 1), 3)),
             implicit=np.zeros(nodes.volumes),
             supply=np.zeros(nodes.nodes - nodes.volumes),
             contact=np.zeros(interfaces.interfaces),
             film=np.zeros(interfaces.interfaces),
         ),
-        book_kind=np.array(books.kinds, dtype=np.int64),
-        book_names=tuple(books.names),
+        account_kind=np.array(accounts.kinds, dtype=np.int64),
+        account_names=tuple(accounts.names),
         ports=names,
         port_of=port_of,
         node_order=node_order,
@@ -165,8 +165,8 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
     )
 
 
-class _Books:
-    """Collects the entries of the ledger."""
+class _Accounts:
+    """Collects the entries of the energy balance."""
 
     def __init__(self) -> None:
         self.kinds: list[int] = []
@@ -259,18 +259,18 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
 def _step_rows(
     rows: Sequence[ElementRow | BranchRow],
     head: int,
-    books: _Books,
+    accounts: _Accounts,
     port_of: Mapping[int, int],
     node_of: Mapping[int, int],
 ) -> StepRows:
     count = len(rows)
     numbers = {
         key: np.zeros(count, np.int64)
-        for key in ("function", "states", "books", "a", "b", "supply", "loss")
+        for key in ("function", "states", "accounts", "a", "b", "supply", "loss")
     }
     offsets = {
         key: np.zeros(count + 1, np.int64)
-        for key in ("parameter0", "state0", "input0", "output0", "port0", "book0")
+        for key in ("parameter0", "state0", "input0", "output0", "port0", "account0")
     }
     numbers["supply"][:] = numbers["loss"][:] = -1
     parameters, state, ports = [np.zeros(0)], [np.zeros(0)], list[int]()
@@ -279,7 +279,7 @@ def _step_rows(
             numbers["a"][k], numbers["b"][k] = node_of[row.a], node_of[row.b]
         numbers["function"][k] = address_of(row.step)
         numbers["states"][k] = len(row.state)
-        numbers["books"][k] = len(row.books)
+        numbers["accounts"][k] = len(row.books)
         parameters.append(row.parameters)
         state.append(row.state)
         ports += [port_of[port] for port in row.ports]
@@ -289,19 +289,19 @@ def _step_rows(
             "input0": (6 if head else 2) + 2 * len(row.ports),
             "output0": head + len(row.ports) + len(row.state) + len(row.books),
             "port0": len(row.ports),
-            "book0": len(row.books),
+            "account0": len(row.books),
         }
         for key, size in sizes.items():
             offsets[key][k + 1] = offsets[key][k] + size
-        offsets["book0"][k] = len(books.kinds)
+        offsets["account0"][k] = len(accounts.kinds)
         label = " ".join(filter(None, (row.component, row.label)))
         for book in row.books:
-            place = books.add(f"{label} {book.label}", _KINDS[book.kind])
+            place = accounts.add(f"{label} {book.label}", _KINDS[book.kind])
             if head and book.kind == "supply":
                 numbers["supply"][k] = place
-        offsets["book0"][k + 1] = len(books.kinds)
+        offsets["account0"][k + 1] = len(accounts.kinds)
         if head and numbers["supply"][k] < 0:
-            numbers["loss"][k] = books.add(f"{label} flow", LOSS)
+            numbers["loss"][k] = accounts.add(f"{label} flow", LOSS)
     return StepRows(
         rows=count,
         head=head,
@@ -317,8 +317,8 @@ def _step_rows(
         output0=offsets["output0"],
         ports=np.array(ports, dtype=np.int64),
         port0=offsets["port0"],
-        book0=offsets["book0"],
-        books=numbers["books"],
+        account0=offsets["account0"],
+        accounts=numbers["accounts"],
         a=numbers["a"],
         b=numbers["b"],
         supply=numbers["supply"],

@@ -296,7 +296,7 @@ def _finish_flows(fluid: Any) -> tuple[int, int]:
             flows.mdot[k] += flows.slope_a[k] * r[a]
         if b < fluid.nodes.volumes:
             flows.mdot[k] += flows.slope_b[k] * r[b]
-        if branches.books[k] > 0:
+        if branches.accounts[k] > 0:
             # what it stores has to follow from the pressures that do the work
             i0 = branches.input0[k]
             branches.inputs[i0 + 2] = p[a]
@@ -338,15 +338,15 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
             port = branches.ports[j]
             power -= branches.outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
         o0 = take_states(branches, k)
-        for j in range(branches.books[k]):
-            book, value = branches.book0[k] + j, branches.outputs[o0 + j]
-            if kind[book] == STORE:
-                power -= value - accounts.books[book]
-                accounts.books[book] = value
+        for j in range(branches.accounts[k]):
+            account, value = branches.account0[k] + j, branches.outputs[o0 + j]
+            if kind[account] == STORE:
+                power -= value - accounts.rows[account]
+                accounts.rows[account] = value
         if branches.supply[k] >= 0:
-            accounts.books[branches.supply[k]] -= power
+            accounts.rows[branches.supply[k]] -= power
         else:
-            accounts.books[branches.loss[k]] += power
+            accounts.rows[branches.loss[k]] += power
 
 
 @phase

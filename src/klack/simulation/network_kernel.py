@@ -8,8 +8,8 @@ One step of length ``h`` (or ``M h`` while nothing touches):
    again, until no port moves by more than a small share of the way in the step.  Elements and
    fluid live on the displacements that they saw last, so what is left of that change costs energy
    in second order: the change of their forces times it, a small share of the work of the step.
-3. States, masses, waves and books are taken over; the forces stay pending for the next pass over
-   the modes.
+3. States, masses, waves and energy accounts are taken over; the forces stay pending for the next
+   pass over the modes.
 
 A coarse step is tried when all interfaces are far apart or at rest; if it ends in a contact, in a
 release or in a noticeable film, it is thrown away and done again in fine steps.
@@ -173,10 +173,7 @@ def run_network(
             record_points(
                 recording,
                 record,
-                network.bodies.fine,
-                network.bodies.start,
-                network.bodies.modes,
-                network.bodies.at,
+                network.bodies,
                 network.node_state.p,
                 network.elements.state,
                 network.branches.state,
@@ -213,7 +210,7 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
         line_state=network.line_state,
         ends=scratch.flows,
         accounts=pointers(network.accounts),
-        kind=first(network.book_kind),
+        kind=first(network.account_kind),
         line_losses=network.accounts.lines,
         recording=recording,
         sums=first(scratch.sums),
@@ -371,9 +368,9 @@ def _end_elements(elements: Any, H: float, accounts: Any, kind: Any, sums: Any) 
         for j in range(q0, elements.port0[k + 1]):
             sums[j] += H * elements.outputs[o0 + j - q0]
         o0 = take_states(elements, k)
-        for j in range(elements.books[k]):
-            book = elements.book0[k] + j
-            if kind[book] == STORE:
-                accounts.books[book] = elements.outputs[o0 + j]
+        for j in range(elements.accounts[k]):
+            account = elements.account0[k] + j
+            if kind[account] == STORE:
+                accounts.rows[account] = elements.outputs[o0 + j]
             else:
-                accounts.books[book] += elements.outputs[o0 + j]
+                accounts.rows[account] += elements.outputs[o0 + j]

@@ -7,14 +7,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.network.step_function import pointer
-from klack.simulation.modal_step import ROW, watch
-from klack.simulation.network_arrays import Recording
+from klack.simulation.modal_step import ROW, ROW_V, watch
+from klack.simulation.network_arrays import Bodies, Recording
 from klack.simulation.phase import phase
 
 __all__ = ["record_means", "record_points"]
 
 Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 @phase
@@ -32,42 +31,43 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
 def record_points(
     recording: Recording,
     record: int,
-    W: Vector,
-    start: Index,
-    count: Index,
-    y: Vector,
+    bodies: Bodies,
     p: Vector,
     state: Vector,
     branch_state: Vector,
     gap: Vector,
 ) -> None:
     """Columns: port displacements, port velocities, centres of mass, pressures, states, gaps."""
-    out, place = recording.points, 0
-    ports = recording.port_row.size
-    for i in range(ports):
-        out[record, place + i] = y[i]
-    place += ports
-    for i in range(ports):
-        total = 0.0
-        for k in range(recording.port_block0[i], recording.port_block1[i]):
-            total += watch(pointer(W, start[k]), count[k], 1, recording.port_row[i])
-        out[record, place + i] = total
-    place += ports
+    out, place = recording.points[record], 0
+    for i in range(bodies.ports):
+        block0, block1 = recording.port_block0[i], recording.port_block1[i]
+        out[i] = bodies.at[i]
+        out[bodies.ports + i] = _speed(bodies, block0, block1, recording.port_row[i])
+    place += 2 * bodies.ports
     for b in range(recording.cm_block0.size):
-        total = 0.0
-        for k in range(recording.cm_block0[b], recording.cm_block1[b]):
-            last = (start[k + 1] - start[k]) // ROW - 1
-            total += watch(pointer(W, start[k]), count[k], 1, last)
-        out[record, place + b] = total
+        out[place + b] = _speed(bodies, recording.cm_block0[b], recording.cm_block1[b], -1)
     place += recording.cm_block0.size
     for i in range(p.size):
-        out[record, place + i] = p[i]
+        out[place + i] = p[i]
     place += p.size
     for i in range(recording.states.size):
-        out[record, place + i] = state[recording.states[i]]
+        out[place + i] = state[recording.states[i]]
     place += recording.states.size
     for i in range(recording.branch_states.size):
-        out[record, place + i] = branch_state[recording.branch_states[i]]
+        out[place + i] = branch_state[recording.branch_states[i]]
     place += recording.branch_states.size
     for c in range(gap.size):
-        out[record, place + c] = gap[c]
+        out[place + c] = gap[c]
+
+
+@phase
+def _speed(bodies: Bodies, block0: int, block1: int, row: int) -> float:
+    """Velocity of a row of the shapes [m/s], of the last one for -1, over the blocks of a body."""
+    total = 0.0
+    for k in range(block0, block1):
+        shape = row
+        if row < 0:
+            shape += (bodies.start[k + 1] - bodies.start[k]) // ROW
+        block = pointer(bodies.fine, bodies.start[k])
+        total += watch(block, bodies.modes[k], ROW_V, shape)
+    return total

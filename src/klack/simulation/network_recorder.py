@@ -132,10 +132,7 @@ class Recorder:
         record_points(
             self.recording,
             0,
-            network.bodies.fine,
-            network.bodies.start,
-            network.bodies.modes,
-            network.bodies.at,
+            network.bodies,
             network.node_state.p,
             network.elements.state,
             network.branches.state,

@@ -31,8 +31,8 @@ from klack.simulation.network_compile import (
     compile_network,
     modal_state,
 )
+from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
 from klack.simulation.network_kernel import run_network
-from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
@@ -91,7 +91,7 @@ def simulate_network(
         ``"free"``: undeformed, with the speeds of their rows.
     state : mapping of str to array, optional
         :attr:`NetworkResult.state` of a former run of the same network and steps, to go on from;
-        ``start`` then has no meaning, time goes on, and the books count from there.
+        ``start`` then has no meaning, time goes on, and the energy balance counts from there.
     progress : callable
         Told the fraction done.
 
@@ -142,7 +142,7 @@ def simulate_network(
     fresh = state is None or _IMPACTS not in state  # of an earlier version
     if state is not None and not fresh:
         finder.state = np.asarray(state[_IMPACTS], dtype=float)
-    reset_books(network)
+    reset_accounts(network)
     _read_stores(network)
     before = energy_stores(network)
     recorder.start(step * first_step, finder, fresh=fresh)
@@ -165,7 +165,7 @@ def simulate_network(
     if failure is not None and not records:
         raise failure
     time = step * (first_step + np.arange(records + 1) * (grid.looks * grid.look_steps))
-    books = energy_books(network, before)
+    books = balance_since(network, before)
     events = finder.events()
     finder.told()
     result = NetworkResult(
@@ -456,7 +456,7 @@ def _not_finite_part(network: CompiledNetwork) -> str:
 
 def _not_finite_account(network: CompiledNetwork) -> str:
     """Component in whose state or energy a number is none; empty if all are."""
-    for name, value in zip(network.book_names, network.accounts.books, strict=True):
+    for name, value in zip(network.account_names, network.accounts.rows, strict=True):
         if not np.isfinite(value):
             return name
     part = _not_finite_part(network)
@@ -502,10 +502,10 @@ def _read_stores(network: CompiledNetwork) -> None:
         for k in range(rows.rows):
             ports = rows.port0[k + 1] - rows.port0[k]
             first = rows.output0[k] + rows.head + ports + rows.states[k]
-            for j in range(rows.books[k]):
-                book = rows.book0[k] + j
-                if network.book_kind[book] == STORE:
-                    network.accounts.books[book] = rows.outputs[first + j]
+            for j in range(rows.accounts[k]):
+                account = rows.account0[k] + j
+                if network.account_kind[account] == STORE:
+                    network.accounts.rows[account] = rows.outputs[first + j]
 
 
 _IMPACTS = "impacts.unfinished"

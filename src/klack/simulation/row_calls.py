@@ -40,22 +40,28 @@ def ask_again(rows: Any, k: int) -> int:
 
 
 @phase
+def _tell_ports(rows: Any, k: int, place: int, y0: Any, y1: Any) -> None:
+    """Write displacements at both ends of the step into the inputs of row ``k``."""
+    for j in range(rows.port0[k], rows.port0[k + 1]):
+        rows.inputs[place] = y0[rows.ports[j]]
+        rows.inputs[place + 1] = y1[rows.ports[j]]
+        place += 2
+
+
+@phase
 def ask_element(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any) -> int:
     """Call element ``k`` for a step between two displacements of every port."""
-    i0, q0 = rows.input0[k], rows.port0[k]
+    i0 = rows.input0[k]
     rows.inputs[i0] = t
     rows.inputs[i0 + 1] = h
-    for j in range(q0, rows.port0[k + 1]):
-        port = rows.ports[j]
-        rows.inputs[i0 + 2 + 2 * (j - q0)] = y0[port]
-        rows.inputs[i0 + 3 + 2 * (j - q0)] = y1[port]
+    _tell_ports(rows, k, i0 + 2, y0, y1)
     return ask_again(rows, k)
 
 
 @phase
 def ask_branch(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any, p: Any, rho: Any) -> int:
     """Call branch ``k`` for a step that ends with these pressures and densities of all nodes."""
-    i0, q0 = rows.input0[k], rows.port0[k]
+    i0 = rows.input0[k]
     a, b = rows.a[k], rows.b[k]
     rows.inputs[i0] = t
     rows.inputs[i0 + 1] = h
@@ -63,10 +69,7 @@ def ask_branch(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any, p: Any, 
     rows.inputs[i0 + 3] = p[b]
     rows.inputs[i0 + 4] = rho[a]
     rows.inputs[i0 + 5] = rho[b]
-    for j in range(q0, rows.port0[k + 1]):
-        port = rows.ports[j]
-        rows.inputs[i0 + 6 + 2 * (j - q0)] = y0[port]
-        rows.inputs[i0 + 7 + 2 * (j - q0)] = y1[port]
+    _tell_ports(rows, k, i0 + 6, y0, y1)
     return ask_again(rows, k)
 
 
@@ -87,7 +90,7 @@ def push_walls(nodes: Any, p: Any, force: Any) -> None:
 
 @phase
 def take_states(rows: Any, k: int) -> int:
-    """Take over the next states of row ``k``; returns where its books lie in the outputs."""
+    """Take over the next states of row ``k``; returns where its accounts lie in the outputs."""
     o0 = rows.output0[k] + rows.head + rows.port0[k + 1] - rows.port0[k]
     for j in range(rows.states[k]):
         rows.state[rows.state0[k] + j] = rows.outputs[o0 + j]

@@ -19,11 +19,11 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
 
-__all__ = ["energy_books", "energy_stores", "reset_books"]
+__all__ = ["balance_since", "energy_stores", "reset_accounts"]
 
 
-def reset_books(network: CompiledNetwork) -> None:
-    """Begin new books: all supplies and losses are zero, works what elements have still to see."""
+def reset_accounts(network: CompiledNetwork) -> None:
+    """Begin a new energy balance: no supplies and losses, works that elements have still to see."""
     for account in network.accounts:
         account[:] = 0.0
     network.bodies.at[WORK : WORK + PORTS] = _unseen_work(network)
@@ -55,9 +55,9 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
         ahead = float(unseen[place : place + len(row.ports)].sum())
         place += len(row.ports)
         stores[f"{row.component} {BODY_STORE}"] = kinetic + strain - ahead
-    for i, kind in enumerate(network.book_kind):
+    for i, kind in enumerate(network.account_kind):
         if kind == STORE:
-            stores[network.book_names[i]] = float(network.accounts.books[i])
+            stores[network.account_names[i]] = float(network.accounts.rows[i])
     for c, contact in enumerate(rows.interfaces):
         stores[f"{contact.component} contact"] = float(
             interface_store(
@@ -78,8 +78,8 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     return stores
 
 
-def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
-    """Books from the moment of ``before`` until now.
+def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
+    """Energy balance from the moment of ``before`` until now.
 
     The damping of modes is what is missing in the balance of its body.
     """
@@ -87,10 +87,10 @@ def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> Energ
     after = energy_stores(network)
     supplies: dict[str, float] = {}
     losses: dict[str, float] = {}
-    for i, kind in enumerate(network.book_kind):
+    for i, kind in enumerate(network.account_kind):
         if kind != STORE:
             owner = supplies if kind == SUPPLY else losses
-            owner[network.book_names[i]] = float(accounts.books[i])
+            owner[network.account_names[i]] = float(accounts.rows[i])
     for i, energy in enumerate(accounts.supply):
         name = rows.nodes[network.node_order[nodes.volumes + i]].component
         supplies[f"{name} pressure"] = supplies.get(f"{name} pressure", 0.0) + float(energy)
