@@ -11,7 +11,7 @@ from rigid_valve import RELIEF_VALVE
 
 from klack.case.reader import parse, validated
 from klack.case.valve import ValveCase
-from klack.simulation.network_fluid import bracketed
+from klack.simulation.network_pressures import bracketed
 from klack.simulation.network_run import simulate_network
 
 

@@ -41,15 +41,6 @@ from klack.simulation.network_arrays import (
     Step,
     StepRows,
 )
-from klack.simulation.network_fluid import (
-    begin_fluid,
-    end_branches,
-    end_ends,
-    end_nodes,
-    guess_pressures,
-    push_by_fluid,
-    solve_pressures,
-)
 from klack.simulation.network_interfaces import (
     begin_interfaces,
     changed_by_interfaces,
@@ -73,6 +64,15 @@ from klack.simulation.network_ports import (
     row_length,
     settled_ports,
     start_coarse,
+)
+from klack.simulation.network_pressures import (
+    begin_fluid,
+    end_branches,
+    end_ends,
+    end_nodes,
+    guess_pressures,
+    push_by_fluid,
+    solve_pressures,
 )
 from klack.simulation.network_record import record_means, record_points
 from klack.simulation.phase import phase
