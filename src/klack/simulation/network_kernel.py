@@ -27,9 +27,6 @@ from klack.simulation.network_arrays import (
     ELEMENTS,
     FORCE,
     PORTS,
-    SEEN,
-    STORE,
-    Y1,
     Accounts,
     Bodies,
     Contacts,
@@ -41,6 +38,7 @@ from klack.simulation.network_arrays import (
     Step,
     StepRows,
 )
+from klack.simulation.network_elements import end_elements, push_by_elements
 from klack.simulation.network_interfaces import (
     begin_interfaces,
     changed_by_interfaces,
@@ -76,13 +74,7 @@ from klack.simulation.network_pressures import (
 )
 from klack.simulation.network_record import record_means, record_points
 from klack.simulation.phase import phase
-from klack.simulation.row_calls import ask_element, push_ports, take_states
-from klack.simulation.step_status import (
-    STATUS_DONE,
-    STATUS_ELEMENT,
-    STATUS_FORCES,
-    STATUS_REFUSED,
-)
+from klack.simulation.step_status import STATUS_DONE, STATUS_FORCES, STATUS_REFUSED
 
 __all__ = ["run_network"]
 
@@ -254,7 +246,7 @@ def _end_step(step: Step, loop: Any) -> None:
     accounts, kind, H = loop.accounts, loop.kind, step.H
     sums_of_branches = shift(loop.sums, elements.port0[elements.rows])
     sums_of_interfaces = shift(sums_of_branches, fluid.branches.rows)
-    _end_elements(elements, H, accounts, kind, loop.sums)
+    end_elements(elements, H, accounts, kind, loop.sums)
     if fluid.nodes.nodes > 0:
         end_branches(fluid, bodies.at, H, accounts, kind, sums_of_branches)
         end_ends(fluid, H)
@@ -281,18 +273,9 @@ def _settle(step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, r
     share = _SETTLED if step.level == 0 else _SETTLED_COARSE
     for sweep in range(_MOST_SWEEPS):
         move_ports_by_guess(bodies, G)
-        for i in range(row_length(bodies)):
-            S[FORCE + i] = 0.0
-        status = _push_by_elements(elements, S, step, report)
+        status = _push_by_rows(step, bodies, elements, fluid, report)
         if status != STATUS_DONE:
             return status
-        if fluid.nodes.nodes > 0:
-            status = solve_pressures(fluid, S, step, report)
-            if status != STATUS_DONE:
-                return status
-            push_by_fluid(fluid, S)
-        for i in range(bodies.ports):
-            S[ELEMENTS + i] = S[FORCE + i]
         push_by_interfaces(contacts, S)
         moved = move_ports(bodies, G)
         moved = solve_interfaces(contacts, bodies, G, step, moved)
@@ -312,16 +295,18 @@ def _settle(step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, r
 
 
 @phase
-def _push_by_elements(elements: Any, S: Any, step: Step, report: Any) -> int:
-    """Forces of all elements for the displacements of this sweep."""
-    seen, end, force = shift(S, SEEN), shift(S, Y1), shift(S, FORCE)
-    for k in range(elements.rows):
-        status = ask_element(elements, k, step.t, step.H, seen, end)
-        if status != 0:
-            report[0], report[1], report[2] = k, status, step.t
-            return STATUS_ELEMENT
-        push_ports(elements, k, force)
-    return STATUS_DONE
+def _push_by_rows(step: Step, bodies: Any, elements: Any, fluid: Any, report: Any) -> int:
+    """Forces of elements and fluid for the displacements of this sweep."""
+    S = bodies.at
+    for i in range(row_length(bodies)):
+        S[FORCE + i] = 0.0
+    status = push_by_elements(elements, S, step, report)
+    if status == STATUS_DONE and fluid.nodes.nodes > 0:
+        status = solve_pressures(fluid, S, step, report)
+        push_by_fluid(fluid, S)
+    for i in range(bodies.ports):
+        S[ELEMENTS + i] = S[FORCE + i]
+    return status
 
 
 @phase
@@ -358,19 +343,3 @@ def _moved_by_rows(G: Any, rows: Any, total: float) -> float:
         for j in range(q0, rows.port0[k + 1]):
             total += abs(G[rows.ports[j]] * rows.outputs[o0 + j - q0])
     return total
-
-
-@phase
-def _end_elements(elements: Any, H: float, accounts: Any, kind: Any, sums: Any) -> None:
-    """Take over states and accounts of all elements."""
-    for k in range(elements.rows):
-        o0, q0 = elements.output0[k], elements.port0[k]
-        for j in range(q0, elements.port0[k + 1]):
-            sums[j] += H * elements.outputs[o0 + j - q0]
-        o0 = take_states(elements, k)
-        for j in range(elements.accounts[k]):
-            account = elements.account0[k] + j
-            if kind[account] == STORE:
-                accounts.rows[account] = elements.outputs[o0 + j]
-            else:
-                accounts.rows[account] += elements.outputs[o0 + j]
