@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.contact.laws import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
+from klack.simulation.phase import compiled
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 
@@ -50,7 +51,7 @@ def _interval(p: Vector, start: int, d: float, hint: int) -> int:
     return i
 
 
-@njit(cache=True)
+@compiled()
 def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
     """Stored energy [J] of the elastic law at indentation ``d``."""
     if d <= 0.0:
@@ -118,7 +119,7 @@ def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple
     return mean, (f1 - mean) / (d1 - d0), number
 
 
-@njit(cache=True)
+@compiled()
 def mean_force(
     kind: int, p: Vector, start: int, d0: float, d1: float, hint: int
 ) -> tuple[float, float, int]:
@@ -142,7 +143,7 @@ def mean_force(
     return _table_mean(p, start, d0, d1, hint)
 
 
-@njit(cache=True)
+@compiled()
 def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     """Closed form of the elastic step for ``F = k d``: both closed, release, onset."""
     if d0 <= _TOUCH and df <= _TOUCH:
@@ -161,7 +162,7 @@ def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     return 0.5 * k * d1 * d1 / (d1 - d0)
 
 
-@njit(cache=True)
+@compiled()
 def solve_step(
     kind: int,
     p: Vector,

@@ -1,8 +1,10 @@
 """The decorator of the parts that a compiled time loop is made of."""
 
+from functools import partial
+
 from numba import njit
 
-__all__ = ["phase"]
+__all__ = ["compiled", "phase"]
 
 phase = njit(
     cache=True,
@@ -16,4 +18,10 @@ phase = njit(
 
 Without the runtime of numba: counting the references of all arrays of a bundle costs more than most
 phases.  Not to be called from Python.
+"""
+
+compiled = partial(njit, cache=True, _nrt=True, error_model="python", forceinline=False)
+"""Compile a function that phases call but do not contain.
+
+Says what numba would else take over from whichever function calls it first.
 """

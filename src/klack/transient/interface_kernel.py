@@ -212,7 +212,7 @@ def safe_flight(
     return safe
 
 
-@njit(cache=True)
+@phase
 def _payment(owed: float, slope: float, square: float) -> float:
     """Smaller root of ``owed + slope p + square p^2``; where it has none, its extremum."""
     inside = slope**2 - 4.0 * square * owed
