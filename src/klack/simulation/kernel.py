@@ -11,13 +11,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
 from klack.simulation.phase import phase
 
 __all__ = [
     "FAST",
-    "SEPARATED",
     "STATUS_CONTACTS",
     "STATUS_FINE",
     "add_release",
@@ -29,11 +29,6 @@ Vector = NDArray[np.float64]  # one axis
 Matrix = NDArray[np.float64]  # two axes
 
 STATUS_FINE, STATUS_CONTACTS = 0, 1
-_SWEEP_LIMIT = 500
-_SWEEP_ACCEPTED = 1e-11  # change of a gap over the largest change that a contact force makes
-SEPARATED = 0.1
-"""Gap over the deepest indentation so far at which a contact forgets its approach speed."""
-
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
@@ -234,10 +229,10 @@ def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
     for c in range(count):
         if contacts.alpha[c] > 0.0 and now.approaching[c] and free[c] < 0.0:
             # mean rate of the gap over the step of onset: no force has acted yet
-            now.chi[c] = contacts.alpha[c] / max(now.gap[c] - free[c], 1e-30)
+            now.chi[c] = contacts.alpha[c] / max(now.gap[c] - free[c], LEAST_WAY)
             now.approaching[c] = False
     closed = False
-    for sweep in range(_SWEEP_LIMIT):
+    for sweep in range(SWEEPS):
         change, largest, lost = 0.0, 0.0, 0.0
         for c in range(count):
             df = now.e[c] - free[c]
@@ -263,7 +258,7 @@ def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
             lost += loss
             F[c] = force
             closed = closed or force > 0.0
-        if count == 1 or change <= _SWEEP_ACCEPTED * largest:
+        if count == 1 or change <= SETTLED * largest:
             return True, closed, lost
     return False, closed, 0.0
 

@@ -12,10 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.contact.laws import LAW_LINEAR
+from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
-from klack.simulation.kernel import FAST, SEPARATED, STATUS_FINE, add_release, push_on
+from klack.simulation.kernel import FAST, STATUS_FINE, add_release, push_on
 from klack.simulation.phase import compiled, phase
 
 __all__ = ["run_one_contact"]
@@ -245,7 +245,7 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
         else:
             if contacts.alpha[0] > 0.0 and approaching and free < 0.0:
                 # mean rate of the gap over the step of onset: no force has acted yet
-                chi, approaching = contacts.alpha[0] / max(now.gap - free, 1e-30), False
+                chi, approaching = contacts.alpha[0] / max(now.gap - free, LEAST_WAY), False
             force, hint, lost = solve_step(
                 contacts.law_kind[0],
                 contacts.law_data,
