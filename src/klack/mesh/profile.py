@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.mesh.curve import SAME, Curve, Point, crossings, on_axis
 
-__all__ = ["Arc", "Curve", "Line", "Profile"]
+__all__ = ["Arc", "Line", "Profile"]
 
 
 @dataclass(frozen=True, slots=True)
