@@ -105,9 +105,9 @@ def test_materials_and_masses_survive_the_units(tmp_path):
     model = read_back(tmp_path / "two.inp", bodies, SETTINGS)
 
     for solid, material in (("UPPER_1", STEEL), ("LOWER_1", BRASS)):
-        read = model.materials[model.sections[solid]].in_si(stress=1e6, density=1e12)
-        for key in ("young", "poisson", "density"):
-            assert getattr(read, key) == pytest.approx(getattr(material, key), rel=1e-12)
+        read = model.materials[model.sections[solid]]
+        for key, unit in (("young", 1e6), ("poisson", 1.0), ("density", 1e12)):  # t, mm, s
+            assert unit * getattr(read, key) == pytest.approx(getattr(material, key), rel=1e-12)
     assert bodies.upper.mass == pytest.approx(7850 * 1e-3 * 0.8e-3 * 1.997e-3, rel=1e-12)
 
 

@@ -102,16 +102,6 @@ class Profile:
         """Volume of the body of revolution [m^3] (Pappus)."""
         return 2 * np.pi * self._integral(1, 0)
 
-    @cached_property
-    def centroid_height(self) -> float:
-        """Height z of the centre of volume [m]."""
-        return 2 * np.pi * self._integral(1, 1) / self.volume
-
-    @cached_property
-    def axial_moment(self) -> float:
-        """Volume moment about the axis, integral of r^2 dV [m^5]."""
-        return 2 * np.pi * self._integral(3, 0)
-
     def surface_area(self, name: str) -> float:
         """Area of the surface swept by the edges called ``name`` [m^2]."""
         if name not in self.names:

@@ -382,7 +382,7 @@ def _turned(points: ContactPoints, state: State, step: _Step) -> bool:
 
 
 @phase
-def _close(modes: Modes, points: ContactPoints, state: State, step: _Step) -> float:
+def _close(points: ContactPoints, state: State, step: _Step) -> float:
     """Let the new contact forces act; returns the least gap [m]."""
     least = 1e300
     for k in range(len(points.gap)):
@@ -571,7 +571,7 @@ def march(
                 if wait and _turned(points, state, step):
                     return taken, TURNED
                 books[ROUNDS] += rounds
-                least = _close(modes, points, state, step)
+                least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
             pay, potential, answer = _pay(modes, points, state, step, share, potential, answer)
