@@ -25,7 +25,7 @@ from klack.exchange.calculix_deck import (
     write_deck,
 )
 from klack.materials import Material
-from klack.mesh.files.abaqus.reader import read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
 from klack.progress import silent
@@ -61,7 +61,7 @@ def impact(family: str = "tet10", *, distance: float = 3e-6, **more: float) -> C
 
 def read_back(deck: Path, impact: CalculixImpact, settings: CalculixSettings) -> MeshModel:
     write_deck(impact, settings, deck)
-    return read_abaqus_model(deck, 1e-3)
+    return read_abaqus(deck, 1e-3)
 
 
 def faces(points: np.ndarray, surface: Surface) -> np.ndarray:

@@ -56,15 +56,7 @@ def read_ansys_archive(
 ) -> MeshModel:
     """Read mesh, components and materials of an ANSYS archive.
 
-    Parameters
-    ----------
-    path : path
-    unit_length : float [m] or None
-        Unit of the coordinates.  None takes the one of the /UNITS command.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
-    solids_only : bool
-        Leave out beams, springs, masses and shells, and count them.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
 
     Returns
     -------
