@@ -117,7 +117,7 @@ def _checked_case(
 
     from pydantic import ValidationError
 
-    from klack.case.valve import StrokeRun
+    from klack.case.valve_sections import StrokeRun
     from klack.errors import InputError
 
     try:

@@ -345,7 +345,7 @@ def pair_model(
         constant=constant,
         inputs=inputs,
         outputs=_motion(system, moving, rise / body.mass, rest),
-        contacts=_contacts(system, contact_names, films, flat.rows, rest),
+        contacts=_contacts(system, contact_names, films, flat.contacts.rows, rest),
         residual_compliance=np.zeros((len(inputs), len(inputs))),
         step=step,
         duration=duration,

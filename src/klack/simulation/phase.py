@@ -1,8 +1,10 @@
-"""The decorator of the parts that the time loop of a network is made of."""
+"""The decorator of the parts that a compiled time loop is made of."""
+
+from functools import partial
 
 from numba import njit
 
-__all__ = ["phase"]
+__all__ = ["compiled", "phase"]
 
 phase = njit(
     cache=True,
@@ -12,8 +14,16 @@ phase = njit(
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,
 )
-"""Compile a function into those compiled ones that call it, without the runtime of numba.
+"""Compile a function into the compiled ones that call it; it makes no array.
 
-Bundles of arrays come as :func:`klack.network.step_function.pointers`: an access to an array checks
-for a negative index and loads a stride, and handing it over counts references.
+Without the runtime of numba: counting the references of all arrays of a bundle costs more than most
+phases.  Not to be called from Python.  In the loop of networks bundles of arrays come as
+:func:`klack.network.step_function.pointers`: an access to an array also checks for a negative index
+and loads a stride.
+"""
+
+compiled = partial(njit, cache=True, _nrt=True, error_model="python", forceinline=False)
+"""Compile a function that phases call but do not contain.
+
+Says what numba would else take over from whichever function calls it first.
 """

@@ -51,7 +51,8 @@ from klack.assembling.reduced_pair import (
 )
 from klack.assembling.structures import impact_structures
 from klack.cache.setting import result_cache
-from klack.case.schema import Case, SubmodelLocalLaw
+from klack.case.impact_sections import SubmodelLocalLaw
+from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
