@@ -12,7 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
@@ -179,7 +179,7 @@ class Result:
     """
 
     record: Any
-    analysis: Analysis[Any]
+    analysis: StoredAnalysis[Any]
 
     @cached_property
     def measures(self) -> Mapping[str, Mapping[str, Number]]:

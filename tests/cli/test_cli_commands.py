@@ -15,10 +15,10 @@ import pytest
 from klack import verification
 from klack.cli import demo as demo_module
 from klack.cli.main import main
-from klack.cli.output import staged_folder, write_json
-from klack.cli.progress import show_progress
-from klack.cli.tables import print_table
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.terminal.output import staged_folder, write_json
+from klack.terminal.progress import show_progress
+from klack.terminal.tables import print_table
 from klack.verification import GROUPS, Check, compare, run_checks
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
@@ -371,7 +371,7 @@ def test_full_disk_is_one_clear_error(tmp_path):
 
 
 def test_json_is_whole_or_absent(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.cli.output.json", json)  # this is no result of a command
+    monkeypatch.setattr("klack.terminal.output.json", json)  # this is no result of a command
     target = tmp_path / "x.json"
     write_json(target, {"peak_force_N": 250.0})
 
@@ -385,7 +385,7 @@ def test_json_is_whole_or_absent(tmp_path, monkeypatch):
 def test_progress_reports_only_stages_that_took_long(monkeypatch, capsys):
     clock = iter([0.0, 0.0, 0.0, 1.0, 1.0, 6.0, 6.0, 6.5])
     played = SimpleNamespace(perf_counter=lambda: next(clock))
-    monkeypatch.setattr("klack.cli.progress.time", played)
+    monkeypatch.setattr("klack.terminal.progress.time", played)
 
     with show_progress() as progress:
         progress("mesh", 0.0)

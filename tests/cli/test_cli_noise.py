@@ -284,7 +284,7 @@ def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):
         for name, unit in (
             ("structure-borne energy injected", "uJ"),
             ("sound exposure level", "dB"),
-            ("the same, A-weighted", "dB"),
+            ("the same, A-weighted", "dBA"),
             ("loudness, loudest moment", "sone"),
         )
     )

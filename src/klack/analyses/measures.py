@@ -6,28 +6,32 @@ its entry in the glossary, its attributes in exported files and its line in the 
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, log10
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
+from klack.units import format_si
 
 __all__ = [
     "Column",
     "Measure",
+    "cells",
     "described",
     "glossary",
+    "heads",
     "json_of",
     "json_type",
     "number_or_none",
+    "page_cells",
+    "page_heads",
 ]
 
 Of = TypeVar("Of", contravariant=True)
 
 Value = float | int | bool | None
-Form = Literal["quantity", "fixed", "share", "power", "count", "signed", "signed share"]
 
 _SUFFIXES = {
     "N": "_N",
@@ -43,8 +47,13 @@ _SUFFIXES = {
     "acum": "_acum",
     "dB": "_dB",
     "dBA": "_dBA",
+    "um": "_um",
+    "kg": "_kg",
+    "m/N": "_m_per_N",
     "1": "",
+    "": "",
 }
+_LEVELS = {"amplitude": 20.0, "energy": 10.0}
 _KINDS: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": bool}
 
 
@@ -83,7 +92,7 @@ class Measure(Generic[Of]):
     symbol : str
         In formulas.
     unit : str
-        SI, ``"1"`` for a pure number.
+        SI, ``"1"`` for a pure number; empty where ``unit_of`` tells it of each thing.
     definition : str
         One sentence; ``note`` may add to it in a glossary.
     source : str
@@ -104,11 +113,14 @@ class Measure(Generic[Of]):
     remark : callable
         Behind the value in tables, for example that it was cut off.
     deviation : str
-        How two runs are compared: ``"relative"`` or by their ``"difference"``.
+        How two runs are compared: by their ``"relative"`` or plain ``"difference"``, by the
+        ``"factor"`` between them, or by its level in dB, of an ``"amplitude"`` or an ``"energy"``.
     page : bool
         Whether it stands among the key numbers of a report.
     absent : str
         What tables say where there is no value.
+    unit_of, digits_of : callable, optional
+        Unit of the value of one thing, empty for a pure number; its significant digits.
     """
 
     key: str
@@ -126,11 +138,13 @@ class Measure(Generic[Of]):
     column: Column | None = None
     given: Callable[[Of], bool] = lambda _: True
     remark: Callable[[Of], str] = lambda _: ""
-    deviation: Literal["", "relative", "difference"] = ""
+    deviation: Literal["", "relative", "difference", "factor", "amplitude", "energy"] = ""
     page: bool = False
     absent: str = "–"
     title: str = ""
     note: str = ""
+    unit_of: Callable[[Of], str] | None = None
+    digits_of: Callable[[Of], int] | None = None
 
     @property
     def json_key(self) -> str:
@@ -152,6 +166,8 @@ class Measure(Generic[Of]):
     def cell(self, of: Of) -> str:
         """Value in its column on a terminal; a dash where it does not exist."""
         value = self.read(of)
+        if value is not None and isfinite(value) and self.unit_of is not None:
+            return format_si(value, self.unit_of(of), self._digits(of))
         if self.column is None or value is None or not isfinite(value):
             return self.absent
         # whole numbers stay whole
@@ -169,14 +185,22 @@ class Measure(Generic[Of]):
     def on_page(self, of: Of) -> str:
         """Value in a report."""
         value = self.read(of)
-        return (self.absent if value is None else self.printed(value)) + self.remark(of)
+        if value is None or (self.unit_of is not None and not isfinite(value)):
+            return self.absent
+        if self.unit_of is not None:
+            return quantity(value, self.unit_of(of), self._digits(of)) + self.remark(of)
+        return self.printed(value) + self.remark(of)
+
+    def _digits(self, of: Of) -> int:
+        return self.digits if self.digits_of is None else self.digits_of(of)
 
     def printed(self, value: float) -> str:
         """A value of this kind as a report prints it."""
+        unit = {"1": "", "um": "µm"}.get(self.unit, self.unit)
         if self.form == "count":
             return count(int(value))
         if self.form == "fixed":
-            return fixed(value, self.digits, self.unit if self.unit != "1" else "")
+            return fixed(value, self.digits, unit)
         if self.form == "share":
             return share(value, self.digits)
         if self.form == "power":
@@ -185,7 +209,44 @@ class Measure(Generic[Of]):
             return signed(value, self.digits)
         if self.form == "signed share":
             return signed_share(value, self.digits)
-        return quantity(value, self.unit if self.unit != "1" else "", self.digits)
+        return quantity(value, unit, self.digits)
+
+    def apart(self, of: Of, reference: Of) -> str:
+        """How far a value is from that of a reference on a terminal: ``+3.0 dB``, ``x 1.2``.
+
+        Differences are those of levels.
+        """
+        values = (self.read(of), self.read(reference))
+        value, other = (float("nan") if item is None else float(item) for item in values)
+        if self.deviation == "factor" and value > 0.0 and other > 0.0:
+            return f"x {value / other:.3g}"
+        if self.deviation == "difference":
+            level = value - other
+        elif self.deviation in _LEVELS and value > 0.0 and other > 0.0:
+            level = _LEVELS[self.deviation] * log10(value / other)
+        else:
+            return self.absent
+        return f"{round(level, 1) + 0.0:+.1f} dB" if isfinite(level) else self.absent
+
+
+def heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
+    """Heads of the columns of a terminal; measures without a column are left out."""
+    return tuple(measure.head for measure in measures if measure.column is not None)
+
+
+def cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
+    """One row below :func:`heads`."""
+    return tuple(measure.cell(of) for measure in measures if measure.column is not None)
+
+
+def page_heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
+    """What a report calls its key numbers, those with ``page``."""
+    return tuple(measure.title or measure.name for measure in measures if measure.page)
+
+
+def page_cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
+    """Key numbers of a report in the order of :func:`page_heads`."""
+    return tuple(measure.on_page(of) for measure in measures if measure.page)
 
 
 def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
@@ -227,7 +288,7 @@ def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
             "key": item.json_key,
             "name": item.name,
             "symbol": item.symbol,
-            "unit": item.unit,
+            "unit": item.unit or "that of the quantity",
             "definition": item.definition,
             "source": item.source,
         }

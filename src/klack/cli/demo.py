@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.impact import run_case
-from klack.cli.options import Json, Out, Quiet, Threads
+from klack.analyses.impact.command import run_case
+from klack.terminal.options import Json, Out, Quiet, Threads
 
 __all__ = ["demo"]
 

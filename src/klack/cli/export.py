@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
-from klack.cli.options import Components, Json, Out, Quiet, Threads, imported, require_threads
-from klack.cli.output import Written, require_folder, require_json_target, write_json
-from klack.cli.stored import is_result
+from klack.analyses.result_folder import is_result
 from klack.errors import InputError
+from klack.terminal.notes import print_notes
+from klack.terminal.options import Components, Json, Out, Quiet, Threads, imported, require_threads
+from klack.terminal.output import Written, require_folder, require_json_target, write_json
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import ExportJson

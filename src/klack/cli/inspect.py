@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Components, Json, Quiet, imported
-from klack.cli.output import require_json_target, write_json
-from klack.cli.tables import print_table
+from klack.terminal.options import Components, Json, Quiet, imported
+from klack.terminal.output import require_json_target, write_json
+from klack.terminal.tables import print_table
 
 if TYPE_CHECKING:
     from klack.analyses.inspection import Row

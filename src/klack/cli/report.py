@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
-from klack.cli.options import Json, Quiet
-from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.terminal.notes import print_notes
+from klack.terminal.options import Json, Quiet
+from klack.terminal.output import require_folder, require_json_target, staged_folder, write_json
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import ReportJson
@@ -32,7 +32,7 @@ def report(
     """Write report.html and report.pdf of a stored result."""
     from klack.analyses.catalogue import analysis_in
     from klack.analyses.incomplete import missing_in
-    from klack.cli.reports import REPORTS, beside_result, write_reports
+    from klack.analyses.result_folder import REPORTS, beside_result, write_reports
 
     require_json_target(json)
     folder = out if out is not None else result

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Json, Quiet
-from klack.cli.output import require_file_target, require_json_target, write_json
-from klack.cli.progress import show_progress
 from klack.cli.verify_text import print_checks, print_groups
+from klack.terminal.options import Json, Quiet
+from klack.terminal.output import require_file_target, require_json_target, write_json
+from klack.terminal.progress import show_progress
 from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:

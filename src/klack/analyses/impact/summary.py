@@ -1,7 +1,10 @@
 """The few numbers of a study that a script or a terminal wants."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured, TextTable
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
@@ -12,12 +15,14 @@ from klack.analyses.impact.measures import (
     PEAK_FORCE,
 )
 from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.json_results import ImpactJson
-from klack.analyses.measures import json_of
+from klack.analyses.json_parts import ContactJson
+from klack.analyses.measures import cells, heads, json_of, json_type
 from klack.contact.restitution import Deviation
 
 __all__ = [
     "SUMMARY_COLUMNS",
+    "DeviationJson",
+    "ImpactJson",
     "answer_line",
     "estimate_lines",
     "no_estimate",
@@ -27,8 +32,47 @@ __all__ = [
     "summary_rows",
 ]
 
-_TOLD = tuple(measure for measure in LEVEL_MEASURES if measure.column is not None)
-SUMMARY_COLUMNS = ("level", *(measure.head for measure in _TOLD))
+SUMMARY_COLUMNS = ("level", *heads(LEVEL_MEASURES))
+
+
+if TYPE_CHECKING:  # made from the catalogue of measures
+    DeviationJson: TypeAlias = dict[str, Any]
+    LevelJson: TypeAlias = dict[str, Any]
+else:
+    DeviationJson = json_type(
+        "DeviationJson", "How far one result is from another one.", DEVIATION_MEASURES
+    )
+    LevelJson = json_type(
+        "LevelJson",
+        "Impact at one level.",
+        LEVEL_MEASURES,
+        {"doubts": Annotated[list[str], Field(description="Why the level may be wrong.")]},
+    )
+
+
+class ImpactJson(TypedDict):
+    """``klack impact`` and ``klack demo``."""
+
+    schema: Literal["klack-impact/1"]
+    case: str
+    complete: Annotated[bool, Field(description="False: a level failed.")]
+    failures: Annotated[
+        dict[str, str], Field(description="Why a level has no numbers, by its name.")
+    ]
+    answer: Annotated[str, Field(description="Name of the best level.")]
+    levels: Annotated[dict[str, LevelJson], Field(description="By the name of the level.")]
+    deviation: Annotated[
+        DeviationJson | None, Field(description="Of the level reduced from the reference.")
+    ]
+    deviations: Annotated[
+        dict[str, DeviationJson], Field(description="Of every level that is not the reference.")
+    ]
+    estimated_error: Annotated[
+        dict[str, DeviationJson | None],
+        Field(description="Of every reduced level, by a run at the interface level."),
+    ]
+    contact: Annotated[ContactJson, Field(description="All levels but lumped share it.")]
+    warnings: list[str]
 
 
 def study_to_json(study: ImpactStudy) -> ImpactJson:
@@ -139,10 +183,7 @@ def _signed(value: float, digits: int) -> str:
 
 def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`SUMMARY_COLUMNS`, one per level, as text."""
-    return tuple(
-        (name, *(measure.cell(result) for measure in _TOLD))
-        for name, result in study.levels.items()
-    )
+    return tuple((name, *cells(LEVEL_MEASURES, result)) for name, result in study.levels.items())
 
 
 def _level(result: LevelResult) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
+from klack.analyses.ending import Wanted
+from klack.terminal.options import (
     CaseArgument,
     Components,
     Json,
@@ -14,10 +14,8 @@ from klack.cli.options import (
     Quiet,
     Threads,
     imported,
-    require_threads,
 )
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase
@@ -69,16 +67,14 @@ def stroke(
     """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
     from klack.case.shipped import find_case
 
-    require_json_target(json)
-    require_threads(threads)
+    asked = Wanted(json=json, quiet=quiet, threads=threads)
     with show_progress(quiet):
         checked = _checked_case(find_case(case), duration, step, imported(component))
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
     folder = out if out is not None else Path("klack-results") / checked.name
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = asked.into(folder, report=report)
 
     with show_progress(quiet):
         from klack.analyses.stroke.analysis import STROKE

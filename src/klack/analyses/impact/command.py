@@ -5,10 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.analyses.ending import Wanted
+from klack.terminal.options import CaseArgument, Json, Levels, Out, Quiet, Threads
+from klack.terminal.progress import show_progress
 
 __all__ = ["impact", "run_case"]
 
@@ -61,14 +60,12 @@ def run_case(
     """Run a case, write and print what came out; return the folder of the results."""
     from klack.case import find_case, load_case
 
-    require_json_target(json)
-    require_threads(threads)
+    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     with show_progress(quiet):
         checked = load_case(find_case(case))
         levels = checked.require_levels(level if level else checked.run.levels)
         folder = out if out is not None else Path("klack-results") / checked.name
-        ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-        ending.require_possible()
+        ending = wanted.into(folder, report=report)
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact

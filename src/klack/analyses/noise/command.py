@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
+from klack.analyses.ending import Wanted
+from klack.analyses.result_folder import is_result
+from klack.terminal.options import (
     Components,
     Json,
     Out,
     Quiet,
     Threads,
     imported,
-    require_threads,
 )
-from klack.cli.output import require_json_target
-from klack.cli.progress import Progress, show_progress
-from klack.cli.stored import is_result
+from klack.terminal.progress import Progress, show_progress
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource
@@ -63,15 +61,13 @@ def noise(
     quiet: Quiet = False,
 ) -> int:
     """Estimate what is heard: force spectra, vibration, radiated sound, loudness, WAV files."""
-    require_json_target(json)
-    require_threads(threads)
+    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
     _require_known(paths)
     own = imported(component)
     folder = out if out is not None else Path("klack-results") / _folder_name(paths)
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = wanted.into(folder, report=report)
 
     with show_progress(quiet):
         from klack.analyses.noise.analysis import NOISE

@@ -1,12 +1,11 @@
 """``klack reduce``: bodies to reduced bodies, with their transfer functions."""
 
-import sys
 from pathlib import Path
 
-from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
-from klack.cli.progress import show_progress
-from klack.cli.tables import print_table
+from klack.analyses.ending import Wanted
+from klack.terminal.options import CaseArgument, Json, Out, Quiet, Threads
+from klack.terminal.output import require_folder, staged_folder
+from klack.terminal.progress import show_progress
 
 __all__ = ["reduce"]
 
@@ -23,13 +22,13 @@ def reduce(
     """Reduce both bodies and compare transfer functions with and without correction."""
     from klack.case import find_case, load_case
 
-    require_json_target(json)
-    require_threads(threads)
+    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     checked = load_case(find_case(case))
     folder = out if out is not None else Path("klack-results") / checked.name
     require_folder(folder)
 
     with show_progress(quiet):
+        from klack.analyses.reduction.analysis import REDUCTION
         from klack.analyses.reduction.run import run_reduce
 
     with show_progress(quiet) as progress:
@@ -37,10 +36,7 @@ def reduce(
     with staged_folder(folder) as stage:
         study.save(stage)
         made = ", ".join(sorted(path.name for path in stage.iterdir()))
-    if not quiet:
-        to_stderr = str(json) == "-"
-        print_table(checked.title, study.columns, study.rows(), to_stderr=to_stderr)
-        print(f"Results in {folder}: {made}", file=sys.stderr if to_stderr else sys.stdout)
-    if json is not None:
-        write_json(json, study.to_json())
+    wanted.tell(REDUCTION, study)
+    wanted.say(f"Results in {folder}: {made}")
+    wanted.write(REDUCTION, study)
     return 0

@@ -5,10 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.analyses.ending import Wanted
+from klack.terminal.options import CaseArgument, Json, Out, Quiet, Threads
+from klack.terminal.progress import show_progress
 
 __all__ = ["shots"]
 
@@ -48,8 +47,7 @@ def shots(
     """Drop the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
     from klack.errors import require_nonnegative, require_positive
 
-    require_json_target(json)
-    require_threads(threads)
+    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     if count is not None:
         require_positive("--shots", count, "shots")
     if seed is not None:
@@ -64,8 +62,7 @@ def shots(
     checked = load_case(find_case(case))
     total = count if count is not None else shots_of(checked).count
     folder = out if out is not None else Path("klack-results") / checked.name
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = wanted.into(folder, report=report)
 
     with show_progress(quiet):
         from klack.analyses.shots.analysis import SHOTS

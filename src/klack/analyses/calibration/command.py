@@ -1,12 +1,12 @@
 """``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
+from klack.analyses.ending import Wanted
+from klack.terminal.options import (
     CaseArgument,
     Components,
     Json,
@@ -15,13 +15,8 @@ from klack.cli.options import (
     Threads,
     imported,
     require_files,
-    require_threads,
 )
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
-
-if TYPE_CHECKING:
-    pass
+from klack.terminal.progress import show_progress
 
 __all__ = ["calibrate"]
 
@@ -64,8 +59,7 @@ def calibrate(
 
     from klack.errors import require_positive
 
-    require_json_target(json)
-    require_threads(threads)
+    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     require_files("--measurement", measurement)
     for option, number, unit in (("--strokes", strokes, "strokes"), ("--workers", workers, "")):
         if number is not None:
@@ -79,8 +73,7 @@ def calibrate(
     checked = tree.case()
     fitted = calibration_of(checked).channels
     folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = wanted.into(folder, report=report)
 
     from klack.analyses.calibration.analysis import CALIBRATION
     from klack.analyses.calibration.calibrated_case import CALIBRATED_NAME, calibrated_text

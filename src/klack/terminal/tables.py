@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable, Sequence
 
-from klack.cli.printable import printable
+from klack.terminal.printable import printable
 
 __all__ = ["print_table"]
 
