@@ -5,7 +5,8 @@ its entry in the glossary, its attributes in exported files and its line in the 
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite, log10
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
@@ -20,6 +21,7 @@ __all__ = [
     "Measure",
     "cells",
     "described",
+    "described_in",
     "glossary",
     "heads",
     "json_of",
@@ -79,6 +81,16 @@ class Column:
     head: str = ""
 
 
+def _unread(_: Any) -> Value:
+    return None
+
+
+def _under(key: str, of: Any) -> Value:
+    """What stands under a key of a mapping, or is called so in a record."""
+    value: Value = of[key] if isinstance(of, Mapping) else getattr(of, key)
+    return value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measure(Generic[Of]):
     """One number that people name.
@@ -88,7 +100,8 @@ class Measure(Generic[Of]):
     key : str
         In JSON, before its unit.
     name : str
-        In words; ``title`` is what a report calls it where that differs.
+        In words, those of the key by default; ``title`` is what a report calls it where that
+        differs.
     symbol : str
         In formulas.
     unit : str
@@ -96,15 +109,16 @@ class Measure(Generic[Of]):
     definition : str
         One sentence; ``note`` may add to it in a glossary.
     source : str
-        Page of the theory, or standard.
+        Page of the documentation; see :func:`described_in`.
     read : callable
-        Its value [unit], nan or None where it does not exist.
+        Its value [unit], nan or None where it does not exist; what stands under its key by
+        default.
     kind : str
         A ``"number"``, a ``"whole"`` number or a ``"truth"`` value.
     form : str
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
-        ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, or
-        with a sign.
+        ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
+        is that of whole numbers, or with a sign.
     digits : int
     column : Column, optional
         Of tables on a terminal that show it.
@@ -124,12 +138,12 @@ class Measure(Generic[Of]):
     """
 
     key: str
-    name: str
-    symbol: str
-    unit: str
     definition: str
-    source: str
-    read: Callable[[Of], Value]
+    name: str = ""
+    symbol: str = ""
+    unit: str = "1"
+    source: str = ""
+    read: Callable[[Of], Value] = _unread
     kind: Literal["number", "whole", "truth"] = "number"
     form: Literal["quantity", "fixed", "share", "power", "count", "signed", "signed share"] = (
         "quantity"
@@ -145,6 +159,15 @@ class Measure(Generic[Of]):
     note: str = ""
     unit_of: Callable[[Of], str] | None = None
     digits_of: Callable[[Of], int] | None = None
+
+    def __post_init__(self) -> None:
+        """Take from the key what is not said."""
+        if not self.name:
+            object.__setattr__(self, "name", self.key.replace("_", " "))
+        if self.read is _unread:
+            object.__setattr__(self, "read", partial(_under, self.key))
+        if self.kind != "number" and self.form == "quantity":
+            object.__setattr__(self, "form", "count")
 
     @property
     def json_key(self) -> str:
@@ -227,6 +250,11 @@ class Measure(Generic[Of]):
         else:
             return self.absent
         return f"{round(level, 1) + 0.0:+.1f} dB" if isfinite(level) else self.absent
+
+
+def described_in(source: str, *measures: Measure[Of]) -> tuple[Measure[Of], ...]:
+    """A catalogue: measures whose equations stand on one page of the documentation."""
+    return tuple(replace(item, source=item.source or source) for item in measures)
 
 
 def heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:

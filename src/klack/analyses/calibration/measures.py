@@ -3,7 +3,7 @@
 from operator import attrgetter
 
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy, FittedImpact
-from klack.analyses.measures import Measure
+from klack.analyses.measures import Measure, described_in
 from klack.report.wording import count
 
 __all__ = [
@@ -84,17 +84,14 @@ def _resumed(study: CalibrationStudy) -> str:
     return f", {count(study.resumed)} of them from an earlier run" if study.resumed else ""
 
 
-CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = (
+CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
+    _THEORY,
     Measure(
         key="strokes",
-        name="strokes",
         symbol="n",
-        unit="1",
         definition="Strokes that were fitted.",
-        source=_THEORY,
         read=lambda study: len(study.strokes),
         kind="whole",
-        form="count",
         page=True,
     ),
     Measure(
@@ -104,7 +101,6 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = (
         unit="um",
         definition="Root mean square of the mean measured stroke less the calibrated one, inside "
         "the fitted windows.",
-        source=_THEORY,
         read=lambda study: 1e6 * study.residual_rms,
         form="fixed",
         digits=3,
@@ -115,7 +111,6 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = (
         symbol="r_0",
         unit="um",
         definition="The same with the values of the case.",
-        source=_THEORY,
         read=lambda study: 1e6 * study.residual_rms_before,
         form="fixed",
         digits=3,
@@ -124,106 +119,54 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = (
         key="degrees_of_freedom",
         name="degrees of freedom of Student's t",
         symbol="n-1",
-        unit="1",
         definition="Degrees of freedom of Student's t for the 95 % intervals.",
-        source=_THEORY,
         read=attrgetter("degrees"),
         kind="whole",
-        form="count",
         page=True,
     ),
     Measure(
         key="misfit",
-        name="misfit",
         symbol="chi",
-        unit="1",
         definition="Weighted root mean square residual of the mean stroke in standard errors of "
         "the mean.",
         note="About 1 or less if only scatter is left; far above, something in the model is wrong.",
-        source=_THEORY,
-        read=attrgetter("misfit"),
         form="fixed",
         digits=2,
         page=True,
     ),
     Measure(
         key="iterations",
-        name="iterations",
-        symbol="",
-        unit="1",
         definition="Steps of the fit.",
-        source=_THEORY,
-        read=attrgetter("iterations"),
         kind="whole",
-        form="count",
         remark=lambda study: "" if study.converged else ", not settled",
         page=True,
     ),
     Measure(
         key="evaluations",
         name="computed strokes",
-        symbol="",
-        unit="1",
         definition="Strokes that were computed for the fit.",
-        source=_THEORY,
-        read=attrgetter("evaluations"),
         kind="whole",
-        form="count",
         remark=_resumed,
         page=True,
     ),
     Measure(
         key="resumed",
-        name="resumed",
-        symbol="",
-        unit="1",
         definition="Computed strokes that were taken over from an interrupted run.",
-        source=_THEORY,
-        read=attrgetter("resumed"),
         kind="whole",
-        form="count",
     ),
     Measure(
         key="workers",
         name="processes",
-        symbol="",
-        unit="1",
         definition="Processes that computed strokes; the numbers do not depend on it.",
-        source=_THEORY,
-        read=attrgetter("workers"),
         kind="whole",
-        form="count",
         page=True,
     ),
-    Measure(
-        key="converged",
-        name="converged",
-        symbol="",
-        unit="1",
-        definition="Whether the fit settled.",
-        source=_THEORY,
-        read=attrgetter("converged"),
-        kind="truth",
-        form="count",
-    ),
-    Measure(
-        key="wall_time",
-        name="wall time",
-        symbol="",
-        unit="s",
-        definition="Wall time of the whole calibration.",
-        source=_THEORY,
-        read=attrgetter("wall_time"),
-        digits=3,
-    ),
+    Measure(key="converged", definition="Whether the fit settled.", kind="truth"),
+    Measure(key="wall_time", unit="s", definition="Wall time of the whole calibration.", digits=3),
     Measure(
         key="profile_time",
-        name="profile time",
-        symbol="",
         unit="s",
         definition="Wall time of the profiles of the likelihood alone.",
-        source=_THEORY,
-        read=attrgetter("profile_time"),
         digits=3,
     ),
 )

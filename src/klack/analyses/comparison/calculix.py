@@ -14,7 +14,7 @@ from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.summary import DeviationJson
 from klack.analyses.json_parts import Real
-from klack.analyses.measures import Column, Measure, cells, heads, json_of, json_type
+from klack.analyses.measures import Column, Measure, cells, described_in, heads, json_of, json_type
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
@@ -158,52 +158,38 @@ def _of_run(measure: Measure[LevelResult]) -> Measure[ProgramRun]:
     )
 
 
-PROGRAM_MEASURES: tuple[Measure[ProgramRun], ...] = (
+PROGRAM_MEASURES: tuple[Measure[ProgramRun], ...] = described_in(
+    "theory/calculix",
     *(_of_run(measure) for measure in LEVEL_MEASURES if measure.key in _SHARED),
     Measure(
         key="energy_balance",
-        name="energy balance",
         symbol="r_E",
-        unit="1",
         definition="Energy gained (negative: lost) by the numerics of a run without damping, over "
         "the energy turned over.",
-        source="theory/calculix",
-        read=attrgetter("energy_balance"),
         form="power",
         column=Column("", 1.0, "+.1e"),
         absent="",
     ),
     Measure(
         key="steps",
-        name="steps",
         symbol="n_t",
-        unit="1",
         definition="Time steps of the run.",
-        source="theory/calculix",
-        read=attrgetter("steps"),
         kind="whole",
-        form="count",
         column=Column("", 1.0, "d"),
     ),
     Measure(
         key="step",
-        name="step",
         symbol="dt",
         unit="s",
         definition="Length of a time step.",
-        source="theory/calculix",
         read=attrgetter("history.step"),
         digits=3,
     ),
     Measure(
         key="wall_time",
-        name="wall time",
-        symbol="",
         unit="s",
         definition="Wall time: set-up and time integration of klack, the whole run of the other "
         "program.",
-        source="theory/calculix",
-        read=attrgetter("wall_time"),
         digits=3,
         column=Column("s", 1.0, ".3g"),
         absent="",

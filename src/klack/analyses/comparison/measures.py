@@ -11,7 +11,7 @@ from klack.analyses.comparison.strokes_record import (
     ComparedVariant,
     HighestShot,
 )
-from klack.analyses.measures import Column, Measure
+from klack.analyses.measures import Column, Measure, described_in
 
 __all__ = [
     "COMPARED",
@@ -187,17 +187,14 @@ VELOCITY_CURVE = _curve(
 )
 LIFT = _compared("lift", "s", "m", _LIFT, "Lift between both stops.", attrgetter("way"))
 
-VARIANT_MEASURES: tuple[Measure[ComparedVariant], ...] = (
+VARIANT_MEASURES: tuple[Measure[ComparedVariant], ...] = described_in(
+    _THEORY,
     Measure(
         key="strokes",
-        name="strokes",
         symbol="n",
-        unit="1",
         definition="Measured strokes that are used.",
-        source=_THEORY,
         read=attrgetter("count"),
         kind="whole",
-        form="count",
         page=True,
     ),
     *LIFT_CURVE,
@@ -208,23 +205,20 @@ VARIANT_MEASURES: tuple[Measure[ComparedVariant], ...] = (
         symbol="f_v",
         unit="Hz",
         definition="3 dB of the differentiator that makes velocity of lift, computed and measured.",
-        source=_THEORY,
-        read=attrgetter("velocity_bandwidth"),
         digits=3,
     ),
     *LIFT,
 )
 """Of one variant beside its measurement."""
 
-HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = (
+HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = described_in(
+    _THEORY,
     Measure(
         key="rebound_height",
         name="height",
         symbol="h_max",
         unit="m",
         definition="Rebound height of the measured stroke that rebounds highest from a stop.",
-        source=_THEORY,
-        read=attrgetter("rebound_height"),
         column=Column("um", 1e6, ".2f"),
         remark=lambda shot: f" ± {1e6 * shot.rebound_height_error:.2f}",
         page=True,
@@ -232,21 +226,14 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = (
     Measure(
         key="rebound_height_error",
         name="standard error of the height",
-        symbol="",
         unit="m",
         definition="Standard error of that height.",
-        source=_THEORY,
-        read=attrgetter("rebound_height_error"),
         digits=2,
     ),
     Measure(
         key="restitution",
-        name="restitution",
         symbol="e",
-        unit="1",
         definition="Restitution of the same stroke.",
-        source=_THEORY,
-        read=attrgetter("restitution"),
         form="fixed",
         digits=3,
         column=Column("", 1.0, ".3f"),
@@ -256,11 +243,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = (
     Measure(
         key="restitution_error",
         name="standard error of the restitution",
-        symbol="",
-        unit="1",
         definition="Standard error of that restitution.",
-        source=_THEORY,
-        read=attrgetter("restitution_error"),
         form="fixed",
         digits=3,
     ),
@@ -268,22 +251,16 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = (
         key="strokes",
         name="of strokes",
         symbol="n",
-        unit="1",
         definition="Strokes of which it is the highest.",
-        source=_THEORY,
         read=attrgetter("count"),
         kind="whole",
-        form="count",
         column=Column("", 1.0, "d"),
         page=True,
     ),
     Measure(
         key="too_high_by_reading",
-        name="too high by reading",
-        symbol="",
         unit="m",
         definition="How much too high the highest of so many readings is by their errors alone.",
-        source=_THEORY,
         read=attrgetter("by_reading"),
         digits=3,
         column=Column("um", 1e6, ".2f"),
@@ -291,40 +268,30 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = (
     Measure(
         key="above_median",
         name="above the median",
-        symbol="",
         unit="m",
         definition="How far the highest of so many strokes lies above the median, without reading "
         "errors.",
-        source=_THEORY,
-        read=attrgetter("above_median"),
         digits=3,
         column=Column("um", 1e6, ".2f"),
     ),
     Measure(
         key="bounces",
-        name="bounces",
         symbol="n_b",
-        unit="1",
         definition="Bounces from this stop, median of the strokes.",
-        source=_THEORY,
-        read=attrgetter("bounces"),
         digits=3,
         column=Column("", 1.0, "g"),
     ),
 )
 """Of the stroke that rebounds highest from a stop, the usual stand-in for a centred impact."""
 
-DROPS_MEASURES: tuple[Measure[MeasuredShotsStudy], ...] = (
+DROPS_MEASURES: tuple[Measure[MeasuredShotsStudy], ...] = described_in(
+    _THEORY,
     Measure(
         key="drops",
-        name="drops",
         symbol="n",
-        unit="1",
         definition="Measured drops that are used.",
-        source=_THEORY,
         read=lambda study: len(study.names),
         kind="whole",
-        form="count",
         page=True,
     ),
     *_compared(
@@ -355,7 +322,8 @@ def _in_its_unit(
     )
 
 
-DISTRIBUTION_MEASURES: tuple[Measure[MeasuredDistribution], ...] = (
+DISTRIBUTION_MEASURES: tuple[Measure[MeasuredDistribution], ...] = described_in(
+    _THEORY,
     _in_its_unit(
         "reading_error",
         "reading error",
@@ -375,22 +343,15 @@ DISTRIBUTION_MEASURES: tuple[Measure[MeasuredDistribution], ...] = (
         key="statistic",
         name="distance of the distributions",
         symbol="D",
-        unit="1",
         definition="Largest distance of the two cumulative distributions (Kolmogorov and Smirnov).",
-        source=_THEORY,
-        read=attrgetter("statistic"),
         form="share",
         digits=0,
         page=True,
     ),
     Measure(
         key="significance",
-        name="significance",
         symbol="p",
-        unit="1",
         definition="Probability of a larger distance if both distributions were the same.",
-        source=_THEORY,
-        read=attrgetter("significance"),
         form="fixed",
         digits=3,
         page=True,

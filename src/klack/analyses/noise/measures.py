@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import log10
 
 from klack.acoustics.third_octave import ENERGY_REFERENCE
-from klack.analyses.measures import Column, Measure
+from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, StopForce
 
 __all__ = [
@@ -41,7 +41,6 @@ FORCE_LEVEL = Measure[NoiseDesign](
     "acceleration of the needle. Sound and surface motion have this share of every band; injected "
     "energy, mobility and blocked force have the contact forces alone. Third octaves are those of "
     "IEC 61260-1 (base ten); the force is held at its first and last value outside the record.",
-    source=_THEORY,
     read=lambda design: (
         10.0 * log10(max(float(design.unbalanced_energy.sum()), 1e-300) / ENERGY_REFERENCE)
     ),
@@ -65,10 +64,10 @@ EXPOSURE_LEVEL_A = Measure[NoiseDesign](
     deviation="difference",
     page=True,
 )
-DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
+DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
+    _THEORY,
     Measure(
         key="peak_force",
-        name="peak force",
         symbol="F_max",
         unit="N",
         definition="Largest force of any stop, mean over a time step.",
@@ -88,8 +87,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         definition="Work of contact and film forces on the modes of the rigidly held bodies, "
         "∫ F v dt.",
         note="The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df.",
-        source=_THEORY,
-        read=lambda design: design.injected_energy,
         digits=3,
         column=Column("uJ", 1e6, ".4g", "injected"),
         deviation="energy",
@@ -102,8 +99,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         unit="J",
         definition="Energy through the held surfaces into mount and plate.",
         note="A valve as a whole passes it on; it comes on top of the injected energy.",
-        source=_THEORY,
-        read=lambda design: design.support_energy,
         digits=3,
         column=Column("uJ", 1e6, ".4g", "to mount, plate"),
         deviation="energy",
@@ -115,8 +110,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         symbol="W_rad",
         unit="J",
         definition="Sound energy that the surfaces radiate during one run, estimated.",
-        source=_THEORY,
-        read=lambda design: design.radiated_energy,
         digits=3,
         column=Column("nJ", 1e9, ".4g", "radiated"),
         deviation="energy",
@@ -128,7 +121,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         symbol="W_aud",
         unit="J",
         definition="Part of the radiated sound energy up to 20 kHz, estimated.",
-        source=_THEORY,
         read=lambda design: float(design.radiated_bands[design.band_middle <= _AUDIBLE].sum()),
         digits=3,
         deviation="energy",
@@ -140,7 +132,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         symbol="W_erp",
         unit="J",
         definition="Equivalent radiated energy, radiation efficiency 1.",
-        source=_THEORY,
         read=lambda design: design.upper_bound,
         digits=3,
         deviation="energy",
@@ -217,7 +208,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
     ),
     Measure(
         key="sharpness",
-        name="sharpness",
         symbol="S",
         unit="acum",
         definition="Sharpness of one click, DIN 45692; 0 where the click is too faint for it.",
@@ -232,7 +222,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         key="kurtosis",
         name="kurtosis of the drive pattern",
         symbol="k",
-        unit="1",
         definition="Fourth moment of the drive pattern over whole periods, over the squared "
         "second: 3 for Gaussian noise, high for rare clicks.",
         source=_SOUND,
@@ -245,7 +234,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         key="crest_factor",
         name="crest factor of the drive pattern",
         symbol="p_max/p_rms",
-        unit="1",
         definition="Largest over root mean square pressure of the drive pattern.",
         source=_SOUND,
         read=_heard(lambda sound: sound.pattern.crest_factor),
@@ -255,22 +243,17 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
     ),
     Measure(
         key="valid_from",
-        name="valid from",
         symbol="f_1",
         unit="Hz",
         definition="One over the length of the record; 0 where every force ends as it began.",
         source="theory/spectra",
-        read=lambda design: design.valid_from,
         digits=3,
     ),
     Measure(
         key="balanced_below",
-        name="balanced below",
         symbol="f_b",
         unit="Hz",
         definition="Frequency below which half of the forces or more is balanced in the valve.",
-        source=_THEORY,
-        read=lambda design: design.balanced_below,
         digits=3,
     ),
     Measure(
@@ -280,7 +263,6 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
         unit="Hz",
         definition="Lowest of the highest kept modes of the bodies.",
         source="theory/reduction",
-        read=lambda design: design.valid_up_to,
         digits=3,
         column=Column("kHz", 1e-3, ".4g", "up to"),
         page=True,
@@ -288,27 +270,22 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = (
 )
 """Of one design: from the force of the stops to what is heard of one stroke."""
 
-STOP_MEASURES: tuple[Measure[StopForce], ...] = (
+STOP_MEASURES: tuple[Measure[StopForce], ...] = described_in(
+    _THEORY,
     Measure(
         key="impacts",
-        name="impacts",
         symbol="n",
-        unit="1",
         definition="Impacts on the stop.",
         source="theory/stroke",
-        read=lambda stop: stop.impacts,
         kind="whole",
-        form="count",
         page=True,
     ),
     Measure(
         key="peak_force",
-        name="peak force",
         symbol="F_max",
         unit="N",
         definition="Largest force of the stop, mean over a time step.",
         source="theory/impact",
-        read=lambda stop: stop.peak_force,
         page=True,
     ),
     Measure(
@@ -318,16 +295,15 @@ STOP_MEASURES: tuple[Measure[StopForce], ...] = (
         unit="N s",
         definition="Integral of the force over the whole record, with what presses at rest.",
         source="theory/impact",
-        read=lambda stop: stop.impulse,
         page=True,
     ),
 )
 """Of the force of one stop."""
 
-BODY_MEASURES: tuple[Measure[BodyNoise], ...] = (
+BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
+    _THEORY,
     Measure(
         key="highest_mode",
-        name="highest mode",
         symbol="f_max",
         unit="Hz",
         definition="Frequency of the highest kept mode.",
@@ -337,61 +313,49 @@ BODY_MEASURES: tuple[Measure[BodyNoise], ...] = (
     ),
     Measure(
         key="vibration_energy",
-        name="vibration energy",
         title="vibration\nby time",
         symbol="E_v",
         unit="J",
         definition="Energy lost in the modes or still ringing when the record ends, by the motion "
         "over time.",
-        source=_THEORY,
-        read=lambda body: body.vibration_energy,
         page=True,
     ),
     Measure(
         key="vibration_energy_by_mobility",
-        name="vibration energy by mobility",
         title="vibration\n∫ 2 Re(Y) |F|² df",
         symbol="E_v",
         unit="J",
         definition="The same over frequency, ∫ 2 Re(Y) |F|² df; missing for a body without "
         "damping.",
-        source=_THEORY,
         read=lambda body: body.vibration_spectral,
         page=True,
     ),
     Measure(
         key="dissipated_energy",
-        name="dissipated energy",
         title="lost by the end",
         symbol="E_d",
         unit="J",
         definition="Part of the vibration energy that is lost by the end of the record.",
-        source=_THEORY,
         read=lambda body: body.dissipated,
         digits=3,
         page=True,
     ),
     Measure(
         key="ringing_energy",
-        name="ringing energy",
         title="still ringing",
         symbol="E_r",
         unit="J",
         definition="Part of the vibration energy that still rings at the end of the record.",
-        source=_THEORY,
         read=lambda body: body.ringing,
         digits=3,
         page=True,
     ),
     Measure(
         key="static_energy",
-        name="static energy",
         title="stored more at rest",
         symbol="E_s",
         unit="J",
         definition="Energy that the modes store statically at the end, less that at the start.",
-        source=_THEORY,
-        read=lambda body: body.static_energy,
         digits=3,
         page=True,
     ),

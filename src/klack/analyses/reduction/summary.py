@@ -7,7 +7,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured, TextTable
-from klack.analyses.measures import Column, Measure, cells, heads, json_of, json_type
+from klack.analyses.measures import Column, Measure, cells, described_in, heads, json_of, json_type
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
 from klack.reduction.reduced_body import ReducedBody
@@ -32,87 +32,65 @@ def _share(body: ReducedBody) -> float | None:
     return float(body.compliance_share[0]) if body.static_compliance[0, 0] else None
 
 
-BODY_MEASURES: tuple[Measure[ReducedBody], ...] = (
+BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
+    _THEORY,
     Measure(
         key="mass",
-        name="mass",
         symbol="m",
         unit="kg",
         definition="Mass of the body; missing where a reduced model does not tell it.",
-        source=_THEORY,
-        read=lambda body: body.mass,
     ),
     Measure(
         key="degrees_of_freedom",
-        name="degrees of freedom",
         symbol="n",
-        unit="1",
         definition="Free displacements of the body before reduction.",
-        source=_THEORY,
         read=lambda body: body.dof_count,
         kind="whole",
-        form="count",
         column=Column("", 1.0, "d"),
     ),
     Measure(
         key="rigid_modes",
-        name="rigid modes",
         symbol="n_r",
-        unit="1",
         definition="Rigid motions that are kept.",
-        source=_THEORY,
         read=lambda body: body.rigid_count,
         kind="whole",
-        form="count",
     ),
     Measure(
         key="elastic_modes",
         name="modes",
         symbol="n_e",
-        unit="1",
         definition="Elastic eigenmodes that are kept, without attachment modes.",
-        source=_THEORY,
         read=elastic_count,
         kind="whole",
-        form="count",
         column=Column("", 1.0, "d"),
     ),
     Measure(
         key="highest_mode",
-        name="highest mode",
         symbol="f_max",
         unit="Hz",
         definition="Highest frequency of a mode that is no attachment mode; 0 without any.",
-        source=_THEORY,
         read=_highest,
         column=Column("kHz", 1e-3, ".4g", "up to"),
     ),
     Measure(
         key="static_compliance",
-        name="static compliance",
         symbol="b^T K^+ b",
         unit="m/N",
         definition="Displacement of the contact per static force on it, of the whole body.",
-        source=_THEORY,
         read=lambda body: float(body.static_compliance[0, 0]),
         column=Column("m/N", 1.0, ".4g"),
     ),
     Measure(
         key="modal_compliance",
-        name="modal compliance",
         symbol="sum phi^2/omega^2",
         unit="m/N",
         definition="Part of the static compliance that the kept modes have.",
-        source=_THEORY,
         read=lambda body: float(body.modal_compliance[0, 0]),
     ),
     Measure(
         key="compliance_share",
         name="share of the modes",
-        symbol="",
-        unit="1",
         definition="Modal over static compliance.",
-        source=_THEORY,
         read=_share,
         form="share",
         column=Column("%", 100.0, ".3g"),
