@@ -1,12 +1,14 @@
 """How every command ends that asks for an analysis: result, report, tables, JSON, exit."""
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 from klack.analyses.result_folder import REPORTS, write_result
+from klack.progress import Progress
 from klack.terminal.notes import print_notes
 from klack.terminal.options import require_threads
 from klack.terminal.output import require_folder, require_json_target, write_json
@@ -60,10 +62,14 @@ class Wanted:
     def _stream(self) -> TextIO:
         return sys.stderr if self._to_stderr else sys.stdout
 
-    def into(self, folder: Path, *, report: bool) -> "Ending":
-        """The ending of an analysis that is stored, with a report if wanted."""
+    def into(self, folder: Path | None, name: str = "", *, report: bool) -> "Ending":
+        """The ending of an analysis that is stored, in a folder of that name without another."""
         return Ending(
-            json=self.json, quiet=self.quiet, threads=self.threads, folder=folder, report=report
+            json=self.json,
+            quiet=self.quiet,
+            threads=self.threads,
+            folder=Path("klack-results") / name if folder is None else folder,
+            report=report,
         )
 
     def say(self, text: str) -> None:
@@ -116,6 +122,17 @@ class Ending(Wanted):
     def __post_init__(self) -> None:
         """Check the folder; the rest was checked before."""
         require_folder(self.folder)
+
+    @contextmanager
+    def resumable(self, log: "LogForm[Any, Any]") -> Iterator[Progress]:
+        """Show progress; who stops it hears what is kept."""
+        with show_progress(self.quiet) as progress:
+            try:
+                yield progress
+            except KeyboardInterrupt as stop:
+                kept = f"{log.count(self.folder)} {log.parts} are kept in {self.folder / log.file}"
+                stop.add_note(f"{kept}, the same command resumes.")
+                raise
 
     def end(
         self,

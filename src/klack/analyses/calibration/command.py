@@ -12,11 +12,11 @@ from klack.terminal.options import (
     Json,
     Out,
     Quiet,
+    Report,
     Threads,
     imported,
     require_files,
 )
-from klack.terminal.progress import show_progress
 
 __all__ = ["calibrate"]
 
@@ -48,7 +48,7 @@ def calibrate(
     strokes: _Strokes = None,
     workers: _Workers = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    report: Report = True,
     out: Out = None,
     json: Json = None,
     threads: Threads = None,
@@ -72,8 +72,7 @@ def calibrate(
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     fitted = calibration_of(checked).channels
-    folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
-    ending = wanted.into(folder, report=report)
+    ending = wanted.into(out, f"{checked.name}-calibration", report=report)
 
     from klack.analyses.calibration.analysis import CALIBRATION
     from klack.analyses.calibration.calibrated_case import CALIBRATED_NAME, calibrated_text
@@ -81,31 +80,25 @@ def calibrate(
     from klack.measurement.loading import load_stroke_set
 
     def calibrated(stage: Path) -> tuple[str, ...]:
-        text = calibrated_text(tree, study, folder)
+        text = calibrated_text(tree, study, ending.folder)
         (stage / CALIBRATED_NAME).write_text(text, encoding="utf-8")
         return (CALIBRATED_NAME,)
 
-    with show_progress(quiet) as progress:
-        try:
-            measured = load_stroke_set(
-                measurement,
-                checked.measurement,
-                lambda share: progress("measurement", share),
-                roles=("lift", *fitted),
-            )
-            study = run_calibration(
-                tree,
-                measured
-                if strokes is None
-                else replace(measured, strokes=measured.strokes[:strokes]),
-                folder=folder,
-                workers=workers,
-                progress=progress,
-                threads=threads,
-            )
-        except KeyboardInterrupt as stop:
-            count = TRIAL_LOG.count(folder)
-            kept = f"{count} computed strokes are kept in {folder / TRIAL_LOG.file}"
-            stop.add_note(f"{kept}, the same command resumes.")
-            raise
+    with ending.resumable(TRIAL_LOG) as progress:
+        measured = load_stroke_set(
+            measurement,
+            checked.measurement,
+            lambda share: progress("measurement", share),
+            roles=("lift", *fitted),
+        )
+        if strokes is not None:
+            measured = replace(measured, strokes=measured.strokes[:strokes])
+        study = run_calibration(
+            tree,
+            measured,
+            folder=ending.folder,
+            workers=workers,
+            progress=progress,
+            threads=threads,
+        )
     return ending.end(CALIBRATION, study, beside=calibrated, unfinished=TRIAL_LOG)

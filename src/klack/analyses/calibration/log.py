@@ -81,7 +81,7 @@ def _trial(line: bytes) -> tuple[TrialKey, Motion] | None:
 TRIAL_LOG = LogForm(
     file="calibration.unfinished.jsonl",
     format="klack calibration 1",
-    parts="computed trials",
+    parts="computed strokes",
     line=_line,
     read=_trial,
 )

@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Wanted
-from klack.terminal.options import CaseArgument, Json, Levels, Out, Quiet, Threads
+from klack.terminal.options import CaseArgument, Json, Levels, Out, Quiet, Report, Threads
 from klack.terminal.progress import show_progress
 
 __all__ = ["impact", "run_case"]
@@ -17,7 +17,7 @@ def impact(
     /,
     *,
     level: Levels = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    report: Report = True,
     certify: Annotated[
         bool,
         Parameter(
@@ -64,8 +64,7 @@ def run_case(
     with show_progress(quiet):
         checked = load_case(find_case(case))
         levels = checked.require_levels(level if level else checked.run.levels)
-        folder = out if out is not None else Path("klack-results") / checked.name
-        ending = wanted.into(folder, report=report)
+        ending = wanted.into(out, checked.name, report=report)
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact
@@ -80,4 +79,4 @@ def run_case(
         except IncompleteImpactError as error:
             study, incomplete = error.study, error
     ending.end(IMPACT, study, incomplete=incomplete)
-    return folder
+    return ending.folder

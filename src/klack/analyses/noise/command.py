@@ -13,6 +13,7 @@ from klack.terminal.options import (
     Json,
     Out,
     Quiet,
+    Report,
     Threads,
     imported,
 )
@@ -54,7 +55,7 @@ def noise(
     *,
     variant: _Names = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    report: Report = True,
     out: Out = None,
     json: Json = None,
     threads: Threads = None,
@@ -66,8 +67,7 @@ def noise(
     paths = (a,) if b is None else (a, b)
     _require_known(paths)
     own = imported(component)
-    folder = out if out is not None else Path("klack-results") / _folder_name(paths)
-    ending = wanted.into(folder, report=report)
+    ending = wanted.into(out, _folder_name(paths), report=report)
 
     with show_progress(quiet):
         from klack.analyses.noise.analysis import NOISE

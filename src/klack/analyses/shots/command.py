@@ -1,12 +1,11 @@
 """``klack shots``: many drops of one valve, each a little different."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from klack.analyses.ending import Wanted
-from klack.terminal.options import CaseArgument, Json, Out, Quiet, Threads
+from klack.terminal.options import CaseArgument, Json, Out, Quiet, Report, Threads
 from klack.terminal.progress import show_progress
 
 __all__ = ["shots"]
@@ -38,7 +37,7 @@ def shots(
     count: _Count = None,
     seed: _Seed = None,
     workers: _Workers = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    report: Report = True,
     out: Out = None,
     json: Json = None,
     threads: Threads = None,
@@ -60,28 +59,22 @@ def shots(
     from klack.case.shipped import find_case
 
     checked = load_case(find_case(case))
-    total = count if count is not None else shots_of(checked).count
-    folder = out if out is not None else Path("klack-results") / checked.name
-    ending = wanted.into(folder, report=report)
+    shots_of(checked)
+    ending = wanted.into(out, checked.name, report=report)
 
     with show_progress(quiet):
         from klack.analyses.shots.analysis import SHOTS
         from klack.analyses.shots.log import SHOT_LOG
         from klack.analyses.shots.run import run_shots
 
-    with show_progress(quiet) as progress:
-        try:
-            study = run_shots(
-                checked,
-                count=count,
-                seed=seed,
-                workers=workers,
-                folder=folder,
-                progress=progress,
-                threads=threads,
-            )
-        except KeyboardInterrupt as stop:
-            kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
-            stop.add_note(f"{kept}, the same command resumes.")
-            raise
+    with ending.resumable(SHOT_LOG) as progress:
+        study = run_shots(
+            checked,
+            count=count,
+            seed=seed,
+            workers=workers,
+            folder=ending.folder,
+            progress=progress,
+            threads=threads,
+        )
     return ending.end(SHOTS, study, unfinished=SHOT_LOG)

@@ -12,6 +12,7 @@ from klack.terminal.options import (
     Json,
     Out,
     Quiet,
+    Report,
     Threads,
     imported,
 )
@@ -58,7 +59,7 @@ def stroke(
     step: _Step = None,
     continued: _Continue = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
+    report: Report = True,
     out: Out = None,
     json: Json = None,
     threads: Threads = None,
@@ -73,8 +74,7 @@ def stroke(
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
-    folder = out if out is not None else Path("klack-results") / checked.name
-    ending = asked.into(folder, report=report)
+    ending = asked.into(out, checked.name, report=report)
 
     with show_progress(quiet):
         from klack.analyses.stroke.analysis import STROKE
