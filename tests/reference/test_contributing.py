@@ -155,8 +155,8 @@ RODS = ROOT / "tests" / "data" / "tiny_rods.yaml"
 EVERYWHERE = """
 import json
 from klack.analyses.catalogue import load_result, analysis_in
-from klack.analyses.json_results import result_schema
 from pathlib import Path
+from pydantic import TypeAdapter
 
 folder = Path("result")
 analysis, record = analysis_in(folder), load_result(folder)
@@ -165,9 +165,10 @@ content = analysis.content(record)
 print(json.dumps({
     "told": dict(zip(table.columns, table.rows[0])),
     "json": analysis.to_json(record),
+    "answer": content.answer,
     "page": dict(content.numbers.rows),
     "glossary": dict(content.definitions),
-    "schema": result_schema(),
+    "schema": TypeAdapter(analysis.json).json_schema(),
 }))
 """
 
@@ -204,8 +205,6 @@ def test_the_recipe_of_a_measure(tmp_path, monkeypatch):
     assert words == "Impulse over the time from first touch to the end of the last contact."
     described = found["schema"]["$defs"]["LevelJson"]["properties"]["mean_force_N"]
     assert described["description"] == words
-    catalogue = found["schema"]["x-measures"]["impact level"]
-    assert catalogue[-1]["key"] == "mean_force_N"
 
 
 REPLACED = """
@@ -222,10 +221,8 @@ from klack.analyses import catalogue
 from klack.analyses.catalogue import Entry
 catalogue.ANALYSES = (*catalogue.ANALYSES, {line})
 from klack.cli.main import main
-assert main(["flight", {case!r}, "--out", "result", "--json", "numbers.json"]) == 0
-assert {{p.name for p in __import__("pathlib").Path("result").iterdir()}} == {{
-    "result.zarr", "report.html", "report.pdf"
-}}
+words = ["--out", "result", "--json", "numbers.json", "--no-report"]
+assert main(["flight", {case!r}, *words]) == 0
 """
 
 
@@ -254,11 +251,8 @@ def test_the_recipe_of_an_analysis(tmp_path):
     assert found["json"] == json.loads((tmp_path / "numbers.json").read_text())
     assert found["page"]["flight time"].split() == ["2.000", "µs"]
     assert found["glossary"]["flight time"] == "Gap over speed."
-    names = [reference["$ref"].rpartition("/")[2] for reference in found["schema"]["oneOf"]]
-    assert "FlightJson" in names
-    assert found["schema"]["x-measures"]["flight"][0]["key"] == "flight_time_s"
-    report = (tmp_path / "result" / "report.html").read_text(encoding="utf-8")
-    assert "The needle flies for 2.000" in report
+    assert found["schema"]["properties"]["flight_time_s"]["description"] == "Gap over speed."
+    assert found["answer"].split() == ["The", "needle", "flies", "for", "2.000", "µs."]
 
 
 def test_files_that_the_pages_name_are_there():
