@@ -1,5 +1,8 @@
 """Measures of a stroke: of every impact, and of a variant as a whole."""
 
+from operator import attrgetter
+from typing import Literal
+
 from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.stroke.record import StrokeVariant
 from klack.report.wording import count
@@ -108,6 +111,22 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
 )
 """Of one impact; contacts closer together than the longest period of the needle are one."""
 
+
+def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVariant], ...]:
+    return tuple(
+        Measure(
+            key=f"{way}_time_at_{share}_percent",
+            symbol=f"t_{way[0]},{share}",
+            unit="s",
+            definition=f"From the start of the run until {share} % of the lift are passed on the "
+            f"way of {way}.",
+            read=attrgetter(f"needle_times.{way}.at_{share}"),
+            absent=NOT_REACHED,
+        )
+        for share in (10, 50, 90)
+    )
+
+
 VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
     "theory/stroke",
     Measure(
@@ -120,33 +139,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         page=True,
         absent=NOT_REACHED,
     ),
-    Measure(
-        key="opening_time_at_10_percent",
-        symbol="t_o,10",
-        unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "opening.",
-        read=lambda variant: variant.needle_times.opening.at_10,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="opening_time_at_50_percent",
-        symbol="t_o,50",
-        unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "opening.",
-        read=lambda variant: variant.needle_times.opening.at_50,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="opening_time_at_90_percent",
-        symbol="t_o,90",
-        unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "opening.",
-        read=lambda variant: variant.needle_times.opening.at_90,
-        absent=NOT_REACHED,
-    ),
+    *_at_shares("opening"),
     Measure(
         key="closing_time",
         symbol="t_c",
@@ -157,33 +150,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         page=True,
         absent=NOT_REACHED,
     ),
-    Measure(
-        key="closing_time_at_10_percent",
-        symbol="t_c,10",
-        unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "closing.",
-        read=lambda variant: variant.needle_times.closing.at_10,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="closing_time_at_50_percent",
-        symbol="t_c,50",
-        unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "closing.",
-        read=lambda variant: variant.needle_times.closing.at_50,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="closing_time_at_90_percent",
-        symbol="t_c,90",
-        unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "closing.",
-        read=lambda variant: variant.needle_times.closing.at_90,
-        absent=NOT_REACHED,
-    ),
+    *_at_shares("closing"),
     Measure(
         key="complete",
         definition="Whether the run came to its end.",
