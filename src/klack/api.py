@@ -187,8 +187,9 @@ class Result:
         found: dict[str, dict[str, Number]] = {}
         for name, of, measures in self.analysis.measured(self.record):
             values = json_of(measures, of)
+            settled = {item.json_key: item.settled(of) for item in measures}
             found[name] = {
-                item.key: Number(values[item.json_key], item.unit, item) for item in measures
+                item.key: Number(values[key], item.unit, item) for key, item in settled.items()
             }
         return found
 

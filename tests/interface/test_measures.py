@@ -25,8 +25,8 @@ def test_a_measure_is_described_whole(of: str, measure: Measure):
 
 def test_keys_are_unique_in_their_catalogue():
     for of, measures in MEASURES.items():
-        keys = [item.json_key for item in measures]
-        assert len(keys) == len(set(keys)), of
+        for keys in ([item.json_key for item in measures], [item.key for item in measures]):
+            assert len(keys) == len(set(keys)), of
 
 
 def test_the_schema_has_every_measure():

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite, log10
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -25,13 +25,15 @@ __all__ = [
     "glossary",
     "heads",
     "json_of",
-    "json_type",
     "number_or_none",
     "page_cells",
     "page_heads",
+    "with_measures",
 ]
 
 Of = TypeVar("Of", contravariant=True)
+
+Kind = TypeVar("Kind", bound=type)
 
 Value = float | int | bool | None
 
@@ -98,7 +100,7 @@ class Measure(Generic[Of]):
     Parameters
     ----------
     key : str
-        In JSON, before its unit.
+        In JSON, before its unit; ``json_name`` is used where that differs.
     name : str
         In words, those of the key by default; ``title`` is what a report calls it where that
         differs.
@@ -157,6 +159,7 @@ class Measure(Generic[Of]):
     absent: str = "–"
     title: str = ""
     note: str = ""
+    json_name: str = ""
     unit_of: Callable[[Of], str] | None = None
     digits_of: Callable[[Of], int] | None = None
 
@@ -177,7 +180,7 @@ class Measure(Generic[Of]):
         ...         source="", read=float).json_key
         'impulse_Ns'
         """
-        return self.key + _SUFFIXES[self.unit]
+        return self.json_name or self.key + _SUFFIXES[self.unit]
 
     @property
     def head(self) -> str:
@@ -190,7 +193,7 @@ class Measure(Generic[Of]):
         """Value in its column on a terminal; a dash where it does not exist."""
         value = self.read(of)
         if value is not None and isfinite(value) and self.unit_of is not None:
-            return format_si(value, self.unit_of(of), self._digits(of))
+            return format_si(value, self.unit_of(of), self.settled(of).digits)
         if self.column is None or value is None or not isfinite(value):
             return self.absent
         # whole numbers stay whole
@@ -210,12 +213,14 @@ class Measure(Generic[Of]):
         value = self.read(of)
         if value is None or (self.unit_of is not None and not isfinite(value)):
             return self.absent
-        if self.unit_of is not None:
-            return quantity(value, self.unit_of(of), self._digits(of)) + self.remark(of)
-        return self.printed(value) + self.remark(of)
+        return self.settled(of).printed(value) + self.remark(of)
 
-    def _digits(self, of: Of) -> int:
-        return self.digits if self.digits_of is None else self.digits_of(of)
+    def settled(self, of: Of) -> "Measure[Of]":
+        """The same in the unit of one thing, and in its digits."""
+        if self.unit_of is None:
+            return self
+        digits = self.digits if self.digits_of is None else self.digits_of(of)
+        return replace(self, unit=self.unit_of(of) or "1", digits=digits, unit_of=None)
 
     def printed(self, value: float) -> str:
         """A value of this kind as a report prints it."""
@@ -296,17 +301,20 @@ def _plain(value: Value, kind: str) -> Value:
     return {"number": float, "whole": int, "truth": bool}[kind](value)
 
 
-def json_type(
-    name: str, words: str, measures: Iterable[Measure[Any]], more: Mapping[str, Any] | None = None
-) -> Any:
-    """Type of what :func:`json_of` returns, with further keys, for the schema of results."""
+def with_measures(measures: Iterable[Measure[Any]]) -> Callable[[Kind], Kind]:
+    """Add what :func:`json_of` returns to a typed dictionary, for the schema of results."""
     keys: dict[str, Any] = {
         item.json_key: Annotated[_KINDS[item.kind], Field(description=item.definition)]
         for item in measures
     }
-    found: Any = TypedDict(name, {**keys, **(more or {})})  # type: ignore[misc]
-    found.__doc__ = words
-    return found
+
+    def extended(kind: Kind) -> Kind:
+        every = {**keys, **kind.__annotations__}
+        found: Any = TypedDict(kind.__name__, every)  # type: ignore[misc]
+        found.__doc__ = kind.__doc__
+        return cast(Kind, found)
+
+    return extended
 
 
 def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
@@ -325,7 +333,9 @@ def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
 
 
 def glossary(measures: Iterable[Measure[Any]]) -> tuple[tuple[str, str], ...]:
-    """Names and definitions, for the end of a report."""
+    """Names and definitions of the key numbers of a report, for its end."""
     return tuple(
-        (item.title or item.name, f"{item.definition} {item.note}".strip()) for item in measures
+        (item.title or item.name, f"{item.definition} {item.note}".strip())
+        for item in measures
+        if item.page
     )

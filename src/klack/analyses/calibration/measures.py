@@ -37,7 +37,7 @@ def _of_parameter(
         digits=digits,
         digits_of=None if digits else attrgetter("digits"),
         unit_of=attrgetter("unit"),
-        absent="–",
+        page=True,
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypeAlias, cast
+from typing import Annotated, Any, Literal, NotRequired, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -20,7 +20,7 @@ from klack.analyses.calibration.measures import (
 )
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy
 from klack.analyses.json_parts import OwnComponents, Real, Version
-from klack.analyses.measures import Measure, json_of, json_type, number_or_none
+from klack.analyses.measures import Measure, json_of, number_or_none, with_measures
 
 __all__ = [
     "PARAMETER_COLUMNS",
@@ -40,31 +40,23 @@ PARAMETER_COLUMNS = (
     "bounds",
 )
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    CalibratedJson: TypeAlias = dict[str, Any]
-    FittedJson: TypeAlias = dict[str, Any]
 
-    class CalibrationNumbersJson(TypedDict):
-        """Of the whole."""
+@with_measures(PARAMETER_MEASURES)
+class CalibratedJson(TypedDict):
+    """One calibrated parameter, in ``unit``."""
 
-else:
-    CalibratedJson = json_type(
-        "CalibratedJson",
-        "One calibrated parameter, in ``unit``.",
-        PARAMETER_MEASURES,
-        {
-            "unit": str,
-            "profile_lower_95": NotRequired[Real],
-            "profile_upper_95": NotRequired[Real],
-        },
-    )
-    FittedJson = json_type("FittedJson", "First impact on a stop.", FITTED_MEASURES)
-    CalibrationNumbersJson = json_type(
-        "CalibrationNumbersJson", "A calibration.", CALIBRATION_MEASURES
-    )
+    unit: str
+    profile_lower_95: NotRequired[Real]
+    profile_upper_95: NotRequired[Real]
 
 
-class CalibrationJson(CalibrationNumbersJson):
+@with_measures(FITTED_MEASURES)
+class FittedJson(TypedDict):
+    """First impact on a stop."""
+
+
+@with_measures(CALIBRATION_MEASURES)
+class CalibrationJson(TypedDict):
     """``klack calibrate``."""
 
     schema: Literal["klack-calibrate/1"]
@@ -94,7 +86,7 @@ def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
         do not exist (infinite, nan) are None.
     """
     profiles = {profile.name: profile for profile in study.profiles}
-    parameters = {}
+    parameters: dict[str, Any] = {}
     for item in study.parameters:
         parameters[item.name] = {**json_of(PARAMETER_MEASURES, item), "unit": item.unit}
         if item.name in profiles:

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isfinite
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 from typing_extensions import TypedDict
 
@@ -14,7 +13,14 @@ from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.summary import DeviationJson
 from klack.analyses.json_parts import Real
-from klack.analyses.measures import Column, Measure, cells, described_in, heads, json_of, json_type
+from klack.analyses.measures import (
+    Column,
+    Measure,
+    cells,
+    heads,
+    json_of,
+    with_measures,
+)
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
@@ -60,31 +66,6 @@ class OtherRun:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ProgramRun:
-    """One impact as one program computed it, as tables and JSON tell it.
-
-    Parameters
-    ----------
-    name : str
-    measures : ImpactMeasures
-    history : ImpactHistory
-    steps : int
-    wall_time : float or None [s]
-    """
-
-    name: str
-    measures: ImpactMeasures
-    history: ImpactHistory
-    steps: int
-    wall_time: float | None
-
-    @property
-    def energy_balance(self) -> float | None:
-        """See :func:`energy_balance`."""
-        return energy_balance(self.history.ledger)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
     """A level of klack beside another program.
 
@@ -107,25 +88,24 @@ class Comparison:
     deviation: Deviation
 
     @property
-    def runs(self) -> tuple[ProgramRun, ProgramRun]:
-        """The other program, and klack."""
-        other, level = self.other, self.level
-        return (
-            ProgramRun(
-                name=other.program,
-                measures=self.measures,
-                history=other.history,
-                steps=other.steps,
-                wall_time=other.wall_time,
-            ),
-            ProgramRun(
-                name=f"klack, {level.level}",
-                measures=level.measures,
-                history=level.history,
-                steps=level.steps,
-                wall_time=self.wall_time,
-            ),
+    def runs(self) -> tuple[LevelResult, LevelResult]:
+        """The other program, as if it were a level of klack, and klack."""
+        other, history = self.other, self.other.history
+        guest = LevelResult(
+            level=other.program.lower(),
+            label=other.program,
+            history=history,
+            measures=self.measures,
+            degrees_of_freedom=self.level.degrees_of_freedom,
+            steps=other.steps,
+            step=history.step,
+            wall_time=float("nan") if other.wall_time is None else other.wall_time,
+            setup_time=0.0,
+            energies=history.ledger.parts(),
+            energy_residual=history.ledger.residual,
         )
+        label = f"klack, {self.level.level}"
+        return guest, replace(self.level, label=label, wall_time=self.wall_time)
 
     @property
     def wall_time(self) -> float:
@@ -139,73 +119,33 @@ class Comparison:
         return None if other is None or self.wall_time == 0.0 else other / self.wall_time
 
 
-_SHARED = ("peak_force", "contact_time", "impulse", "restitution")
-
-
-def _of_run(measure: Measure[LevelResult]) -> Measure[ProgramRun]:
-    """The same measure of an impact, whoever computed it."""
-    assert measure.column is not None
-    form = {"peak_force": ".3f"}.get(measure.key, measure.column.form)
-    return Measure(
-        key=measure.key,
-        name=measure.name,
-        symbol=measure.symbol,
-        unit=measure.unit,
-        definition=measure.definition,
-        source=measure.source,
-        read=attrgetter(f"measures.{measure.key}"),
-        column=replace(measure.column, form=form),
-    )
-
-
-PROGRAM_MEASURES: tuple[Measure[ProgramRun], ...] = described_in(
-    "theory/calculix",
-    *(_of_run(measure) for measure in LEVEL_MEASURES if measure.key in _SHARED),
+_OF_LEVELS = {measure.key: measure for measure in LEVEL_MEASURES}
+PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
+    replace(_OF_LEVELS["peak_force"], column=Column("N", 1.0, ".3f")),
+    *(_OF_LEVELS[key] for key in ("contact_time", "impulse", "restitution")),
     Measure(
         key="energy_balance",
         symbol="r_E",
         definition="Energy gained (negative: lost) by the numerics of a run without damping, over "
         "the energy turned over.",
+        source="theory/calculix",
+        read=lambda run: energy_balance(run.history.ledger),
         form="power",
         column=Column("", 1.0, "+.1e"),
         absent="",
     ),
-    Measure(
-        key="steps",
-        symbol="n_t",
-        definition="Time steps of the run.",
-        kind="whole",
-        column=Column("", 1.0, "d"),
-    ),
-    Measure(
-        key="step",
-        symbol="dt",
-        unit="s",
-        definition="Length of a time step.",
-        read=attrgetter("history.step"),
-        digits=3,
-    ),
-    Measure(
-        key="wall_time",
-        unit="s",
-        definition="Wall time: set-up and time integration of klack, the whole run of the other "
-        "program.",
-        digits=3,
-        column=Column("s", 1.0, ".3g"),
-        absent="",
-    ),
+    replace(_OF_LEVELS["steps"], column=Column("", 1.0, "d")),
+    _OF_LEVELS["step"],
+    replace(_OF_LEVELS["wall_time"], absent=""),
 )
-"""Of an impact as one program computed it."""
+"""Of an impact as one program computed it; the wall time of klack has its set-up in it."""
 
 COMPARISON_COLUMNS = ("", *heads(PROGRAM_MEASURES))
 
-if TYPE_CHECKING:  # made from the catalogue of measures
 
-    class ProgramJson(TypedDict):
-        """Impact as one program computed it."""
-
-else:
-    ProgramJson = json_type("ProgramJson", "Impact as one program computed it.", PROGRAM_MEASURES)
+@with_measures(PROGRAM_MEASURES)
+class ProgramJson(TypedDict):
+    """Impact as one program computed it."""
 
 
 class OtherProgramJson(ProgramJson):
@@ -267,20 +207,7 @@ def compare_with(study: ImpactStudy, level: str, other: OtherRun) -> Comparison:
 
 def with_other(study: ImpactStudy, comparison: Comparison) -> ImpactStudy:
     """Study that holds the compared level and the other program as one more level, for charts."""
-    other, history = comparison.other, comparison.other.history
-    guest = LevelResult(
-        level=other.program.lower(),
-        label=other.program,
-        history=history,
-        measures=comparison.measures,
-        degrees_of_freedom=comparison.level.degrees_of_freedom,
-        steps=other.steps,
-        step=history.step,
-        wall_time=other.wall_time or 0.0,
-        setup_time=0.0,
-        energies=history.ledger.parts(),
-        energy_residual=history.ledger.residual,
-    )
+    guest, _ = comparison.runs
     return replace(
         study,
         levels={guest.level: guest, comparison.level.level: comparison.level},
@@ -293,7 +220,7 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`COMPARISON_COLUMNS`: the other program, klack, the deviation."""
     deviation, ratio = comparison.deviation, comparison.wall_time_ratio
     return (
-        *((run.name, *cells(PROGRAM_MEASURES, run)) for run in comparison.runs),
+        *((run.label, *cells(PROGRAM_MEASURES, run)) for run in comparison.runs),
         (
             "klack from it",
             f"{100 * deviation.peak_force:+.2f} %",

@@ -51,6 +51,7 @@ def _compared(
             source=_THEORY,
             read=lambda item: of(read(item)),
             column=Column("", column.factor, sign + column.form, head),
+            page=part in ("", "measured"),
         )
 
     return (

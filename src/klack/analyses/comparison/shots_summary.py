@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,7 @@ from klack.analyses.analysis import Measured, Notes, TextTable
 from klack.analyses.comparison.measures import DISTRIBUTION_MEASURES, DROPS_MEASURES
 from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
 from klack.analyses.json_parts import Real, RejectedJson, Version
-from klack.analyses.measures import json_of, json_type, number_or_none
+from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
 from klack.units import format_si
 
@@ -35,31 +35,21 @@ _KEYS = {"restitution": "restitution", "rebound height": "rebound_height_m"}
 
 _SHARES = (0.05, 0.5, 0.95)
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-
-    class DropNumbersJson(TypedDict):
-        """Of all drops."""
-
-    class DistributionJson(TypedDict):
-        """Of one measure."""
-
-else:
-    DropNumbersJson = json_type("DropNumbersJson", "Measured drops.", DROPS_MEASURES)
-    DistributionJson = json_type(
-        "DistributionJson",
-        "One number of many drops, in the unit of its key.",
-        DISTRIBUTION_MEASURES,
-        {
-            side: Annotated[
-                dict[str, Real],
-                Field(description="count, mean, standard_deviation, quantiles, highest."),
-            ]
-            for side in ("computed", "measured")
-        },
-    )
+_Sample = Annotated[
+    dict[str, Real], Field(description="count, mean, standard_deviation, quantiles, highest.")
+]
 
 
-class DropsJson(DropNumbersJson):
+@with_measures(DISTRIBUTION_MEASURES)
+class DistributionJson(TypedDict):
+    """One number of many drops, in the unit of its key."""
+
+    computed: _Sample
+    measured: _Sample
+
+
+@with_measures(DROPS_MEASURES)
+class DropsJson(TypedDict):
     """``klack compare`` of shots."""
 
     schema: Literal["klack-compare-shots/1"]

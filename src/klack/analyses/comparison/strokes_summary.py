@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -23,7 +23,7 @@ from klack.analyses.comparison.strokes_record import (
     stop_words,
 )
 from klack.analyses.json_parts import RejectedJson, Version
-from klack.analyses.measures import cells, heads, json_of, json_type
+from klack.analyses.measures import cells, heads, json_of, with_measures
 
 __all__ = [
     "CURVE_COLUMNS",
@@ -54,36 +54,27 @@ RULE = (
     "counted."
 )
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    ComparedImpactJson: TypeAlias = dict[str, Any]
-    HighestStrokeJson: TypeAlias = dict[str, Any]
-
-    class VariantNumbersJson(TypedDict):
-        """Of one variant."""
-
-else:
-    _Stop = Annotated[str, Field(description="``opening`` or ``seat``.")]
-    ComparedImpactJson = json_type(
-        "ComparedImpactJson",
-        "One impact, computed and measured.",
-        IMPACT_MEASURES,
-        {
-            "stop": _Stop,
-            "number": Annotated[int, Field(description="1 for the first on this stop.")],
-        },
-    )
-    HighestStrokeJson = json_type(
-        "HighestStrokeJson",
-        "The measured stroke that rebounds highest from a stop.",
-        HIGHEST_MEASURES,
-        {"stop": _Stop, "stroke": str},
-    )
-    VariantNumbersJson = json_type(
-        "ComparedNumbersJson", "A variant beside its recording.", VARIANT_MEASURES
-    )
+_Stop = Annotated[str, Field(description="``opening`` or ``seat``.")]
 
 
-class ComparedVariantJson(VariantNumbersJson):
+@with_measures(IMPACT_MEASURES)
+class ComparedImpactJson(TypedDict):
+    """One impact, computed and measured."""
+
+    stop: _Stop
+    number: Annotated[int, Field(description="1 for the first on this stop.")]
+
+
+@with_measures(HIGHEST_MEASURES)
+class HighestStrokeJson(TypedDict):
+    """The measured stroke that rebounds highest from a stop."""
+
+    stop: _Stop
+    stroke: str
+
+
+@with_measures(VARIANT_MEASURES)
+class ComparedVariantJson(TypedDict):
     """A variant beside its recording."""
 
     agreement: Literal["excellent", "fair", "none", "unknown"]

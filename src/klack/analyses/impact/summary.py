@@ -1,7 +1,7 @@
 """The few numbers of a study that a script or a terminal wants."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -16,7 +16,7 @@ from klack.analyses.impact.measures import (
 )
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.json_parts import ContactJson
-from klack.analyses.measures import cells, heads, json_of, json_type
+from klack.analyses.measures import cells, heads, json_of, with_measures
 from klack.contact.restitution import Deviation
 
 __all__ = [
@@ -35,19 +35,16 @@ __all__ = [
 SUMMARY_COLUMNS = ("level", *heads(LEVEL_MEASURES))
 
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    DeviationJson: TypeAlias = dict[str, Any]
-    LevelJson: TypeAlias = dict[str, Any]
-else:
-    DeviationJson = json_type(
-        "DeviationJson", "How far one result is from another one.", DEVIATION_MEASURES
-    )
-    LevelJson = json_type(
-        "LevelJson",
-        "Impact at one level.",
-        LEVEL_MEASURES,
-        {"doubts": Annotated[list[str], Field(description="Why the level may be wrong.")]},
-    )
+@with_measures(DEVIATION_MEASURES)
+class DeviationJson(TypedDict):
+    """How far one result is from another one."""
+
+
+@with_measures(LEVEL_MEASURES)
+class LevelJson(TypedDict):
+    """Impact at one level."""
+
+    doubts: Annotated[list[str], Field(description="Why the level may be wrong.")]
 
 
 class ImpactJson(TypedDict):
@@ -186,9 +183,9 @@ def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
     return tuple((name, *cells(LEVEL_MEASURES, result)) for name, result in study.levels.items())
 
 
-def _level(result: LevelResult) -> dict[str, Any]:
+def _level(result: LevelResult) -> Any:
     return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts)}
 
 
-def _deviation(deviation: Deviation) -> dict[str, Any]:
+def _deviation(deviation: Deviation) -> Any:
     return json_of(DEVIATION_MEASURES, deviation)

@@ -282,7 +282,7 @@ def _modes(design: NoiseDesign) -> str:
 
 
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
-    *glossary(measure for measure in DESIGN_MEASURES if measure.page),
+    *glossary(DESIGN_MEASURES),
     (
         "blocked force",
         "Axial force of the body on a rigid support. A softer structure takes up less.",

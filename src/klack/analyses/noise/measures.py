@@ -51,7 +51,8 @@ FORCE_LEVEL = Measure[NoiseDesign](
     page=True,
 )
 EXPOSURE_LEVEL_A = Measure[NoiseDesign](
-    key="sound_exposure_level",
+    key="sound_exposure_level_weighted",
+    json_name="sound_exposure_level_dBA",
     name="sound exposure level of a click, A-weighted",
     symbol="L_AE",
     unit="dBA",

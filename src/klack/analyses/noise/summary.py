@@ -1,7 +1,7 @@
 """The few numbers of a noise study that a script or a terminal wants."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import Field
@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
 from klack.analyses.analysis import Measured, TextTable
 from klack.analyses.json_parts import OwnComponents, Real
-from klack.analyses.measures import cells, heads, json_of, json_type, number_or_none
+from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
 from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
 
@@ -35,34 +35,23 @@ class BandJson(TypedDict):
     level_dB: Annotated[float, Field(description="re (1 uN)^2 s.")]
 
 
-_Bands = Annotated[list[BandJson], Field(description="Of the force.")]
+@with_measures(STOP_MEASURES)
+class StopNoiseJson(TypedDict):
+    """Force of one stop."""
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    StopNoiseJson: TypeAlias = dict[str, Any]
-    BodyNoiseJson: TypeAlias = dict[str, Any]
-
-    class DesignNumbersJson(TypedDict):
-        """Of one design."""
-
-else:
-    StopNoiseJson = json_type(
-        "StopNoiseJson", "Force of one stop.", STOP_MEASURES, {"third_octave": _Bands}
-    )
-    BodyNoiseJson = json_type(
-        "BodyNoiseJson",
-        "Vibration and radiation of one body.",
-        BODY_MEASURES,
-        {
-            "injected_energy_J": Annotated[dict[str, Real], Field(description="By port.")],
-            "radiated_energy_J": Annotated[
-                dict[str, Real], Field(description="By group of surfaces.")
-            ],
-        },
-    )
-    DesignNumbersJson = json_type("DesignNumbersJson", "Noise of one design.", DESIGN_MEASURES)
+    third_octave: list[BandJson]
 
 
-class DesignNoiseJson(DesignNumbersJson):
+@with_measures(BODY_MEASURES)
+class BodyNoiseJson(TypedDict):
+    """Vibration and radiation of one body."""
+
+    injected_energy_J: Annotated[dict[str, Real], Field(description="By port.")]
+    radiated_energy_J: Annotated[dict[str, Real], Field(description="By group of surfaces.")]
+
+
+@with_measures(DESIGN_MEASURES)
+class DesignNoiseJson(TypedDict):
     """Noise of one design; what is heard is null where nothing radiates."""
 
     kind: str
@@ -166,7 +155,7 @@ def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[Ba
     ]
 
 
-def _body(body: BodyNoise) -> BodyNoiseJson:
+def _body(body: BodyNoise) -> dict[str, Any]:
     radiated = body.radiated.sum(axis=1)
     return json_of(BODY_MEASURES, body) | {
         "injected_energy_J": dict(zip(body.ports, map(number_or_none, body.injected), strict=True)),

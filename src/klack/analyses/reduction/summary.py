@@ -1,13 +1,21 @@
 """The few numbers of a reduction that a script or a terminal wants."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured, TextTable
-from klack.analyses.measures import Column, Measure, cells, described_in, heads, json_of, json_type
+from klack.analyses.measures import (
+    Column,
+    Measure,
+    cells,
+    described_in,
+    heads,
+    json_of,
+    with_measures,
+)
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
 from klack.reduction.reduced_body import ReducedBody
@@ -98,20 +106,15 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
 )
 """Of one reduced body at its contact."""
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    ReducedBodyJson: TypeAlias = dict[str, Any]
-else:
-    ReducedBodyJson = json_type(
-        "ReducedBodyJson",
-        "A body after reduction.",
-        BODY_MEASURES,
-        {
-            "frequencies_Hz": Annotated[
-                list[float], Field(description="Of the elastic modes, attachment modes included.")
-            ],
-            "correction": str,
-        },
-    )
+
+@with_measures(BODY_MEASURES)
+class ReducedBodyJson(TypedDict):
+    """A body after reduction."""
+
+    frequencies_Hz: Annotated[
+        list[float], Field(description="Of the elastic modes, attachment modes included.")
+    ]
+    correction: str
 
 
 class TransferJson(TypedDict):
@@ -146,7 +149,7 @@ def reduction_measured(study: ReductionStudy) -> Iterator[Measured]:
         yield body.name, body, BODY_MEASURES
 
 
-def reduction_to_json(study: ReductionStudy) -> ReductionJson:
+def reduction_to_json(study: ReductionStudy) -> dict[str, Any]:
     """Plain numbers in SI, the unit in the key."""
     return {
         "schema": "klack-reduce/1",

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured, TextTable
 from klack.analyses.json_parts import Real, Version
-from klack.analyses.measures import json_of, json_type, number_or_none
+from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
 from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
@@ -40,10 +40,9 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Shares of the shots that stay below."""
 
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    ShotJson: TypeAlias = dict[str, Any]
-else:
-    ShotJson = json_type("ShotJson", "One shot.", SHOT_MEASURES)
+@with_measures(SHOT_MEASURES)
+class ShotJson(TypedDict):
+    """One shot."""
 
 
 class HighestRuleJson(TypedDict):
@@ -148,7 +147,7 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def _row(columns: ShotColumns, index: int) -> dict[str, Any]:
+def _row(columns: ShotColumns, index: int) -> Any:
     return json_of(SHOT_MEASURES, columns.row(index))
 
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from klack.analyses.analysis import Measured, TextTable
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
-from klack.analyses.measures import cells, heads, json_of, json_type, number_or_none
+from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
 from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
@@ -54,22 +54,11 @@ _NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as the first one."""
 
 
-if TYPE_CHECKING:  # made from the catalogue of measures
-    EventJson: TypeAlias = dict[str, Any]
+@with_measures(EVENT_MEASURES)
+class EventJson(TypedDict):
+    """One impact of a stroke."""
 
-    class VariantNumbersJson(TypedDict):
-        """Of one variant."""
-
-else:
-    EventJson = json_type(
-        "EventJson",
-        "One impact of a stroke.",
-        EVENT_MEASURES,
-        {"stop": Annotated[str, Field(description="Name of the end stop.")]},
-    )
-    VariantNumbersJson = json_type(
-        "VariantNumbersJson", "One variant of a stroke.", VARIANT_MEASURES
-    )
+    stop: Annotated[str, Field(description="Name of the end stop.")]
 
 
 class PassageJson(TypedDict):
@@ -105,7 +94,8 @@ class StartJson(TypedDict):
     notes: Annotated[list[str], Field(description="What has no steady state.")]
 
 
-class VariantJson(TimesJson, VariantNumbersJson):
+@with_measures(VARIANT_MEASURES)
+class VariantJson(TimesJson):
     """One variant of a stroke; opening and closing are those of the needle."""
 
     label: str
