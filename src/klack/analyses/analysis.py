@@ -9,27 +9,11 @@ from klack.analyses.measures import Measure
 from klack.analyses.named import named
 from klack.analyses.store import RecordFormat, load_record, save_record
 from klack.report.page import Content
+from klack.terminal.wanted import Notes, TextTable
 
-__all__ = ["Analysis", "Measured", "Notes", "StoredAnalysis", "TextTable"]
+__all__ = ["Analysis", "Measured", "StoredAnalysis"]
 
 Kept = TypeVar("Kept")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextTable:
-    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Notes:
-    """Notes on what stands above them."""
-
-    notes: Sequence[str]
 
 
 Measured = tuple[str, Any, Sequence[Measure[Any]]]

@@ -1,112 +1,29 @@
 """How every command ends that asks for an analysis: result, report, tables, JSON, exit."""
 
-import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from klack.analyses.result_folder import REPORTS, write_result
 from klack.progress import Progress
-from klack.terminal.notes import print_notes
-from klack.terminal.options import require_threads
-from klack.terminal.output import require_folder, require_json_target, write_json
+from klack.terminal.output import require_folder
 from klack.terminal.progress import show_progress
-from klack.terminal.tables import print_table
+from klack.terminal.wanted import Shown, WantedResult
 
 if TYPE_CHECKING:
-    from klack.analyses.analysis import Analysis, StoredAnalysis
+    from klack.analyses.analysis import StoredAnalysis
     from klack.analyses.record import AnyRecord
     from klack.analyses.unfinished import LogForm
 
-__all__ = ["Ending", "Wanted"]
+__all__ = ["Ending"]
 
-Kept = TypeVar("Kept")
 Stored = TypeVar("Stored", bound="AnyRecord")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What the user wants to see of a record; targets are checked before the long work begins.
-
-    Parameters
-    ----------
-    json : Path or None
-        Where the numbers go; ``-`` is the standard output.
-    quiet : bool
-        Neither progress nor tables: notes only.
-    threads : int or None
-        Cores that may compute.
-
-    Raises
-    ------
-    InputError
-        If the target cannot be written, or the cores cannot be.
-    """
-
-    json: Path | None
-    quiet: bool
-    threads: int | None = None
-
-    def __post_init__(self) -> None:
-        """Check what was asked for."""
-        require_json_target(self.json)
-        require_threads(self.threads)
-
-    @property
-    def _to_stderr(self) -> bool:
-        return self.quiet or str(self.json) == "-"
-
-    @property
-    def _stream(self) -> TextIO:
-        return sys.stderr if self._to_stderr else sys.stdout
-
-    def into(self, folder: Path | None, name: str = "", *, report: bool) -> "Ending":
-        """The ending of an analysis that is stored, in a folder of that name without another."""
-        return Ending(
-            json=self.json,
-            quiet=self.quiet,
-            threads=self.threads,
-            folder=Path("klack-results") / name if folder is None else folder,
-            report=report,
-        )
-
-    def say(self, text: str) -> None:
-        """Print a line, unless it shall be quiet."""
-        if not self.quiet:
-            print(text, file=self._stream)
-
-    def note(self, notes: Iterable[str]) -> None:
-        """Print what makes a result doubtful, also where it shall be quiet."""
-        print_notes(notes, to_stderr=self._to_stderr)
-
-    def tell(self, analysis: "Analysis[Kept]", record: Kept) -> None:
-        """Print tables, lines and notes of a record."""
-        from klack.analyses.analysis import Notes
-
-        for item in analysis.told(record):
-            if isinstance(item, Notes):
-                self.note(item.notes)
-            elif isinstance(item, str):
-                self.say(item)
-            elif not self.quiet:
-                print_table(
-                    item.title,
-                    item.columns,
-                    item.rows,
-                    left=item.left,
-                    to_stderr=self._to_stderr,
-                )
-
-    def write(self, analysis: "Analysis[Kept]", record: Kept) -> None:
-        """Write the numbers of a record, if they were asked for."""
-        if self.json is not None:
-            write_json(self.json, analysis.to_json(record))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ending(Wanted):
+class Ending(Shown):
     """What the user wants of a record that is stored.
 
     Parameters
@@ -120,8 +37,14 @@ class Ending(Wanted):
     report: bool
 
     def __post_init__(self) -> None:
-        """Check the folder; the rest was checked before."""
+        """Refuse a folder that cannot be written to; the rest was checked before."""
         require_folder(self.folder)
+
+    @classmethod
+    def of(cls, wanted: WantedResult, name: str) -> Self:
+        """The ending that was asked for, in a folder of that name without another."""
+        folder = Path("klack-results") / name if wanted.out is None else wanted.out
+        return cls(json=wanted.json, quiet=wanted.quiet, folder=folder, report=wanted.report)
 
     @contextmanager
     def resumable(self, log: "LogForm[Any, Any]") -> Iterator[Progress]:
@@ -173,13 +96,13 @@ class Ending(Wanted):
                 progress=progress,
                 unfinished=unfinished,
             )
-        self.tell(analysis, record)
+        self.show(analysis.told(record))
         self.note(record.warnings)
         if cached := stages_with_cached(record.stage_times):
             self.say(f"With cached results (klack cache): {', '.join(cached)}")
         made = ["result.zarr", *names, *(REPORTS if self.report and failure is None else ())]
         self.say(f"Results in {self.folder}: {', '.join(made)}")
-        self.write(analysis, record)
+        self.write(lambda: analysis.to_json(record))
         if error := incomplete or failure:
             raise error
         return 0

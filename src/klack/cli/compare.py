@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Ending, Wanted
+from klack.analyses.ending import Ending
 from klack.errors import InputError
-from klack.terminal.notes import print_notes
-from klack.terminal.options import Components, Json, Quiet, imported
+from klack.terminal.options import Components, imported
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.case.measurement import CaseMeasurement
@@ -73,11 +73,9 @@ def compare(
         ),
     ] = None,
     component: Components = None,
-    json: Json = None,
-    quiet: Quiet = False,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Compare a result with a measurement, or with CalculiX: curves, numbers, residuals."""
-    wanted = Wanted(json=json, quiet=quiet)
     if variant is not None:
         raise InputError(
             "--variant",
@@ -98,7 +96,7 @@ def compare(
         return 0
     folder = out if out is not None else result / _MEASURED
     own = imported(component)
-    ending = wanted.into(folder, report=report)
+    ending = Ending(json=wanted.json, quiet=wanted.quiet, folder=folder, report=report)
     return _with_measurement(result, measurement or [], case, own, ending)
 
 
@@ -176,7 +174,7 @@ def _section(
 # --------------------------------------------------------------------------- CalculiX
 
 
-def _with_calculix(result: Path, calculix: Path, level: str, folder: Path, wanted: Wanted) -> None:
+def _with_calculix(result: Path, calculix: Path, level: str, folder: Path, wanted: Shown) -> None:
     from klack.analyses.comparison.analysis import CALCULIX
     from klack.analyses.comparison.calculix import compare_with, level_of, with_other
     from klack.analyses.impact.analysis import IMPACT
@@ -187,12 +185,12 @@ def _with_calculix(result: Path, calculix: Path, level: str, folder: Path, wante
 
     study = IMPACT.load(result)
     require_folder(folder)
-    print_notes(missing_in(study), to_stderr=True)
+    wanted.warn(missing_in(study))
     history = level_of(study, level).history
     comparison = compare_with(study, level, other_run(read_calculix(calculix), history))
     with staged_folder(folder) as stage:
         chart = force_chart(with_other(study, comparison))
         (stage / _PICTURE).write_bytes(svg_chart(chart))
-    wanted.tell(CALCULIX, comparison)
+    wanted.show(CALCULIX.told(comparison))
     wanted.say(f"Picture: {folder / _PICTURE}")
-    wanted.write(CALCULIX, comparison)
+    wanted.write(lambda: CALCULIX.to_json(comparison))

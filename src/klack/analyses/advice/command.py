@@ -6,9 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Wanted
-from klack.terminal.options import CaseArgument, Components, Json, Quiet, Threads, imported
+from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["advise"]
 
@@ -59,14 +59,11 @@ def advise(
         bool, Parameter(help="Run the advised case and lay it over the finest run.")
     ] = True,
     component: Components = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: Wanted = WANTED,
 ) -> int:
     """Advise mesh sizes, modes and step of a case, with the error expected of each."""
     from klack.units import FREQUENCY, RATIO, parse_quantity
 
-    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     _require_new_file(write)
     limit = _within("--error", error, parse_quantity(error, RATIO, "--error"), _MOST_ERROR, "1 %")
     decibel = _within("--bands", bands, _decibel(bands), _MOST_LEVEL, "1 dB")
@@ -85,7 +82,7 @@ def advise(
     from klack.analyses.advice.any_case import advise_case
     from klack.analyses.advice.summary import AdvisedCase
 
-    with show_progress(quiet) as progress:
+    with show_progress(wanted.quiet) as progress:
         advice = advise_case(
             checked,
             error=limit,
@@ -94,7 +91,7 @@ def advise(
             level=level,
             confirm=confirm,
             progress=progress,
-            threads=threads,
+            threads=wanted.threads,
         )
     if write is not None:
         _write_whole(write, advised_text(tree, advice, write, __version__))
@@ -104,8 +101,8 @@ def advise(
         yaml=advice_yaml(tree, advice),
         written=write,
     )
-    wanted.tell(ADVICE, advised)
-    wanted.write(ADVICE, advised)
+    wanted.show(ADVICE.told(advised))
+    wanted.write(lambda: ADVICE.to_json(advised))
     return 0
 
 

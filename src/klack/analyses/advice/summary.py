@@ -13,9 +13,9 @@ from typing_extensions import TypedDict
 from klack.analyses.advice.advice import Advice, Counsel
 from klack.analyses.advice.ladder import REACH, Measure, score
 from klack.analyses.advice.settings import SettingValue
-from klack.analyses.analysis import TextTable
 from klack.analyses.json_parts import Real
 from klack.input.problem import Key
+from klack.terminal.wanted import TextTable
 from klack.units import format_si
 
 __all__ = [

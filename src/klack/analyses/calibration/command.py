@@ -5,18 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Wanted
-from klack.terminal.options import (
-    CaseArgument,
-    Components,
-    Json,
-    Out,
-    Quiet,
-    Report,
-    Threads,
-    imported,
-    require_files,
-)
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument, Components, imported, require_files
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["calibrate"]
 
@@ -48,18 +39,13 @@ def calibrate(
     strokes: _Strokes = None,
     workers: _Workers = None,
     component: Components = None,
-    report: Report = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Fit parameters of a valve to measured strokes, with their uncertainty."""
     from dataclasses import replace
 
     from klack.errors import require_positive
 
-    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     require_files("--measurement", measurement)
     for option, number, unit in (("--strokes", strokes, "strokes"), ("--workers", workers, "")):
         if number is not None:
@@ -72,7 +58,7 @@ def calibrate(
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     fitted = calibration_of(checked).channels
-    ending = wanted.into(out, f"{checked.name}-calibration", report=report)
+    ending = Ending.of(wanted, f"{checked.name}-calibration")
 
     from klack.analyses.calibration.analysis import CALIBRATION
     from klack.analyses.calibration.calibrated_case import CALIBRATED_NAME, calibrated_text
@@ -99,6 +85,6 @@ def calibrate(
             folder=ending.folder,
             workers=workers,
             progress=progress,
-            threads=threads,
+            threads=wanted.threads,
         )
     return ending.end(CALIBRATION, study, beside=calibrated, unfinished=TRIAL_LOG)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NotRequired, cast
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.calibration.measures import (
     BOUNDS,
     CALIBRATION_MEASURES,
@@ -21,6 +21,7 @@ from klack.analyses.calibration.measures import (
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy
 from klack.analyses.json_parts import OwnComponents, Real, Version
 from klack.analyses.measures import Measure, json_of, number_or_none, with_measures
+from klack.terminal.wanted import TextTable
 
 __all__ = [
     "PARAMETER_COLUMNS",

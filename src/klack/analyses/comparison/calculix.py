@@ -8,7 +8,6 @@ from typing import Any, Literal, cast
 from typing_extensions import TypedDict
 
 from klack.acoustics.comparison import compare_histories
-from klack.analyses.analysis import TextTable
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.summary import DeviationJson
@@ -24,6 +23,7 @@ from klack.analyses.measures import (
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
+from klack.terminal.wanted import TextTable
 
 __all__ = [
     "COMPARISON_COLUMNS",

@@ -8,12 +8,13 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, Notes, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.comparison.measures import DISTRIBUTION_MEASURES, DROPS_MEASURES
 from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
 from klack.analyses.json_parts import Real, RejectedJson, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
+from klack.terminal.wanted import Notes, TextTable
 from klack.units import format_si
 
 __all__ = [

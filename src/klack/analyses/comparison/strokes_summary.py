@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, Notes, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.comparison.measures import (
     COMPARED,
     HIGHEST_MEASURES,
@@ -24,6 +24,7 @@ from klack.analyses.comparison.strokes_record import (
 )
 from klack.analyses.json_parts import RejectedJson, Version
 from klack.analyses.measures import cells, heads, json_of, with_measures
+from klack.terminal.wanted import Notes, TextTable
 
 __all__ = [
     "CURVE_COLUMNS",

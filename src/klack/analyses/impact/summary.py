@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.impact.measures import (
     CONTACT_TIME,
@@ -18,6 +18,7 @@ from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.json_parts import ContactJson
 from klack.analyses.measures import cells, heads, json_of, with_measures
 from klack.contact.restitution import Deviation
+from klack.terminal.wanted import TextTable
 
 __all__ = [
     "SUMMARY_COLUMNS",

@@ -6,18 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Wanted
+from klack.analyses.ending import Ending
 from klack.analyses.result_folder import is_result
-from klack.terminal.options import (
-    Components,
-    Json,
-    Out,
-    Quiet,
-    Report,
-    Threads,
-    imported,
-)
+from klack.terminal.options import Components, imported
 from klack.terminal.progress import Progress, show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource
@@ -55,28 +48,25 @@ def noise(
     *,
     variant: _Names = None,
     component: Components = None,
-    report: Report = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Estimate what is heard: force spectra, vibration, radiated sound, loudness, WAV files."""
-    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
     _require_known(paths)
     own = imported(component)
-    ending = wanted.into(out, _folder_name(paths), report=report)
+    ending = Ending.of(wanted, _folder_name(paths))
 
-    with show_progress(quiet):
+    with show_progress(wanted.quiet):
         from klack.analyses.noise.analysis import NOISE
         from klack.analyses.noise.run import run_noise
         from klack.analyses.noise.sounds import write_sounds
 
-    with show_progress(quiet) as progress:
+    with show_progress(wanted.quiet) as progress:
         sources = [
-            source for path in paths for source in _sources(path, names, own, progress, threads)
+            source
+            for path in paths
+            for source in _sources(path, names, own, progress, wanted.threads)
         ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
     return ending.end(NOISE, study, beside=lambda folder: write_sounds(study, folder))

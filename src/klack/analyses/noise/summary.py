@@ -8,11 +8,12 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.json_parts import OwnComponents, Real
 from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
 from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
+from klack.terminal.wanted import TextTable
 
 __all__ = [
     "NOISE_COLUMNS",

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.measures import (
     Column,
     Measure,
@@ -19,6 +19,7 @@ from klack.analyses.measures import (
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
 from klack.reduction.reduced_body import ReducedBody
+from klack.terminal.wanted import TextTable
 
 __all__ = [
     "BODY_MEASURES",

@@ -4,9 +4,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Wanted
-from klack.terminal.options import CaseArgument, Json, Out, Quiet, Report, Threads
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument
 from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["shots"]
 
@@ -37,16 +38,11 @@ def shots(
     count: _Count = None,
     seed: _Seed = None,
     workers: _Workers = None,
-    report: Report = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Drop the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
     from klack.errors import require_nonnegative, require_positive
 
-    wanted = Wanted(json=json, quiet=quiet, threads=threads)
     if count is not None:
         require_positive("--shots", count, "shots")
     if seed is not None:
@@ -60,9 +56,9 @@ def shots(
 
     checked = load_case(find_case(case))
     shots_of(checked)
-    ending = wanted.into(out, checked.name, report=report)
+    ending = Ending.of(wanted, checked.name)
 
-    with show_progress(quiet):
+    with show_progress(wanted.quiet):
         from klack.analyses.shots.analysis import SHOTS
         from klack.analyses.shots.log import SHOT_LOG
         from klack.analyses.shots.run import run_shots
@@ -75,6 +71,6 @@ def shots(
             workers=workers,
             folder=ending.folder,
             progress=progress,
-            threads=threads,
+            threads=wanted.threads,
         )
     return ending.end(SHOTS, study, unfinished=SHOT_LOG)

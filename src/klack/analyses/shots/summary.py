@@ -7,12 +7,13 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
 from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
+from klack.terminal.wanted import TextTable
 from klack.units import format_si
 
 __all__ = [

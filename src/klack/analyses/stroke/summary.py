@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
+from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
 from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
@@ -16,6 +16,7 @@ from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.simulation.network_result import ImpactEvent
+from klack.terminal.wanted import TextTable
 from klack.units import format_si
 
 __all__ = [
