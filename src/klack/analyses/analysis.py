@@ -9,7 +9,7 @@ from klack.analyses.measures import Measure
 from klack.analyses.named import named
 from klack.analyses.store import RecordFormat, load_record, save_record
 from klack.report.page import Content
-from klack.terminal.wanted import Notes, TextTable
+from klack.terminal.tables import Notes, TextTable
 
 __all__ = ["Analysis", "Measured", "StoredAnalysis"]
 

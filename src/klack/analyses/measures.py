@@ -4,7 +4,7 @@ From the description of a measure come its key in JSON, its column in tables, it
 its entry in the glossary, its attributes in exported files and its line in the reference.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite, log10
@@ -14,6 +14,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "number_or_none",
     "page_cells",
     "page_heads",
+    "text_table",
     "with_measures",
 ]
 
@@ -270,6 +272,14 @@ def heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
 def cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
     """One row below :func:`heads`."""
     return tuple(measure.cell(of) for measure in measures if measure.column is not None)
+
+
+def text_table(
+    title: str, first: str, measures: Sequence[Measure[Of]], named: Iterable[tuple[str, Of]]
+) -> TextTable:
+    """A table for a terminal: things down, below their names, and their measures across."""
+    rows = tuple((name, *cells(measures, of)) for name, of in named)
+    return TextTable(title=title, columns=(first, *heads(measures)), rows=rows)
 
 
 def page_heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.terminal.options import Components, imported
-from klack.terminal.wanted import SHOWN, Shown, TextTable
+from klack.terminal.tables import TextTable
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.inspection import Row

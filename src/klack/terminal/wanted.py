@@ -1,7 +1,7 @@
 """What the user wants of a command: how much on the terminal, what as JSON, where the results."""
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -9,35 +9,16 @@ from cyclopts import Parameter
 
 from klack.terminal.options import Json, Out, Quiet, Report, Threads, require_threads
 from klack.terminal.output import require_json_target, write_json
-from klack.terminal.tables import print_table
+from klack.terminal.tables import Notes, TextTable, print_table
 
 __all__ = [
     "SHOWN",
     "WANTED",
     "WANTED_RESULT",
-    "Notes",
     "Shown",
-    "TextTable",
     "Wanted",
     "WantedResult",
 ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextTable:
-    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Notes:
-    """Notes on what stands above them."""
-
-    notes: Sequence[str]
 
 
 @Parameter(name="*")
@@ -91,11 +72,7 @@ class Shown:
                 self.say(item)
             elif not self.quiet:
                 print_table(
-                    item.title,
-                    item.columns,
-                    item.rows,
-                    left=item.left,
-                    to_stderr=self.to_stderr,
+                    item.title, item.columns, item.rows, left=item.left, to_stderr=self.to_stderr
                 )
 
     def write(self, numbers: Callable[[], Mapping[str, Any]]) -> None:

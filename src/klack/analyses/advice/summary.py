@@ -15,7 +15,7 @@ from klack.analyses.advice.ladder import REACH, Measure, score
 from klack.analyses.advice.settings import SettingValue
 from klack.analyses.json_parts import Real
 from klack.input.problem import Key
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [

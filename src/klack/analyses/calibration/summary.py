@@ -21,7 +21,7 @@ from klack.analyses.calibration.measures import (
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy
 from klack.analyses.json_parts import OwnComponents, Real, Version
 from klack.analyses.measures import Measure, json_of, number_or_none, with_measures
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 
 __all__ = [
     "PARAMETER_COLUMNS",

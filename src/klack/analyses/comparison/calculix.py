@@ -23,7 +23,7 @@ from klack.analyses.measures import (
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 
 __all__ = [
     "COMPARISON_COLUMNS",

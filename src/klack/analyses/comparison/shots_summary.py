@@ -14,7 +14,7 @@ from klack.analyses.comparison.shots_record import MeasuredDistribution, Measure
 from klack.analyses.json_parts import Real, RejectedJson, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
-from klack.terminal.wanted import Notes, TextTable
+from klack.terminal.tables import Notes, TextTable
 from klack.units import format_si
 
 __all__ = [

@@ -24,7 +24,7 @@ from klack.analyses.comparison.strokes_record import (
 )
 from klack.analyses.json_parts import RejectedJson, Version
 from klack.analyses.measures import cells, heads, json_of, with_measures
-from klack.terminal.wanted import Notes, TextTable
+from klack.terminal.tables import Notes, TextTable
 
 __all__ = [
     "CURVE_COLUMNS",

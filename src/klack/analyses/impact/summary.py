@@ -16,12 +16,11 @@ from klack.analyses.impact.measures import (
 )
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.json_parts import ContactJson
-from klack.analyses.measures import cells, heads, json_of, with_measures
+from klack.analyses.measures import json_of, text_table, with_measures
 from klack.contact.restitution import Deviation
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 
 __all__ = [
-    "SUMMARY_COLUMNS",
     "DeviationJson",
     "ImpactJson",
     "answer_line",
@@ -30,10 +29,7 @@ __all__ = [
     "study_measured",
     "study_to_json",
     "study_told",
-    "summary_rows",
 ]
-
-SUMMARY_COLUMNS = ("level", *heads(LEVEL_MEASURES))
 
 
 @with_measures(DEVIATION_MEASURES)
@@ -109,7 +105,7 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
 
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     """What a terminal shows: the levels side by side, the answer, how good the others are."""
-    yield TextTable(title=study.title, columns=SUMMARY_COLUMNS, rows=summary_rows(study))
+    yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
         yield doubt
@@ -177,11 +173,6 @@ def _percent(value: float) -> str:
 
 def _signed(value: float, digits: int) -> str:
     return f"{value:+.{digits}f}" if abs(value) < float("inf") else "unknown"
-
-
-def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`SUMMARY_COLUMNS`, one per level, as text."""
-    return tuple((name, *cells(LEVEL_MEASURES, result)) for name, result in study.levels.items())
 
 
 def _level(result: LevelResult) -> Any:

@@ -1,6 +1,7 @@
 """The few numbers of a noise study that a script or a terminal wants."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -10,22 +11,17 @@ from typing_extensions import TypedDict
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
 from klack.analyses.analysis import Measured
 from klack.analyses.json_parts import OwnComponents, Real
-from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
+from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 
 __all__ = [
-    "NOISE_COLUMNS",
     "NoiseJson",
     "noise_measured",
-    "noise_rows",
     "noise_to_json",
     "noise_told",
 ]
-
-# dBA: A-weighted, dBZ: unweighted (IEC 61672-1)
-NOISE_COLUMNS = ("design", *heads(DESIGN_MEASURES))
 
 
 class BandJson(TypedDict):
@@ -72,8 +68,14 @@ class NoiseJson(DesignNoiseJson):
 
 
 def noise_told(study: NoiseStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: the designs side by side."""
-    yield TextTable(title=study.title, columns=NOISE_COLUMNS, rows=noise_rows(study))
+    """What a terminal shows: the designs side by side, then how far each is from the first.
+
+    Differences are levels; those of loudness and sharpness are factors.  dBA: A-weighted, dBZ:
+    unweighted (IEC 61672-1).
+    """
+    first, *others = study.designs
+    table = text_table(study.title, "design", DESIGN_MEASURES, ((d.name, d) for d in study.designs))
+    yield replace(table, rows=(*table.rows, *(_difference_row(other, first) for other in others)))
 
 
 def noise_measured(study: NoiseStudy) -> Iterator[Measured]:
@@ -84,18 +86,6 @@ def noise_measured(study: NoiseStudy) -> Iterator[Measured]:
             yield f"{design.name}, {stop.stop}", stop, STOP_MEASURES
         for body in design.bodies:
             yield f"{design.name}, {body.name}", body, BODY_MEASURES
-
-
-def noise_rows(study: NoiseStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`NOISE_COLUMNS` as text: one per design, then how far each is from the first.
-
-    Differences are levels; those of loudness and sharpness are factors.
-    """
-    first, *others = study.designs
-    return (
-        *((design.name, *cells(DESIGN_MEASURES, design)) for design in study.designs),
-        *(_difference_row(design, first) for design in others),
-    )
 
 
 def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:

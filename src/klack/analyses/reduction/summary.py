@@ -10,16 +10,15 @@ from klack.analyses.analysis import Measured
 from klack.analyses.measures import (
     Column,
     Measure,
-    cells,
     described_in,
-    heads,
     json_of,
+    text_table,
     with_measures,
 )
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
 from klack.reduction.reduced_body import ReducedBody
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 
 __all__ = [
     "BODY_MEASURES",
@@ -137,11 +136,7 @@ class ReductionJson(TypedDict):
 
 def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
     """What a terminal shows: both bodies."""
-    yield TextTable(
-        title=study.title,
-        columns=("body", *heads(BODY_MEASURES)),
-        rows=tuple((body.name, *cells(BODY_MEASURES, body)) for body in study.bodies),
-    )
+    yield text_table(study.title, "body", BODY_MEASURES, ((b.name, b) for b in study.bodies))
 
 
 def reduction_measured(study: ReductionStudy) -> Iterator[Measured]:

@@ -13,7 +13,7 @@ from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
 from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [

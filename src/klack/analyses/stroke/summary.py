@@ -10,32 +10,27 @@ from typing_extensions import TypedDict
 from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
-from klack.analyses.measures import cells, heads, json_of, number_or_none, with_measures
+from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.simulation.network_result import ImpactEvent
-from klack.terminal.wanted import TextTable
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
-    "IMPACT_COLUMNS",
     "TIME_COLUMNS",
-    "VARIANT_COLUMNS",
     "StrokeJson",
     "first_impact",
-    "impact_rows",
     "start_text",
     "stroke_measured",
     "stroke_to_json",
     "stroke_told",
     "time_rows",
     "touch_event",
-    "variant_rows",
 ]
 
-VARIANT_COLUMNS = ("variant", *heads(VARIANT_MEASURES))
 TIME_COLUMNS = (
     "variant",
     "body",
@@ -47,7 +42,6 @@ TIME_COLUMNS = (
     "touch [ms]",
     "of",
 )
-IMPACT_COLUMNS = ("stop", *heads(EVENT_MEASURES))
 
 _TOLD = 20
 """Impacts of a variant on a terminal."""
@@ -147,7 +141,7 @@ def stroke_to_json(study: StrokeStudy) -> StrokeJson:
 
 def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
     """What a terminal shows: variants side by side, times at shares of the lift, impacts."""
-    yield TextTable(title=study.title, columns=VARIANT_COLUMNS, rows=variant_rows(study))
+    yield text_table(study.title, "variant", VARIANT_MEASURES, study.variants.items())
     if times := time_rows(study):
         title = "times at shares of the lift"
         yield TextTable(title=title, columns=TIME_COLUMNS, rows=times, left=3)
@@ -160,7 +154,8 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             continue
         if total > _TOLD:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
-        yield TextTable(title=title, columns=IMPACT_COLUMNS, rows=tuple(impact_rows(variant)))
+        events = variant.result.events[:_TOLD]
+        yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
     for stop in study.stops:
         if doubt := contact_doubt(stop):
             yield f"Impacts on '{stop.name}': {doubt}"
@@ -174,13 +169,6 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
         for event in variant.result.events:
             counts[event.stop] += 1
             yield f"{name}, {event.stop} {counts[event.stop]}", event, EVENT_MEASURES
-
-
-def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`VARIANT_COLUMNS`, one per variant, as text."""
-    return tuple(
-        (variant.name, *cells(VARIANT_MEASURES, variant)) for variant in study.variants.values()
-    )
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
@@ -213,12 +201,6 @@ def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
         ),
         None,
     )
-
-
-def impact_rows(variant: StrokeVariant, most: int = _TOLD) -> Iterator[tuple[str, ...]]:
-    """Rows of :data:`IMPACT_COLUMNS`, the first ``most`` impacts of a variant, as text."""
-    for event in variant.result.events[:most]:
-        yield (event.stop, *cells(EVENT_MEASURES, event))
 
 
 def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
