@@ -46,7 +46,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("transient", "acoustics", "measurement"),
     # from a case to results
     ("case", "report"),
-    ("assembling",),
+    ("assembling", "terminal"),
     ("analyses",),
     ("exchange",),
     ("verification", "api"),

@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
@@ -182,7 +182,7 @@ class Result:
     """
 
     record: Any
-    analysis: Analysis[Any]
+    analysis: StoredAnalysis[Any]
 
     @cached_property
     def measures(self) -> Mapping[str, Mapping[str, Number]]:
@@ -190,8 +190,9 @@ class Result:
         found: dict[str, dict[str, Number]] = {}
         for name, of, measures in self.analysis.measured(self.record):
             values = json_of(measures, of)
+            settled = {item.json_key: item.settled(of) for item in measures}
             found[name] = {
-                item.key: Number(values[item.json_key], item.unit, item) for item in measures
+                item.key: Number(values[key], item.unit, item) for key, item in settled.items()
             }
         return found
 

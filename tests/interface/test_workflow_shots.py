@@ -13,9 +13,8 @@ from klack.analyses.shots.log import SHOT_LOG, shot_log, shots_mark
 from klack.analyses.shots.measures import FIRST_IMPACT
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
-from klack.analyses.shots.pool import run_shots_on
 from klack.analyses.shots.record import ShotColumns
-from klack.analyses.shots.run import judge_rule, run_shots
+from klack.analyses.shots.run import judge_rule, run_shots, run_shots_on
 from klack.analyses.shots.summary import (
     DISTRIBUTION_COLUMNS,
     distribution_rows,
@@ -193,9 +192,7 @@ def test_shots_whose_workers_die_end_with_a_way_out(model, draws, alone, tmp_pat
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     log = shot_log(None, "")
     log.add(0, alone[0])
-    words = (
-        r"shots: a worker process died with exit code 3; 1 of 4 shots are finished\.\nTry: fewer"
-    )
+    words = r"a worker process died with exit code 3; finished shots so far: 1\.\nTry: fewer"
     with pytest.raises(ConvergenceError, match=words):
         run_shots_on(2, model.setup, draws, log, silent)
 
