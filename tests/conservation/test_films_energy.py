@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.contact.step_constants import NO_LAW
 from klack.network.rows import FilmRow
-from klack.simulation.interface_step import NO_LAW, interface_store, solve_interface
+from klack.simulation.interface_step import interface_store, solve_interface
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import steel_rod
 

@@ -166,7 +166,7 @@ def test_result_is_plain(model: InterfaceModel):
 def test_hits_on_both_stops_in_quick_succession_are_two_impacts(model: InterfaceModel):
     """4 um between the stops: 13 us of flight, less than what ends an impact on one stop alone."""
     above = np.arange(model.count) >= model.contacts[1][1]
-    near = model.with_gap(model.gap - np.where(above, 26e-6, 0.0))
+    near = dataclasses.replace(model, gap=model.gap - np.where(above, 26e-6, 0.0))
     run = simulate_interface(near, speed=0.3, duration=250e-6, flight=True, points=False)
     names = [segment.contact for segment in run.impacts]
     assert names[:4] == ["contact", "opposite", "contact", "opposite"]

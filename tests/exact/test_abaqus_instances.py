@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from klack.errors import AccuracyWarning
-from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Surface
 from klack.mesh.quality import corner_volume
@@ -104,7 +104,7 @@ MODEL = (BOX + TET + ASSEMBLY).replace("elset=Ends, instance=Tip", "elset=Only, 
 @pytest.fixture
 def model(tmp_path) -> MeshModel:
     (tmp_path / "two.inp").write_text(MODEL)
-    return read_abaqus_model(tmp_path / "two.inp", MM)
+    return read_abaqus(tmp_path / "two.inp", MM)
 
 
 def sorted_points(points: np.ndarray) -> np.ndarray:
@@ -187,7 +187,7 @@ def test_one_instance_alone(tmp_path, name):
         with pytest.raises(ValueError, match=r"one of: Left\.Set-1"):
             read_abaqus(tmp_path / "two.inp", MM, solids=(name,))
         return
-    mesh = read_abaqus(tmp_path / "two.inp", MM, solids=(name,))
+    mesh = read_abaqus(tmp_path / "two.inp", MM, solids=(name,)).mesh
 
     assert mesh.solids == ("Right.Set-1",)
     assert mesh.node_count == 8
@@ -203,7 +203,7 @@ def test_turn_about_a_slanted_axis_keeps_volume_and_axis(tmp_path):
         "1., 1., 1., 2., 2., 2., 120.\n*End Instance\n*End Assembly\n"
     )
     (tmp_path / "cube.inp").write_text(cube + placed)
-    mesh = read_abaqus(tmp_path / "cube.inp", 1.0)
+    mesh = read_abaqus(tmp_path / "cube.inp", 1.0).mesh
 
     assert mesh.solids == ("Set-1",)
     assert corner_volume(mesh) == pytest.approx(1.0, rel=1e-12)
@@ -221,7 +221,7 @@ def test_single_instance_keeps_plain_names_and_numbers(tmp_path):
         "*Nset, nset=Set-1\n1,\n*Nset, nset=two, instance=I\n1, 2\n*End Assembly\n"
     )
     (tmp_path / "one.inp").write_text(BOX + assembly)
-    model = read_abaqus_model(tmp_path / "one.inp", 1.0)
+    model = read_abaqus(tmp_path / "one.inp", 1.0)
 
     assert model.node_numbers.tolist() == list(range(1, 9))
     assert model.mesh.solids == ("Set-1",)
@@ -236,7 +236,7 @@ def test_instance_may_add_sets_to_its_part(tmp_path):
         "*Instance, name=J, part=Box\n0., 0., 9.\n*End Instance\n"
     )
     (tmp_path / "more.inp").write_text(BOX + assembly)
-    mesh = read_abaqus(tmp_path / "more.inp", 1.0)
+    mesh = read_abaqus(tmp_path / "more.inp", 1.0).mesh
 
     np.testing.assert_allclose(mesh.points[mesh.node_sets["more"], 2], 4.0)
     assert "J.more" not in mesh.node_sets
@@ -245,7 +245,7 @@ def test_instance_may_add_sets_to_its_part(tmp_path):
 def test_part_without_assembly_is_taken_as_drawn(tmp_path):
     (tmp_path / "part.inp").write_text(TET)
 
-    mesh = read_abaqus(tmp_path / "part.inp", 1.0)
+    mesh = read_abaqus(tmp_path / "part.inp", 1.0).mesh
 
     assert corner_volume(mesh) == pytest.approx(1 / 6, rel=1e-12)
     assert mesh.solids == ("Set-1",)
@@ -256,7 +256,7 @@ def test_ring_may_move_along_its_axis(tmp_path):
     (tmp_path / "r.inp").write_text(
         ring + "*INSTANCE, NAME=i, PART=r\n0., 5.\n*END INSTANCE\n".replace("5.", "5., 0.")
     )
-    mesh = read_abaqus(tmp_path / "r.inp", 1.0)
+    mesh = read_abaqus(tmp_path / "r.inp", 1.0).mesh
 
     np.testing.assert_array_equal(mesh.points, [[1, 5], [2, 5], [1, 6]])
 
@@ -267,7 +267,7 @@ def test_transform_and_ties_are_passed_over_with_one_warning(tmp_path):
         MODEL.replace("*End Assembly\n", extra + extra + "*End Assembly\n")
     )
     with pytest.warns(AccuracyWarning) as caught:
-        mesh = read_abaqus(tmp_path / "two.inp", MM)
+        mesh = read_abaqus(tmp_path / "two.inp", MM).mesh
 
     assert len(caught) == 1
     line = MODEL[: MODEL.index("*End Assembly")].count("\n") + 1

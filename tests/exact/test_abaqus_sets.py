@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from klack.mesh.files.abaqus.deck import read_deck
-from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import corner_volume
 
@@ -34,13 +34,13 @@ ROW = (
 
 def read(path: Path, text: str | bytes) -> Mesh:
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_abaqus(path, 1.0)
+    return read_abaqus(path, 1.0).mesh
 
 
 def numbers(path: Path, text: str, name: str) -> list[int]:
     """File numbers of a node set."""
     path.write_text(text)
-    model = read_abaqus_model(path, 1.0)
+    model = read_abaqus(path, 1.0)
     return model.node_numbers[model.mesh.node_sets[name]].tolist()
 
 
@@ -163,7 +163,7 @@ def test_blocks_may_alternate_and_need_not_be_sorted(tmp_path):
         record = [x + 1, *(10 * x + k for k in (1, 11, 12, 2, 4, 14, 13, 3))]
         text += "*ELEMENT, TYPE=C3D8R, ELSET=row\n" + ", ".join(map(str, record)) + "\n"
     (tmp_path / "x.inp").write_text(text)
-    model = read_abaqus_model(tmp_path / "x.inp", 1.0)
+    model = read_abaqus(tmp_path / "x.inp", 1.0)
 
     assert model.node_numbers.tolist() == sorted(10 * x + k for x in range(5) for k in range(1, 5))
     assert model.element_numbers[0].tolist() == [4, 3, 2, 1]

@@ -78,12 +78,3 @@ def test_a_small_rest_is_warned_of(static):
 
     with pytest.warns(AccuracyWarning, match=r"left to the local law"):
         consistent_law(static, 0.9 * slope)
-
-
-def test_linear_fit_of_a_straight_part(static):
-    local = consistent_law(static, 0.0)
-
-    fit = local.linear_fit(0.5 * FORCE, FORCE)
-
-    low, high = (float(np.cbrt((s * FORCE / STIFFNESS) ** 2)) for s in (0.5, 1.0))
-    assert fit == pytest.approx(0.5 * FORCE / (high - low), rel=0.01)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.contact.step_constants import NO_LAW
 from klack.network.rows import FilmRow
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
-from klack.simulation.interface_step import NO_LAW, film_force, interface_store, solve_interface
+from klack.simulation.interface_step import film_force, interface_store, solve_interface
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import one_contact, steel_rod
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from klack.contact.complementarity import solve_lcp
-from klack.transient.interface_kernel import solve_active
+from klack.transient.active_set import solve_active
+from klack.transient.interface_arrays import ActiveSet
 
 
 class Compiled:
@@ -15,20 +16,14 @@ class Compiled:
     def __init__(self, A):
         n = len(A)
         self.A = np.ascontiguousarray(A)
-        self.active = np.zeros(n, dtype=bool)
-        self.index = np.zeros(n, dtype=np.int64)
-        self.B = np.zeros((n, n))
-        self.counts = np.zeros(2, dtype=np.int64)
+        self.carrying = ActiveSet.none(n)
 
     def solve(self, q):
         lam, gap = np.zeros(len(q)), np.zeros(len(q))
         rounds = solve_active(
             self.A,
             q,
-            self.active,
-            self.index,
-            self.B,
-            self.counts,
+            self.carrying,
             lam,
             gap,
             1e-13 * np.abs(q).max(initial=1e-300),
@@ -37,8 +32,8 @@ class Compiled:
         return lam, gap, rounds
 
     def inverse_error(self):
-        at = self.index[: self.counts[0]]
-        B = self.B[: len(at), : len(at)]
+        at = self.carrying.points[: self.carrying.counts[0]]
+        B = self.carrying.inverse[: len(at), : len(at)]
         return np.abs(B @ self.A[np.ix_(at, at)] - np.eye(len(at))).max(initial=0.0)
 
 
@@ -103,8 +98,8 @@ def test_hundreds_of_points_closing_and_opening():
         lam, gap, rounds = solver.solve(q)
         assert rounds > 0
         check(A, q, lam, gap, rtol=1e-6)
-        changes += np.count_nonzero(solver.active != before)
-        before = solver.active.copy()
+        changes += np.count_nonzero(solver.carrying.active != before)
+        before = solver.carrying.active.copy()
         assert solver.inverse_error() < 1e-8
 
     assert changes > 600  # more than two refreshes of the inverse

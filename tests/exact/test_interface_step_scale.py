@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from klack.contact.laws import ContactLaw, HertzLaw, LinearLaw, TableLaw
-from klack.simulation.interface_step import NO_LAW, solve_interface
+from klack.contact.step_constants import NO_LAW
+from klack.simulation.interface_step import solve_interface
 
 DEPTHS = np.array([0.2, 0.5, 1.0, 2.0])
 

@@ -189,7 +189,7 @@ def test_of_a_long_stroke_the_first_part_is_followed():
     )
     assert part.events[0] is inside
     assert np.isnan(part.events[1].separation_time)
-    assert "Only the first 20 us of the run of 40 us are followed, with 2 of its 3 impacts" in note
+    assert "Only the first 20 us of the run of 40 us are evaluated, with 2 of its 3 impacts" in note
     assert first_part(whole, most=2000) == (whole, "")
     with pytest.raises(InputError, match="no impact in its first 10 us"):
         first_part(whole, most=500)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.mesh.files.abaqus.reader import read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 
 DATA = Path(__file__).parents[1] / "data"
 BOX = (DATA / "block.inp").read_bytes()
@@ -84,7 +84,7 @@ def read(path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            model = read_abaqus_model(path, 1e-3)
+            model = read_abaqus(path, 1e-3)
         except InputError:
             return
     mesh = model.mesh
@@ -152,7 +152,7 @@ def test_random_bytes(tmp_path):
         for start in (b"", b"*", b"*NODE\n"):
             (tmp_path / "x.inp").write_bytes(start + random.bytes(size))
             with pytest.raises(InputError):
-                read_abaqus_model(tmp_path / "x.inp", 1.0)
+                read_abaqus(tmp_path / "x.inp", 1.0)
 
 
 def test_large_block_stays_small_in_memory(tmp_path):
@@ -160,7 +160,7 @@ def test_large_block_stays_small_in_memory(tmp_path):
     lines = b"".join(b"%d, 1.23456789, 2.3456789, 3.45678901\n" % i for i in range(10, 100_000))
     (tmp_path / "x.inp").write_bytes(TET + b"*NODE, NSET=more\n" + lines)
     tracemalloc.start()
-    model = read_abaqus_model(tmp_path / "x.inp", 1.0)
+    model = read_abaqus(tmp_path / "x.inp", 1.0)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 
@@ -171,4 +171,4 @@ def test_large_block_stays_small_in_memory(tmp_path):
 def test_folder_instead_of_a_file(tmp_path):
     (tmp_path / "x.inp").mkdir()
     with pytest.raises(InputError, match="no such file"):
-        read_abaqus_model(tmp_path / "x.inp", 1.0)
+        read_abaqus(tmp_path / "x.inp", 1.0)

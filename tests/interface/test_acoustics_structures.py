@@ -143,7 +143,7 @@ def test_only_the_surfaces_that_the_case_names(stroke_case: ValveCase) -> None:
 def test_a_free_body_is_refused() -> None:
     body, *_ = rod(elements=4, clamped=False)
 
-    with pytest.raises(InputError, match=r"structure of body 'rod': got a body that nothing holds"):
+    with pytest.raises(InputError, match=r"structure of body 'rod': got an unsupported body"):
         build_structure(
             body,
             modes=None,  # type: ignore[arg-type]

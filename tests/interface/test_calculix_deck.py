@@ -25,7 +25,7 @@ from klack.exchange.calculix_deck import (
     write_deck,
 )
 from klack.materials import Material
-from klack.mesh.files.abaqus.reader import read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
 from klack.progress import silent
@@ -61,7 +61,7 @@ def impact(family: str = "tet10", *, distance: float = 3e-6, **more: float) -> C
 
 def read_back(deck: Path, impact: CalculixImpact, settings: CalculixSettings) -> MeshModel:
     write_deck(impact, settings, deck)
-    return read_abaqus_model(deck, 1e-3)
+    return read_abaqus(deck, 1e-3)
 
 
 def faces(points: np.ndarray, surface: Surface) -> np.ndarray:
@@ -105,9 +105,9 @@ def test_materials_and_masses_survive_the_units(tmp_path):
     model = read_back(tmp_path / "two.inp", bodies, SETTINGS)
 
     for solid, material in (("UPPER_1", STEEL), ("LOWER_1", BRASS)):
-        read = model.materials[model.sections[solid]].in_si(stress=1e6, density=1e12)
-        for key in ("young", "poisson", "density"):
-            assert getattr(read, key) == pytest.approx(getattr(material, key), rel=1e-12)
+        read = model.materials[model.sections[solid]]
+        for key, unit in (("young", 1e6), ("poisson", 1.0), ("density", 1e12)):  # t, mm, s
+            assert unit * getattr(read, key) == pytest.approx(getattr(material, key), rel=1e-12)
     assert bodies.upper.mass == pytest.approx(7850 * 1e-3 * 0.8e-3 * 1.997e-3, rel=1e-12)
 
 

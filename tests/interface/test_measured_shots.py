@@ -1,4 +1,4 @@
-"""Shots beside measured drops.
+"""Shots against measured drops.
 
 Truth: throws under a constant force, where the rebound of a drop with restitution e and speed v
 rises ``(e v)^2 / 2 a``, and the mean of the highest of m draws, counted out.

@@ -171,7 +171,7 @@ def test_other_keywords_are_no_slips(tmp_path):
     )
     (tmp_path / "x.inp").write_text(TET + rest)
 
-    assert read_abaqus(tmp_path / "x.inp", 1.0).element_count == 1
+    assert read_abaqus(tmp_path / "x.inp", 1.0).mesh.element_count == 1
 
 
 def test_unit_must_be_a_length(tmp_path):
@@ -226,7 +226,7 @@ def test_a_set_of_nodes_is_no_surface(tmp_path):
     path = tmp_path / "x.inp"
     path.write_text(TET + "*NSET, NSET=foot\n1, 2, 3\n*SURFACE, NAME=face\nbody, S1\n")
     with pytest.raises(InputError, match=r"surface 'foot': got a set of nodes.*one of: face"):
-        read_abaqus(path, 1.0).surface("foot")
+        read_abaqus(path, 1.0).mesh.surface("foot")
 
 
 def test_a_lost_include_says_where_it_is_looked_for(tmp_path):

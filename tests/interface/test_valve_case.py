@@ -8,7 +8,7 @@ import pytest
 
 from klack.case import read_case
 from klack.case.bodies import CaseBody
-from klack.case.valve import BodyPort, CaseStop, StrokeRun, ValveBody, ValveCase
+from klack.case.valve import ValveCase
 from klack.case.valve_reader import (
     load_any_case,
     load_valve_case,
@@ -16,6 +16,7 @@ from klack.case.valve_reader import (
     valve_case_schema,
 )
 from klack.case.valve_roles import find_roles
+from klack.case.valve_sections import BodyPort, CaseStop, StrokeRun, ValveBody
 from klack.errors import InputError
 from klack.input.section import Section
 from klack.network.catalogue import component_classes

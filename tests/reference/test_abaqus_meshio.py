@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from klack.mesh.files.abaqus.reader import read_abaqus, read_abaqus_model
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.quality import corner_volume
 from klack.verification.lattice import lattice_mesh
 
@@ -48,7 +48,7 @@ def test_what_meshio_writes(tmp_path, family):
     )
     meshio.write(tmp_path / "m.inp", written, file_format="abaqus", float_fmt=".17g")
 
-    read = read_abaqus_model(tmp_path / "m.inp", 1.0)
+    read = read_abaqus(tmp_path / "m.inp", 1.0)
 
     np.testing.assert_array_equal(read.mesh.points, mesh.points)
     parts = [block.connectivity for block in read.mesh.blocks]
@@ -66,7 +66,7 @@ def test_what_meshio_reads(tmp_path, boxes, family):
     (tmp_path / "m.inp").write_text("*NODE, NSET=" + text)
 
     other = meshio.read(tmp_path / "m.inp", file_format="abaqus")
-    mesh = read_abaqus(tmp_path / "m.inp", 1.0)
+    mesh = read_abaqus(tmp_path / "m.inp", 1.0).mesh
 
     (block,), (cells,) = mesh.blocks, other.cells
     assert NAMES[block.family] == cells.type
@@ -78,7 +78,7 @@ def test_what_meshio_reads(tmp_path, boxes, family):
 
 def test_boxes_of_the_benchmark(tmp_path, boxes):
     volume = boxes.write_boxes(tmp_path / "boxes.inp", 3000)
-    mesh = read_abaqus(tmp_path / "boxes.inp", 1e-3)
+    mesh = read_abaqus(tmp_path / "boxes.inp", 1e-3).mesh
 
     assert mesh.solids == ("tet10", "hex20", "wedge15")
     assert corner_volume(mesh) == pytest.approx(volume, rel=1e-8)  # nine digits

@@ -12,8 +12,9 @@ from klack.analyses.impact import run as impact
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.summary import answer_line, estimate_lines, study_to_json
+from klack.case.impact_sections import LinearLocalLaw, Spring
 from klack.case.reader import load_case, read_case
-from klack.case.schema import Case, LinearLocalLaw, Spring
+from klack.case.schema import Case
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.stages import for_comparison
 

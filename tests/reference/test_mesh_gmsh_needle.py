@@ -21,7 +21,7 @@ NEEDLE = Path(__file__).parents[2] / "cases" / "needle-from-inp" / "needle.inp"
 
 @pytest.fixture(scope="module")
 def needle() -> Mesh:
-    return read_abaqus(NEEDLE, MM)
+    return read_abaqus(NEEDLE, MM).mesh
 
 
 def test_volume(needle):

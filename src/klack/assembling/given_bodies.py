@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.assembled_bodies import assembled_from_matrices
 from klack.assembling.damping_choice import damping_of
 from klack.case.bodies import CaseFile
 from klack.case.foreign import ModelPort, ReducedModel
@@ -24,7 +23,7 @@ from klack.reduction.given_modes import RIGID_FREQUENCY
 from klack.reduction.reduced_body import ReducedBody, StateSpace
 from klack.reduction.residual_fit import fit_residual
 
-__all__ = ["assembled_from_matrices", "reduced_from_file"]
+__all__ = ["reduced_from_file"]
 
 _MASS = 0.01
 _SAME_UNIT = 1e-3

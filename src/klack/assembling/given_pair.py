@@ -15,7 +15,8 @@ from klack.assembling.modes import elastic_count, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
 from klack.cache.setting import result_cache
 from klack.case.bodies import CaseBody, SurfaceName
-from klack.case.schema import Case, HertzLocalLaw, LinearLocalLaw
+from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw
+from klack.case.schema import Case
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility

@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 from klack.assembling.problem import ContactProblem
-from klack.case.schema import (
-    ModeChoice,
-)
+from klack.case.bodies import ModeChoice
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
 from klack.errors import InputError
+from klack.mesh.curve import Curve
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.profile import Curve, Profile
+from klack.mesh.profile import Profile
 
 __all__ = ["Touch", "first_touch_of_meshes", "first_touch_of_profiles"]
 

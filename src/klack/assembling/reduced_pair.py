@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
-from klack.case.schema import (
-    Case,
-    HertzLocalLaw,
-    LinearLocalLaw,
-    SubmodelLocalLaw,
-)
+from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw, SubmodelLocalLaw
+from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import (
     ContactLaw,

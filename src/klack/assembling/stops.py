@@ -15,7 +15,8 @@ from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder
 from klack.assembling.modes import selection_of
-from klack.case.valve import CaseStop, ValveCase
+from klack.case.valve import ValveCase
+from klack.case.valve_sections import CaseStop
 from klack.contact.laws import ContactLaw, LinearLaw, TableLaw
 from klack.contact.local_law import LocalLaw, consistent_law
 from klack.contact.mortar import touching_shift

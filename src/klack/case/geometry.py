@@ -17,7 +17,6 @@ __all__ = [
     "ContactRefinement",
     "Edge",
     "Geometry",
-    "InputPath",
     "MeshFile",
     "MeshSettings",
     "NodeTable",

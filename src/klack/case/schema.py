@@ -8,67 +8,17 @@ from typing import Self
 
 from pydantic import model_validator
 
-from klack.case.bodies import (
-    BodyDamping,
-    CaseBody,
-    CaseMaterial,
-    ModeChoice,
-    RayleighCoefficients,
-    Reduction,
-    SurfaceName,
-)
 from klack.case.consistency import check_consistency
-from klack.case.guide import CaseGuide
 from klack.case.impact_sections import (
     LEVELS,
-    CaseContact,
-    ConsistentLocalLaw,
-    HertzLocalLaw,
     ImpactSections,
     Level,
-    LinearLocalLaw,
-    LocalLaw,
-    Lumped,
-    Motion,
-    Run,
-    Spring,
-    SubmodelLocalLaw,
-    TransferSweep,
 )
 from klack.case.noise_consistency import check_noise
-from klack.case.opposite import CaseOpposite
-from klack.case.placement import Placement
-from klack.case.shots import Shots
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 
-__all__ = [
-    "LEVELS",
-    "BodyDamping",
-    "Case",
-    "CaseBody",
-    "CaseContact",
-    "CaseGuide",
-    "CaseMaterial",
-    "CaseOpposite",
-    "ConsistentLocalLaw",
-    "HertzLocalLaw",
-    "Level",
-    "LinearLocalLaw",
-    "LocalLaw",
-    "Lumped",
-    "ModeChoice",
-    "Motion",
-    "Placement",
-    "RayleighCoefficients",
-    "Reduction",
-    "Run",
-    "Shots",
-    "Spring",
-    "SubmodelLocalLaw",
-    "SurfaceName",
-    "TransferSweep",
-]
+__all__ = ["Case"]
 
 
 class Case(ImpactSections):

@@ -10,10 +10,6 @@ from klack.case.noise_consistency import check_noise
 from klack.case.valve_consistency import check_valve
 from klack.case.valve_sections import (
     VARIANTS,
-    BodyPort,
-    CaseStop,
-    StrokeRun,
-    ValveBody,
     ValveSections,
     Variant,
 )
@@ -21,15 +17,7 @@ from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.own_component import source_digests
 
-__all__ = [
-    "VARIANTS",
-    "BodyPort",
-    "CaseStop",
-    "StrokeRun",
-    "ValveBody",
-    "ValveCase",
-    "Variant",
-]
+__all__ = ["ValveCase"]
 
 
 class ValveCase(ValveSections):

@@ -4,8 +4,6 @@ The lumped, the reduced and the full-order level all return this object, so any 
 compared.  Axis of motion z; body a (the needle) is above and moves in -z onto body b.
 """
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,17 +12,6 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 
 __all__ = ["BodyEnergy", "EnergyLedger", "ImpactHistory"]
-
-_ARRAYS = (
-    "force",
-    "peak_force",
-    "gap",
-    "velocity_a",
-    "velocity_b",
-    "displacement_a",
-    "displacement_b",
-    "external_force",
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,68 +198,3 @@ class ImpactHistory:
     def impulse(self) -> float:
         """Integral of the contact force over the whole record [N s]."""
         return float(np.sum(self.force) * self.step)
-
-    def to_arrays(self) -> dict[str, NDArray]:
-        """Return everything as plain arrays (numbers only; texts as UTF-8 bytes of JSON)."""
-        out: dict[str, NDArray] = {name: getattr(self, name) for name in _ARRAYS}
-        out["scalars"] = np.array(
-            [self.step, self.speed, self.mass_a, self.mass_b, self.longest_period, self.start]
-        )
-        ledger = self.ledger
-        out["ledger"] = np.array(
-            [
-                ledger.initial,
-                ledger.contact,
-                ledger.contact_dissipation,
-                ledger.damping,
-                ledger.work,
-                ledger.spring,
-            ]
-        )
-        words = {"solver": self.solver, "bodies": [body.name for body in ledger.bodies]}
-        out["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
-        for i, body in enumerate(ledger.bodies):
-            out[f"body{i}_energy"] = np.array([body.translation, body.vibration, body.strain])
-            out[f"body{i}_frequency"] = body.frequency
-            out[f"body{i}_modal"] = body.modal
-        return out
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray]) -> "ImpactHistory":
-        """Rebuild what :meth:`to_arrays` took apart."""
-        words = json.loads(np.asarray(arrays["words"], dtype=np.uint8).tobytes().decode())
-        step, speed, mass_a, mass_b, longest_period, start = map(float, arrays["scalars"])
-        initial, contact, contact_dissipation, damping, work, spring = map(float, arrays["ledger"])
-        bodies = []
-        for i, name in enumerate(words["bodies"]):
-            translation, vibration, strain = map(float, arrays[f"body{i}_energy"])
-            bodies.append(
-                BodyEnergy(
-                    name=name,
-                    translation=translation,
-                    vibration=vibration,
-                    strain=strain,
-                    frequency=np.asarray(arrays[f"body{i}_frequency"], dtype=float),
-                    modal=np.asarray(arrays[f"body{i}_modal"], dtype=float),
-                )
-            )
-        ledger = EnergyLedger(
-            initial=initial,
-            bodies=tuple(bodies),
-            contact=contact,
-            contact_dissipation=contact_dissipation,
-            damping=damping,
-            work=work,
-            spring=spring,
-        )
-        return cls(
-            step=step,
-            speed=speed,
-            mass_a=mass_a,
-            mass_b=mass_b,
-            longest_period=longest_period,
-            start=start,
-            solver=words["solver"],
-            ledger=ledger,
-            **{name: np.asarray(arrays[name], dtype=float) for name in _ARRAYS},
-        )

@@ -17,12 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from klack.contact.step_constants import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
 from klack.errors import InputError, require_nonnegative, require_positive
 
 __all__ = [
-    "LAW_HERTZ",
-    "LAW_LINEAR",
-    "LAW_TABLE",
     "ContactLaw",
     "ElasticLaw",
     "FlatLaw",
@@ -32,8 +30,6 @@ __all__ = [
     "TableLaw",
     "gonthier_coefficient",
 ]
-
-LAW_LINEAR, LAW_HERTZ, LAW_TABLE = 0, 1, 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -78,12 +78,6 @@ class LocalLaw:
         """End of the table [N]; an impact should stay below it."""
         return float(self.force[-1])
 
-    def linear_fit(self, low: float, high: float) -> float:
-        """Slope [N/m] of a straight line through the law between two forces [N]."""
-        inside = np.linspace(low, high, 50)
-        d = np.interp(inside, np.append(0.0, self.force), np.append(0.0, self.force_indentation))
-        return float(np.polyfit(d, inside, 1)[0])
-
     @property
     def force_indentation(self) -> NDArray[np.float64]:
         """Local indentation [m] at ``force``."""

@@ -49,7 +49,6 @@ __all__ = [
     "COVERED",
     "ContactSpace",
     "HatQuadrature",
-    "check_initial_gap",
     "contact_space",
     "hat_quadrature",
     "touching_shift",
@@ -585,28 +584,6 @@ def _node_size(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
         np.add.at(total, block.connectivity, part[:, None])
         np.add.at(count, block.connectivity, 1.0)
     return total / np.maximum(count, 1.0)
-
-
-def check_initial_gap(space: ContactSpace, expected_approach: float) -> None:
-    """Refuse bodies that overlap before the impact.
-
-    A negative initial gap is spurious stored energy.
-
-    Parameters
-    ----------
-    space : ContactSpace
-    expected_approach : float [m]
-        Largest approach of the impact; an overlap of 1 % of it is accepted.
-    """
-    lowest = float(np.min(space.gap))
-    if lowest < -0.01 * expected_approach:
-        at = ", ".join(f"{x * 1e3:.4g}" for x in space.points[np.argmin(space.gap)])
-        raise InputError(
-            "contact: initial gap",
-            got=f"an overlap of {-lowest * 1e6:.4g} um at ({at}) mm",
-            expected=f"at most 1 % of the expected approach of {expected_approach * 1e6:.4g} um",
-            hint="move the needle by klack.contact.mortar.touching_shift(...) along z.",
-        )
 
 
 def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface) -> float:

@@ -35,15 +35,12 @@ class LocalStiffness:
     fit_range : tuple of float [N]
     size : float [m]
         Distance from the contact up to which the bodies deform.
-    free_nodes : tuple of int
-        Number of nodes of a and b that deform.
     """
 
     static: StaticContact
     stiffness: float
     fit_range: tuple[float, float]
     size: float
-    free_nodes: tuple[int, int]
 
 
 def local_stiffness(
@@ -83,10 +80,9 @@ def local_stiffness(
         )
     space = static.space
     carrying = space.points[static.pressures[-1] > 0]
-    parts = [_region(body, carrying, size) for body in (body_a, body_b)]
     with (
-        Flexibility(parts[0][0], cache=cache) as first,
-        Flexibility(parts[1][0], cache=cache) as second,
+        Flexibility(_region(body_a, carrying, size), cache=cache) as first,
+        Flexibility(_region(body_b, carrying, size), cache=cache) as second,
     ):
         C = contact_compliance(space, first, second)
     yields = np.diag(C) > 1e-6 * np.max(np.diag(C))  # a held point has no compliance at all
@@ -108,14 +104,11 @@ def local_stiffness(
         stiffness=float(slope),
         fit_range=fit_range,
         size=size,
-        free_nodes=(parts[0][1], parts[1][1]),
     )
 
 
-def _region(
-    body: ElasticBody, carrying: NDArray[np.float64], size: float
-) -> tuple[ElasticBody, int]:
-    """Return the body with everything beyond ``size`` held, and its number of free nodes."""
+def _region(body: ElasticBody, carrying: NDArray[np.float64], size: float) -> ElasticBody:
+    """Return the body with everything beyond ``size`` held."""
     distance, _ = cKDTree(carrying).query(body.mesh.points)
     beyond = np.flatnonzero(distance > size)
     free = body.mesh.node_count - len(beyond)
@@ -129,4 +122,4 @@ def _region(
         )
     d = body.mesh.dimension
     held = (d * beyond[:, None] + np.arange(d)).ravel()
-    return replace(body, fixed=np.union1d(body.fixed, held)), free
+    return replace(body, fixed=np.union1d(body.fixed, held))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from klack.contact.step_constants import shared_constants
 from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.exchange.model_folder import model_folder, named_apart
@@ -69,9 +70,10 @@ def write_matlab(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]
                 names.append(f"{model.name}_{script}.m")
                 source = (_SCRIPTS / f"{script}.m").read_text(encoding="ascii")
                 text = source.replace("@NAME@_" + script.upper(), names[-1][:-2].upper())
-                (stage / names[-1]).write_text(
-                    text.replace("@NAME@", model.name), encoding="ascii", newline="\n"
-                )
+                text = text.replace("@NAME@", model.name)
+                for constant in shared_constants("MATLAB"):
+                    text = text.replace(f"@{constant.name}@", str(constant.value))
+                (stage / names[-1]).write_text(text, encoding="ascii", newline="\n")
     return tuple(folder / name for name in names)
 
 

@@ -8,6 +8,7 @@ compression ``e`` as a state, see :func:`contact_text`.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from klack.contact.step_constants import MODELICA_POWER_TURNS, MODELICA_TABLE_TURNS
 from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.exchange.modelica_words import array, number, table
 from klack.exchange.state_space import ContactKind, contact_kind, law_table
@@ -177,12 +178,16 @@ def _law_function(name: str, kind: ContactKind, rows: int, soft: bool) -> Iterab
     elif kind == "power":
         yield _POWER.strip("\n").replace("SEARCH", "    Real f;\n" if soft else "")
         if soft:
-            yield _SOFT_POWER.strip("\n")
+            yield _SOFT_POWER.strip("\n").replace("TURNS", str(MODELICA_POWER_TURNS))
         yield "    force := law[1]*d^law[2];"
     else:
         search = "    Real low;\n    Real high;\n    Real excess;\n" if soft else ""
         yield _TABLE.strip("\n").replace("ROWS", str(rows)).replace("SEARCH", search)
-        yield _SOFT_TABLE.strip("\n") if soft else "    s := rest;"
+        yield (
+            _SOFT_TABLE.strip("\n").replace("TURNS", str(MODELICA_TABLE_TURNS))
+            if soft
+            else "    s := rest;"
+        )
         yield "    force := law[row, 2] + s*(law[row, 3] + s*(law[row, 4] + s*law[row, 5]));"
     yield f"  end {name};"
 
@@ -195,7 +200,7 @@ SEARCH  algorithm
 """
 
 _SOFT_POWER = """
-    for step in 1:40 loop
+    for step in 1:TURNS loop
       f := law[1]*d^(law[2] - 1);
       d := max(d - (d + series*f*d - max(closing, 0.0))/(1 + series*law[2]*f), 0.0);
     end for;
@@ -218,7 +223,7 @@ _SOFT_TABLE = """
     low := 0.0;
     high := rest;
     s := rest/(1 + series*law[row, 3]);
-    for step in 1:20 loop
+    for step in 1:TURNS loop
       excess := s + series*s*(law[row, 3] + s*(law[row, 4] + s*law[row, 5])) - rest;
       low := if excess < 0 then s else low;
       high := if excess < 0 then high else s;

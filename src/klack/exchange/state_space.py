@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.contact.step_constants import RELAXATION
 from klack.errors import InputError, MissingExtraError
 from klack.exchange.modal_model import ModalModel, ModelContact
 
@@ -209,7 +210,7 @@ def relaxation_time(model: ModalModel) -> float:
     With the usual 20 ns it moves the peak force by less than 1e-6 and the speed of the rebound by
     2e-5 (two rods with a strong film); a shorter one is more exact and stiffer.
     """
-    return 0.2 * model.step
+    return RELAXATION * model.step
 
 
 def contact_kind(contact: ModelContact) -> ContactKind:

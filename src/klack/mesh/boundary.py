@@ -74,10 +74,6 @@ class FaceTable:
         found[found] = table[rows[found]] == keys[found]
         return np.where(found, rows, -1)
 
-    def rows_of(self, block: int, element: int) -> NDArray[np.int64]:
-        """Rows of all faces of one element, in the order of its sides."""
-        return self._place[block][element]
-
     @cached_property
     def _place(self) -> tuple[NDArray[np.int64], ...]:
         """Row of every face, by block: shape (n_elements, n_sides)."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.mesh.curve import SAME, Curve, Point, crossings, on_axis
 
-__all__ = ["Arc", "Curve", "Line", "Profile"]
+__all__ = ["Arc", "Line", "Profile"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,16 +101,6 @@ class Profile:
     def volume(self) -> float:
         """Volume of the body of revolution [m^3] (Pappus)."""
         return 2 * np.pi * self._integral(1, 0)
-
-    @cached_property
-    def centroid_height(self) -> float:
-        """Height z of the centre of volume [m]."""
-        return 2 * np.pi * self._integral(1, 1) / self.volume
-
-    @cached_property
-    def axial_moment(self) -> float:
-        """Volume moment about the axis, integral of r^2 dV [m^5]."""
-        return 2 * np.pi * self._integral(3, 0)
 
     def surface_area(self, name: str) -> float:
         """Area of the surface swept by the edges called ``name`` [m^2]."""

@@ -210,7 +210,7 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
     shape = tuple(int(n) for n in _integers(budget, next(parts, None), order))
     if not 2 <= len(shape) <= 8 or any(n < 0 for n in shape):
         raise _damaged(budget.path, f"a variable of shape {shape[:8]}")
-    name = _text(budget, next(parts, None), order)
+    name = _text(budget, next(parts, None))
     if kind == _CELL:
         return name, _cells(budget, parts, order, shape, depth)
     if kind in (_STRUCTURE, _OBJECT):
@@ -289,7 +289,7 @@ def _sparse(
     return matrix
 
 
-def _text(budget: _Budget, element: _Element | None, order: str) -> str:
+def _text(budget: _Budget, element: _Element | None) -> str:
     if element is None:
         raise _damaged(budget.path, "a variable without name")
     return bytes(element.data).rstrip(b"\0").decode("latin-1")

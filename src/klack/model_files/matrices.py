@@ -16,7 +16,7 @@ from klack.model_files.nastran_pch import read_nastran_pch
 from klack.model_files.numpy_matrices import read_numpy_matrix
 from klack.model_files.system_matrix import Role, SystemMatrix
 
-__all__ = ["MATRIX_FORMATS", "is_matrix_file", "read_matrix"]
+__all__ = ["MATRIX_FORMATS", "read_matrix"]
 
 Reader = Callable[[Path, str | None, Role | None], SystemMatrix]
 
@@ -45,11 +45,6 @@ MATRIX_FORMATS: Mapping[str, tuple[str, Reader]] = {
     ".npz": ("NumPy", read_numpy_matrix),
 }
 """Ending of the file name: program, and its reader."""
-
-
-def is_matrix_file(path: Path) -> bool:
-    """True for the ending of a matrix file that klack reads."""
-    return path.suffix.lower() in MATRIX_FORMATS
 
 
 def read_matrix(

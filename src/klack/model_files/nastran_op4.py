@@ -40,7 +40,7 @@ def read_nastran_op4(path: Path, name: str | None, role: Role | None) -> SystemM
         raise InputError(str(path), got="a matrix twice", expected="distinct names", hint=hint)
     chosen = choose_matrix(str(path), known, name, role)
     strings = found[known.index(chosen)]
-    row, column, value = strings.entries(f"{path}: {chosen}")
+    row, column, value = strings.entries()
     size = strings.header.columns
     del data, found, strings  # the entries are copies
     matrix, notes = symmetric_matrix(f"{path}: {chosen}", row, column, value, size)

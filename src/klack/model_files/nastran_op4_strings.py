@@ -125,9 +125,7 @@ class Op4Strings:
         self.first.append(first)
         self.count.append(count)
 
-    def entries(
-        self, where: str
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def entries(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Row, column (from zero) and value of all non-zeros."""
         for record in self.columns:
             self._cut_into_strings(*record)

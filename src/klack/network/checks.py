@@ -190,7 +190,7 @@ def check_rows(rows: Rows) -> None:
     Warns
     -----
     LooseBodyWarning
-        For a body that nothing holds.
+        For an unsupported body.
     """
     if not rows.bodies:
         raise InputError(

@@ -82,7 +82,7 @@ def build_structure(
     if not body.is_fixed:
         raise InputError(
             f"structure of body '{body.name}'",
-            got="a body that nothing holds",
+            got="an unsupported body",
             expected="a held body",
             hint="name a support in bodies." + body.name + ".fixed.",
         )

@@ -18,7 +18,9 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.impact_arrays import Contacts, Losses, StepMatrices, Watched
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.simulation.system import ReducedSystem
 
@@ -57,32 +59,16 @@ class BodyBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FlatSystem:
-    """Modes in the coordinates of the kernel, and arguments of its ``run_steps``, see there."""
+    """Modes in the coordinates of the kernel, and what its ``run_steps`` works on."""
 
     blocks: tuple[BodyBlock, ...]
     omega: NDArray[np.float64]
     damping: NDArray[np.float64]
     v: NDArray[np.float64]
-    A: NDArray[np.float64]
-    B: NDArray[np.float64]
-    P: NDArray[np.float64]
-    rows: NDArray[np.float64]
-    gap_offset: NDArray[np.float64]
-    G: NDArray[np.float64]
-    push_index: NDArray[np.int64]
-    push: NDArray[np.float64]
-    law_kind: NDArray[np.int64]
-    law_data: NDArray[np.float64]
-    law_start: NDArray[np.int64]
-    alpha: NDArray[np.float64]
-    series: NDArray[np.float64]
-    damped: bool
-    damped_weight: NDArray[np.float64]
-    damped_loss: NDArray[np.float64]
-    watch_q: NDArray[np.float64]
-    watch_q_force: NDArray[np.float64]
-    watch_v: NDArray[np.float64]
-    watch_v_force: NDArray[np.float64]
+    modes: StepMatrices
+    contacts: Contacts
+    losses: Losses
+    watched: Watched
 
 
 def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float) -> FlatSystem:
@@ -131,26 +117,28 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
         omega=w,
         damping=z,
         v=np.concatenate(speeds),
-        A=A,
-        B=B,
-        P=P,
-        rows=rows,
-        gap_offset=np.array([contact.gap for contact in system.contacts]),
-        G=(rows * B[0]) @ rows.T,
-        push_index=push_index,
-        push=B[:, push_index] * force[push_index],
-        law_kind=np.array([law.kind for law in laws]),
-        law_data=np.concatenate([law.parameters for law in laws]),
-        law_start=np.concatenate(([0], np.cumsum(sizes)[:-1])).astype(np.int64),
-        alpha=np.array([law.dissipation for law in laws]),
-        series=np.array([contact.series_compliance for contact in system.contacts]),
-        damped=bool(np.any(damped_modes)),
-        damped_weight=np.array([0.5 * w**2, np.full(w.size, 0.5)]) * damped_modes,
-        damped_loss=np.array([loss.Q11, loss.Q12, loss.Q22, loss.L1, loss.L2, loss.S]),
-        watch_q=watch_q,
-        watch_q_force=(watch_q * B[0]) @ rows.T,
-        watch_v=watch_v,
-        watch_v_force=(watch_v * B[1]) @ rows.T,
+        modes=StepMatrices(A, B, P, push_index, B[:, push_index] * force[push_index]),
+        contacts=Contacts(
+            rows=rows,
+            gap=np.array([contact.gap for contact in system.contacts]),
+            G=(rows * B[0]) @ rows.T,
+            law_kind=np.array([law.kind for law in laws]),
+            law_data=np.concatenate([law.parameters for law in laws]),
+            law_start=np.concatenate(([0], np.cumsum(sizes)[:-1])).astype(np.int64),
+            alpha=np.array([law.dissipation for law in laws]),
+            series=np.array([contact.series_compliance for contact in system.contacts]),
+        ),
+        losses=Losses(
+            damped=bool(np.any(damped_modes)),
+            weight=np.array([0.5 * w**2, np.full(w.size, 0.5)]) * damped_modes,
+            forms=np.array([loss.Q11, loss.Q12, loss.Q22, loss.L1, loss.L2, loss.S]),
+        ),
+        watched=Watched(
+            q=watch_q,
+            q_force=(watch_q * B[0]) @ rows.T,
+            v=watch_v,
+            v_force=(watch_v * B[1]) @ rows.T,
+        ),
     )
 
 
@@ -196,16 +184,16 @@ def propose_step(system: ReducedSystem, *, speed: float) -> float:
     return float(max(m for m in (1.0, 2.0, 5.0) if m * decade <= limit * (1 + 1e-12)) * decade)
 
 
-def _stiffest(law: object, speed: float, yielding: float) -> float:
+def _stiffest(law: InterfaceLaw, speed: float, yielding: float) -> float:
     """Tangent stiffness at the depth that would store all energy of approach."""
     energy = 0.5 * speed**2 / yielding if yielding else 0.5e-3 * speed**2
     depth = 1e-9
-    while law.potential(depth) > energy > 0.0:  # type: ignore[attr-defined]
+    while law.potential(depth) > energy > 0.0:
         depth /= 1.25
-    while law.potential(depth) < energy:  # type: ignore[attr-defined]
+    while law.potential(depth) < energy:
         depth *= 1.25
     depths = depth * np.linspace(1e-3, 1.0, 50)
-    return float(np.max(law.tangent_stiffness(depths)))  # type: ignore[attr-defined]
+    return float(np.max(law.tangent_stiffness(depths)))
 
 
 def _block(

@@ -17,17 +17,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.contact.laws import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
+from klack.contact.step_constants import (
+    FORCE_LEFT,
+    HERTZ_EQUAL,
+    HERTZ_SERIES_BELOW,
+    LAW_HERTZ,
+    LAW_LINEAR,
+    LAW_TABLE,
+    NEWTON_LIMIT,
+    STEP_LEFT,
+    TOUCH,
+)
+from klack.simulation.phase import compiled
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 
 Vector = NDArray[np.float64]
-
-_LINEAR, _HERTZ, _TABLE = LAW_LINEAR, LAW_HERTZ, LAW_TABLE
-_FORCE_LEFT = 1e-11  # accepted error of a force over the force
-_STEP_LEFT = 3e-7  # last Newton step over the indentation; what is left of the force is its square
-_NEWTON_LIMIT = 60
-_TOUCH = 1e-150  # [m] that a contact is closed by at least; the squares of less are no numbers
 
 
 @njit(cache=True, inline="always")
@@ -50,14 +55,14 @@ def _interval(p: Vector, start: int, d: float, hint: int) -> int:
     return i
 
 
-@njit(cache=True)
+@compiled()
 def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
     """Stored energy [J] of the elastic law at indentation ``d``."""
     if d <= 0.0:
         return 0.0
-    if kind == _LINEAR:
+    if kind == LAW_LINEAR:
         return 0.5 * p[start] * d * d
-    if kind == _HERTZ:
+    if kind == LAW_HERTZ:
         return p[start] / (p[start + 1] + 1.0) * _power(d, p[start + 1]) * d
     i = _interval(p, start, d, 0)
     s = d - p[i]
@@ -69,7 +74,7 @@ def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
     """Mean of ``K d^n`` over ``low < d < high``, both positive and close together or not."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     r = half / middle
-    if r < 5e-3:
+    if r < HERTZ_SERIES_BELOW:
         c = n * (n - 1.0) / 6.0
         r2 = r * r
         tail = 1.0 + (n - 2.0) * (n - 3.0) / 20.0 * r2
@@ -118,34 +123,34 @@ def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple
     return mean, (f1 - mean) / (d1 - d0), number
 
 
-@njit(cache=True)
+@compiled()
 def mean_force(
     kind: int, p: Vector, start: int, d0: float, d1: float, hint: int
 ) -> tuple[float, float, int]:
     """Mean force between two indentations, its slope over ``d1``, and the table interval."""
-    if d0 <= _TOUCH and d1 <= _TOUCH:
+    if d0 <= TOUCH and d1 <= TOUCH:
         return 0.0, 0.0, hint
-    if kind == _LINEAR:
+    if kind == LAW_LINEAR:
         k = p[start]
         if d0 >= 0.0 and d1 >= 0.0:
             return 0.5 * k * (d0 + d1), 0.5 * k, hint
         mean = 0.5 * k * max(d0, d1) ** 2 / abs(d1 - d0)
         return mean, (k * max(d1, 0.0) - mean) / (d1 - d0), hint
-    if kind == _HERTZ:
+    if kind == LAW_HERTZ:
         K, n = p[start], p[start + 1]
         low, high = min(d0, d1), max(d0, d1)
         mean = _hertz_mean(K, n, max(low, 0.0), high)
-        if high - low < 1e-8 * high:
+        if high - low < HERTZ_EQUAL * high:
             return mean, 0.5 * n * mean / high, hint
         mean *= (high - max(low, 0.0)) / (high - low)
         return mean, (K * _power(max(d1, 0.0), n) - mean) / (d1 - d0), hint
     return _table_mean(p, start, d0, d1, hint)
 
 
-@njit(cache=True)
+@compiled()
 def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     """Closed form of the elastic step for ``F = k d``: both closed, release, onset."""
-    if d0 <= _TOUCH and df <= _TOUCH:
+    if d0 <= TOUCH and df <= TOUCH:
         return 0.0
     a = 1.0 + 0.5 * G * k
     if d0 >= 0.0:
@@ -161,7 +166,7 @@ def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     return 0.5 * k * d1 * d1 / (d1 - d0)
 
 
-@njit(cache=True)
+@compiled()
 def solve_step(
     kind: int,
     p: Vector,
@@ -181,21 +186,21 @@ def solve_step(
 
     Returns the force, the table interval, and the part of the work ``F (d1 - d0)`` that is lost.
     """
-    if d0 <= _TOUCH and df <= _TOUCH:
+    if d0 <= TOUCH and df <= TOUCH:
         return 0.0, hint, 0.0
-    if kind == _LINEAR and chi_over_h == 0.0:
+    if kind == LAW_LINEAR and chi_over_h == 0.0:
         return solve_linear(p[start], G, d0, df), hint, 0.0
     low, high = -np.inf, df
     d1 = df - G * guess
     force = 0.0
-    for _ in range(_NEWTON_LIMIT):
+    for _ in range(NEWTON_LIMIT):
         i = start + 1 + 6 * hint
-        if kind == _TABLE and chi_over_h == 0.0 and _within(p, start, i, d0, d1):
+        if kind == LAW_TABLE and chi_over_h == 0.0 and _within(p, start, i, d0, d1):
             force, slope = _cubic_mean(p, i, d0 - p[i], d1 - p[i])  # the usual case, no call
             curvature = abs(p[i + 3]) + abs(p[i + 4]) * (d0 + 3.0 * d1 - 4.0 * p[i])
             excess = d1 - df + G * force
             step = excess / (1.0 + G * slope)
-            last = curvature * step * step <= _FORCE_LEFT * force
+            last = curvature * step * step <= FORCE_LEFT * force
             last = last and _within(p, start, i, d0, d1 - step)  # another cubic beyond
         else:
             force, slope, hint = _step_force(kind, p, start, chi_over_h, d0, d1, hint)
@@ -204,7 +209,7 @@ def solve_step(
             deep = max(d0, d1)
             if chi_over_h * deep > 1.0:
                 deep = 1.0 / chi_over_h
-            last = abs(step) <= _STEP_LEFT * deep
+            last = abs(step) <= STEP_LEFT * deep
         # taken without a look back, and before the bracket test: both its ends are round-off then
         if last:
             force = max(force - slope * step, 0.0)

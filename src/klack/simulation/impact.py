@@ -13,6 +13,7 @@ from klack.errors import ConvergenceError, InputError, require_positive
 from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
 from klack.simulation.contact_step import law_potential
+from klack.simulation.impact_arrays import Record
 from klack.simulation.kernel import STATUS_FINE, run_steps
 from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
@@ -141,42 +142,21 @@ def simulate(
             hint="a wall needs a needle that hits it.",
         )
     records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
-    contacts, bodies = len(system.contacts), len(system.bodies)
+    contacts = len(system.contacts)
     q, v = np.zeros(flat.v.size), flat.v.copy()
-    force, peak, gap = (np.zeros((records, contacts)) for _ in range(3))
-    out_q, out_v = np.zeros((records + 1, 2 * contacts)), np.zeros((records + 1, bodies))
-    out_v[0] = flat.watch_v @ v
+    record = Record.empty(records, contacts, flat.watched)
+    record.v[0] = flat.watched.v @ v
     books = np.zeros(3 + 2 * contacts)
     run = run_one_contact if contacts == 1 else run_steps
     status = run(
         int(steps_per_record),
         q,
         v,
-        flat.A,
-        flat.B,
-        flat.P,
-        flat.rows,
-        flat.gap_offset,
-        flat.G,
-        flat.push_index,
-        flat.push,
-        flat.law_kind,
-        flat.law_data,
-        flat.law_start,
-        flat.alpha,
-        flat.series,
-        flat.damped,
-        flat.damped_weight,
-        flat.damped_loss,
-        flat.watch_q,
-        flat.watch_q_force,
-        flat.watch_v,
-        flat.watch_v_force,
-        force,
-        peak,
-        gap,
-        out_q,
-        out_v,
+        flat.modes,
+        flat.contacts,
+        flat.losses,
+        flat.watched,
+        record,
         books,
     )
     if status != STATUS_FINE:
@@ -191,9 +171,9 @@ def simulate(
         "simulate",
         step * steps_per_record,
         {
-            **{f"velocity of {body.name}": out_v[:, i] for i, body in enumerate(system.bodies)},
-            **{f"contact force of {name}": force[:, c] for c, name in enumerate(pairs)},
-            **{f"gap of {name}": gap[:, c] for c, name in enumerate(pairs)},
+            **{f"velocity of {body.name}": record.v[:, i] for i, body in enumerate(system.bodies)},
+            **{f"contact force of {name}": record.force[:, c] for c, name in enumerate(pairs)},
+            **{f"gap of {name}": record.gap[:, c] for c, name in enumerate(pairs)},
         },
     )
     positions, speeds = [], []
@@ -213,12 +193,12 @@ def simulate(
         system=system,
         integration_step=float(step),
         step=float(step) * steps_per_record,
-        force=force,
-        peak_force=peak,
-        gap=gap,
-        displacement=out_q.reshape(records + 1, contacts, 2),
-        velocity=out_v,
-        external_force=_external_forces(system, flat, records, step * steps_per_record, out_v),
+        force=record.force,
+        peak_force=record.peak,
+        gap=record.gap,
+        displacement=record.q.reshape(records + 1, contacts, 2),
+        velocity=record.v,
+        external_force=_external_forces(system, flat, records, step * steps_per_record, record.v),
         final_position=tuple(positions),
         final_velocity=tuple(speeds),
         ledger=ledger,
@@ -292,11 +272,11 @@ def _ledger(
         for phi, stiffness, preload in block.springs:
             y0, y = float(phi @ q0), float(phi @ q)
             spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
-    contact = 0.0
-    for c in range(flat.rows.shape[0]):
+    contact, at = 0.0, flat.contacts
+    for c in range(len(at.gap)):
         gap, e = books[3 + 2 * c], books[4 + 2 * c]
-        contact += law_potential(flat.law_kind[c], flat.law_data, flat.law_start[c], -gap - e)
-        contact += 0.5 * e**2 / flat.series[c] if e else 0.0
+        contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
+        contact += 0.5 * e**2 / at.series[c] if e else 0.0
     return EnergyLedger(
         initial=initial,
         bodies=tuple(bodies),

@@ -35,24 +35,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.contact.laws import LAW_LINEAR, LAW_TABLE
+from klack.contact.step_constants import (
+    FILM_NEWTON_LIMIT,
+    FORCE_LEFT,
+    LAW_LINEAR,
+    LEFT_BY_FILM,
+    LOG_SERIES_BELOW,
+    NO_LAW,
+    ROUND_OFF,
+    STEP_LEFT,
+)
 from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
 
 __all__ = ["NO_LAW", "film_force", "interface_store", "solve_interface"]
 
 Vector = NDArray[np.float64]
 Step = tuple[float, float, float, float, int, float, float]
-
-NO_LAW = -1
-"""``kind`` of an interface without a contact: only a film."""
-
-_LINEAR, _TABLE = LAW_LINEAR, LAW_TABLE
-_FORCE_LEFT = 1e-11  # accepted error of a force over the force
-_STEP_LEFT = 3e-7  # last Newton step over the indentation, where the curvature is not looked up
-_ROUND_OFF = 1e-15  # of the equation, over its gaps
-_LEFT_BY_FILM = 0.01  # share of the compression that a film must have made to end at first touch
-_NEWTON_LIMIT = 100
-_SERIES = 0.05  # below it the logarithm is a short series
 
 
 @njit(cache=True, error_model="numpy")
@@ -83,7 +81,7 @@ def _film_mean(
     damping = 0.5 * cubic * total * inverses * inverses
     if linear != 0.0:
         r = closed / total
-        if abs(r) > _SERIES:
+        if abs(r) > LOG_SERIES_BELOW:
             return closed * damping + linear * log(x0 * inverse1)
         r2 = r * r
         log_mean = 2.0 + r2 * (2 / 3 + r2 * (2 / 5 + r2 * (2 / 7 + r2 * (2 / 9 + r2 * 2 / 11))))
@@ -180,7 +178,7 @@ def solve_interface(
             relaxed = 0.5 * e0 * e0 / series if e0 != 0.0 else 0.0
             return 0.0, 0.0, g_free, 0.0, hint, relaxed, 0.0
         return _bare(kind, law_data, law_start, chi_over_h, G, series, z0, g_free, e0, guess, hint)
-    left = abs(film_before) * series > _LEFT_BY_FILM * abs(e0)
+    left = abs(film_before) * series > LEFT_BY_FILM * abs(e0)
     theta = 0.5
     if series > 0.0 and z0 > 0.0:
         theta = _relaxing(cubic, linear, cut_off, h, series, z0, g_free - e0)
@@ -296,7 +294,7 @@ def _contact_alone(
 ) -> tuple[float, int]:
     if z0 >= 0.0 and base >= 0.0:
         return 0.0, hint
-    if kind == _LINEAR and chi_over_h == 0.0:
+    if kind == LAW_LINEAR and chi_over_h == 0.0:
         return solve_linear(p[start], S, -z0, -base), hint
     force, hint, _ = solve_step(kind, p, start, chi_over_h, S, -z0, -base, guess, hint)
     return force, hint
@@ -323,7 +321,7 @@ def _film_alone(
     inverse0 = 1.0 / x0
     z = max(base + S * guess, 0.0)
     film = 0.0
-    for _ in range(_NEWTON_LIMIT):
+    for _ in range(FILM_NEWTON_LIMIT):
         x = z + cut_off
         inverse = 1.0 / x
         film = rate * _film_mean(cubic, linear, x0, x, inverse0, inverse, z0 - z)
@@ -337,8 +335,8 @@ def _film_alone(
             slope = (damper + linear) * inverse * rate
             curvature = (3.0 * damper + linear) * inverse * inverse * rate
         step = excess / (1.0 + S * slope)
-        if abs(excess) <= _ROUND_OFF * (z + abs(base)) or (
-            curvature * step * step <= _FORCE_LEFT * abs(film)
+        if abs(excess) <= ROUND_OFF * (z + abs(base)) or (
+            curvature * step * step <= FORCE_LEFT * abs(film)
             and step < z
             and not (pulled and step > 0.0)
         ):
@@ -384,7 +382,7 @@ def _both(
     z = base + S * guess
     low, high = -np.inf, np.inf
     contact, film = 0.0, 0.0
-    for _ in range(_NEWTON_LIMIT):
+    for _ in range(FILM_NEWTON_LIMIT):
         contact, stiffness, curvature, longest = 0.0, 0.0, 0.0, np.inf
         if (z0 < 0.0 or z < 0.0) and kind != NO_LAW:
             contact, stiffness, longest, hint = _contact(kind, p, start, chi_over_h, z0, z, hint)
@@ -405,10 +403,10 @@ def _both(
         after = z - step
         kinked = z == 0.0 or (z > 0.0) != (after > 0.0) or (pulled and step > 0.0)
         # taken without a look back, and before the bracket test: both its ends are round-off then
-        if abs(excess) <= _ROUND_OFF * (abs(z) + abs(base)) or (
+        if abs(excess) <= ROUND_OFF * (abs(z) + abs(base)) or (
             not kinked
             and abs(step) <= longest
-            and curvature * step * step <= _FORCE_LEFT * (contact + abs(film))
+            and curvature * step * step <= FORCE_LEFT * (contact + abs(film))
         ):
             contact = max(contact + stiffness * step, 0.0)
             if pulled or film + film_slope * step >= -suction:
@@ -439,8 +437,8 @@ def _contact(
     deep = -min(z0, z)
     if chi_over_h * deep > 1.0:
         deep = 1.0 / chi_over_h
-    longest = _STEP_LEFT * deep
-    if kind == _LINEAR and z0 <= 0.0 and z <= 0.0:
+    longest = STEP_LEFT * deep
+    if kind == LAW_LINEAR and z0 <= 0.0 and z <= 0.0:
         mean, slope = -0.5 * p[start] * (z0 + z), 0.5 * p[start]
         if chi_over_h == 0.0:
             longest = np.inf

@@ -5,17 +5,22 @@ the modes (free motion, with the contact force of the step before folded in) and
 for each contact that is closed or closes.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
+from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
+from klack.simulation.phase import phase
 
 __all__ = [
     "FAST",
-    "SEPARATED",
     "STATUS_CONTACTS",
     "STATUS_FINE",
+    "add_release",
     "push_on",
     "run_steps",
 ]
@@ -24,11 +29,6 @@ Vector = NDArray[np.float64]  # one axis
 Matrix = NDArray[np.float64]  # two axes
 
 STATUS_FINE, STATUS_CONTACTS = 0, 1
-_SWEEP_LIMIT = 500
-_SWEEP_ACCEPTED = 1e-11  # change of a gap over the largest change that a contact force makes
-SEPARATED = 0.1
-"""Gap over the deepest indentation so far at which a contact forgets its approach speed."""
-
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
@@ -72,15 +72,27 @@ def _watch(rows: Matrix, k: int, state: Vector) -> float:
     return y
 
 
-@njit(cache=True)
-def push_on(
-    index: NDArray[np.int64], push: Matrix, A: Matrix, pushed_q: Vector, pushed_v: Vector
-) -> None:
+@phase
+def push_on(modes: StepMatrices, pushed_q: Vector, pushed_v: Vector) -> None:
     """One step of the motion that constant forces alone give to rigid modes."""
-    for k in range(index.size):
-        i, pq, pv = index[k], pushed_q[k], pushed_v[k]
-        pushed_q[k] = A[0, i] * pq + A[1, i] * pv + push[0, k]
-        pushed_v[k] = A[2, i] * pq + A[3, i] * pv + push[1, k]
+    A = modes.A
+    for k in range(modes.push_index.size):
+        i, pq, pv = modes.push_index[k], pushed_q[k], pushed_v[k]
+        pushed_q[k] = A[0, i] * pq + A[1, i] * pv + modes.push[0, k]
+        pushed_v[k] = A[2, i] * pq + A[3, i] * pv + modes.push[1, k]
+
+
+@phase
+def add_release(loss: float, contacts: Contacts, c: int, compression: float, gap: float) -> float:
+    """Add what a series spring loses when its contact opens.
+
+    A clipped law is still pressed in: the displacement of the spring is now its own.
+    """
+    kind, data, start = contacts.law_kind[c], contacts.law_data, contacts.law_start[c]
+    loss += 0.5 * compression * compression / contacts.series[c]
+    loss += law_potential(kind, data, start, compression - gap)
+    loss -= law_potential(kind, data, start, -gap)
+    return loss
 
 
 @njit(cache=True)
@@ -139,39 +151,173 @@ def _damping_loss(q: Vector, v: Vector, B: Matrix, f_before: Vector, f: Vector, 
     return total
 
 
+class _Now(NamedTuple):
+    """Where the contacts and modes are in the run."""
+
+    F: Vector  # (c,) [N] of the last step
+    F_before: Vector  # of the step before
+    gap: Vector  # (c,) [m]
+    free: Vector  # (c,) [m] at the end of the step, without its contact forces
+    e: Vector  # (c,) [m] compression of the series spring
+    chi: Vector  # (c,) [1/m] dissipation of the law over the speed of approach
+    approaching: NDArray[np.bool_]
+    deepest: Vector  # (c,) [m] since a damped contact was touched
+    hint: NDArray[np.int64]  # (c,) interval of a table
+    sum_force: Vector  # (c,) over a record
+    sum_gap: Vector
+    peak: Vector
+    f: Vector  # (m,) modal contact force of the last step
+    f_before: Vector
+    q0: Vector  # (m,) at the start of the step
+    v0: Vector
+    pending: Matrix  # (2, m) what the last contact force still does to q, v
+    pushed_q: Vector  # (p,) motion under constant forces since the record began
+    pushed_v: Vector
+
+
+@njit(cache=True)
+def _begin(modes: StepMatrices, contacts: Contacts) -> _Now:
+    m, c, p = modes.A.shape[1], contacts.gap.size, modes.push_index.size
+    return _Now(
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(c),
+        np.ones(c, np.bool_),
+        np.zeros(c),
+        np.zeros(c, np.int64),
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(c),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros((2, m)),
+        np.zeros(p),
+        np.zeros(p),
+    )
+
+
+@phase
+def _pend(modes: StepMatrices, now: _Now) -> None:
+    """Effect of the contact forces of the last step on this one."""
+    for i in range(now.f.size):
+        now.pending[0, i] = modes.P[0, i] * now.f[i]
+        now.pending[1, i] = modes.P[1, i] * now.f[i]
+
+
+@phase
+def _near(modes: StepMatrices, contacts: Contacts, now: _Now) -> bool:
+    """Complete the free gaps; whether any contact is closed or would close."""
+    near = False
+    for c in range(contacts.gap.size):
+        now.free[c] = contacts.gap[c] + now.free[c]
+        for k in range(modes.push_index.size):
+            now.free[c] += contacts.rows[c, modes.push_index[k]] * now.pushed_q[k]
+        near = near or now.free[c] < now.e[c] or now.gap[c] + now.e[c] < 0.0
+    return near
+
+
+@phase
+def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
+    """Contact forces of the step: whether they settled, whether any acts, and their loss [J]."""
+    F, free, G = now.F, now.free, contacts.G
+    count = contacts.gap.size
+    for c in range(count):
+        if contacts.alpha[c] > 0.0 and now.approaching[c] and free[c] < 0.0:
+            # mean rate of the gap over the step of onset: no force has acted yet
+            now.chi[c] = contacts.alpha[c] / max(now.gap[c] - free[c], LEAST_WAY)
+            now.approaching[c] = False
+    closed = False
+    for sweep in range(SWEEPS):
+        change, largest, lost = 0.0, 0.0, 0.0
+        for c in range(count):
+            df = now.e[c] - free[c]
+            for other in range(count):
+                if other != c:
+                    df -= G[c, other] * F[other]
+            own = G[c, c] + 2.0 * contacts.series[c]
+            force, now.hint[c], loss = solve_step(
+                contacts.law_kind[c],
+                contacts.law_data,
+                contacts.law_start[c],
+                now.chi[c],
+                own,
+                -now.gap[c] - now.e[c],
+                df,
+                F[c] if sweep > 0 else 2.0 * F[c] - now.F_before[c],
+                now.hint[c],
+            )
+            if sweep == 0:
+                now.F_before[c] = F[c]
+            change = max(change, abs(force - F[c]) * own)
+            largest = max(largest, force * own)
+            lost += loss
+            F[c] = force
+            closed = closed or force > 0.0
+        if count == 1 or change <= SETTLED * largest:
+            return True, closed, lost
+    return False, closed, 0.0
+
+
+@phase
+def _end_step(contacts: Contacts, now: _Now, closed: bool, release_loss: float) -> float:
+    """Gaps, series springs and dissipation after the step; returns the losses at release [J]."""
+    for c in range(contacts.gap.size):
+        after = now.free[c]
+        if closed:
+            for other in range(contacts.gap.size):
+                after += contacts.G[c, other] * now.F[other]
+            now.sum_force[c] += now.F[c]
+            now.peak[c] = max(now.peak[c], now.F[c])
+        now.sum_gap[c] += 0.5 * (now.gap[c] + after)
+        now.gap[c] = after
+        if contacts.series[c] > 0.0:
+            if now.F[c] > 0.0:
+                now.e[c] = 2.0 * contacts.series[c] * now.F[c] - now.e[c]
+            elif now.e[c] != 0.0:
+                release_loss = add_release(release_loss, contacts, c, now.e[c], after)
+                now.e[c] = 0.0
+        if not now.approaching[c]:
+            now.deepest[c] = max(now.deepest[c], -after)
+            if after > SEPARATED * now.deepest[c]:
+                now.approaching[c] = True
+                now.chi[c] = now.deepest[c] = 0.0
+    return release_loss
+
+
+@phase
+def _end_record(
+    modes: StepMatrices, q: Vector, v: Vector, now: _Now, record: Record, at: int, steps: int
+) -> None:
+    """Means of a record; the motion under constant forces joins that of the modes."""
+    for c in range(now.gap.size):
+        record.force[at, c] = now.sum_force[c] / steps
+        record.peak[at, c] = now.peak[c]
+        record.gap[at, c] = now.sum_gap[c] / steps
+        now.sum_gap[c] = now.sum_force[c] = now.peak[c] = 0.0
+    for k in range(modes.push_index.size):
+        q[modes.push_index[k]] += now.pushed_q[k]
+        v[modes.push_index[k]] += now.pushed_v[k]
+        now.pushed_q[k] = now.pushed_v[k] = 0.0
+
+
 @njit(cache=True)
 def run_steps(
     steps_per_record: int,
     q: Vector,
     v: Vector,
-    A: Matrix,
-    B: Matrix,
-    P: Matrix,
-    rows: Matrix,
-    gap_offset: Vector,
-    G: Matrix,
-    push_index: NDArray[np.int64],
-    push: Matrix,
-    law_kind: NDArray[np.int64],
-    law_data: Vector,
-    law_start: NDArray[np.int64],
-    alpha: Vector,
-    series: Vector,
-    damped: bool,
-    damped_weight: Matrix,
-    damped_loss: Matrix,
-    watch_q: Matrix,
-    watch_q_force: Matrix,
-    watch_v: Matrix,
-    watch_v_force: Matrix,
-    out_force: Matrix,
-    out_peak: Matrix,
-    out_gap: Matrix,
-    out_q: Matrix,
-    out_v: Matrix,
+    modes: StepMatrices,
+    contacts: Contacts,
+    losses: Losses,
+    watched: Watched,
+    record: Record,
     books: Vector,
 ) -> int:
-    """Integrate ``out_force.shape[0]`` records of ``steps_per_record`` steps, in place.
+    """Integrate the records of ``record`` with ``steps_per_record`` steps each.
 
     Parameters
     ----------
@@ -179,29 +325,8 @@ def run_steps(
     q, v : array (m,)
         Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
         position under the constant forces.
-    A, B, P : array (4, m), (2, m), (2, m)
-        Step matrices ``A11, A12, A21, A22`` and ``B1, B2``; ``P = A B``.
-    rows : array (c, m)
-        ``gap = gap_offset + rows . q``; the modal force of contact ``c`` is ``rows[c] F[c]``.
-    gap_offset : array (c,)
-    G : array (c, c)
-        ``rows B1 rows^T``: gap at the end of a step from unit forces during the step.
-    push_index, push : int array (p,), array (2, p)
-        Rigid modes with a constant force, and what it adds to their ``q, v`` in a step.  Within a
-        record their motion under it runs beside that of all modes (superposition), because
-        single numbers written into ``q`` stall the vector loads; at its end it is added.
-    law_kind, law_data, law_start, alpha, series : arrays
-        One law per contact as flat numbers; dissipation factor; compliance in series [m/N].
-    damped : bool
-    damped_weight, damped_loss : array (2, m), (6, m)
-        Energy weights of the damped modes (zero for the others) and their loss forms.
-    watch_q, watch_v : array (k, m), (l, m)
-        What is recorded at the ends of records; ``watch_*_force`` (k, c), (l, c): effect of unit
-        contact forces of the last step.
-    out_force, out_peak, out_gap : array (n, c)
-        Mean force, largest step force, mean gap of each record.
-    out_q, out_v : array (n + 1, k), (n + 1, l)
-        Row 0 is filled in by the caller.
+    modes, contacts, losses, watched, record
+        See :mod:`klack.simulation.impact_arrays`.
     books : array (3 + 2 c,)
         Out: contact dissipation, loss at release of a series spring, modal damping loss; then for
         each contact the last gap and the last compression of its series spring.
@@ -211,168 +336,69 @@ def run_steps(
     int
         ``STATUS_FINE`` or ``STATUS_CONTACTS`` (the forces of several contacts did not settle).
     """
-    contacts = rows.shape[0]
-    modes = q.size
-    F = np.zeros(contacts)
-    F_before = np.zeros(contacts)
-    f = np.zeros(modes)
-    f_before = np.zeros(modes)
-    q0 = np.zeros(modes)
-    v0 = np.zeros(modes)
-    pending_rows = np.zeros((2, modes))
-    hint = np.zeros(contacts, np.int64)
-    gap = np.zeros(contacts)
-    free = np.zeros(contacts)
-    e = np.zeros(contacts)
-    chi = np.zeros(contacts)
-    sum_gap = np.zeros(contacts)
-    sum_force = np.zeros(contacts)
-    peak = np.zeros(contacts)
-    approaching = np.ones(contacts, np.bool_)
-    deepest = np.zeros(contacts)  # since a damped contact was touched
-    row0 = rows[0]
-    pushes = push_index.size
-    pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
-    for c in range(contacts):
-        gap[c] = gap_offset[c] + _dot(rows[c], q)
-    pending = False
-    in_flight = True
-    flight_energy = _damped_energy(q, v, B, f, damped_weight) if damped else 0.0
+    A, B, rows, row0, weight = modes.A, modes.B, contacts.rows, contacts.rows[0], losses.weight
+    now = _begin(modes, contacts)
+    F, f, f_before, q0, v0 = now.F, now.f, now.f_before, now.q0, now.v0
+    for c in range(F.size):
+        now.gap[c] = contacts.gap[c] + _dot(rows[c], q)
+    pending, in_flight = False, True
+    flight_energy = _damped_energy(q, v, B, f, weight) if losses.damped else 0.0
     contact_loss, release_loss, damping = 0.0, 0.0, 0.0
 
-    for record in range(out_force.shape[0]):
-        for c in range(contacts):
-            sum_gap[c] = sum_force[c] = peak[c] = 0.0
+    for place in range(record.force.shape[0]):
         for _ in range(steps_per_record):
-            if damped:
+            if losses.damped:
                 _copy(q, v, q0, v0)
-            if not pending:
-                y = _free(q, v, A, row0)
+            if pending:
+                _pend(modes, now)
+                now.free[0] = _forced(q, v, A, row0, now.pending, 1.0)
             else:
-                for i in range(modes):
-                    pending_rows[0, i] = P[0, i] * f[i]
-                    pending_rows[1, i] = P[1, i] * f[i]
-                y = _forced(q, v, A, row0, pending_rows, 1.0)
-            push_on(push_index, push, A, pushed_q, pushed_v)
-            near = False
-            for c in range(contacts):
-                free[c] = gap_offset[c] + (y if c == 0 else _dot(rows[c], q))
-                for k in range(pushes):
-                    free[c] += rows[c, push_index[k]] * pushed_q[k]
-                near = near or free[c] < e[c] or gap[c] + e[c] < 0.0
-
+                now.free[0] = _free(q, v, A, row0)
+            push_on(modes, now.pushed_q, now.pushed_v)
+            for c in range(1, F.size):
+                now.free[c] = _dot(rows[c], q)
             closed = False
-            if near:
-                for c in range(contacts):
-                    if alpha[c] > 0.0 and approaching[c] and free[c] < 0.0:
-                        # mean rate of the gap over the step of onset: no force has acted yet
-                        chi[c] = alpha[c] / max(gap[c] - free[c], 1e-30)
-                        approaching[c] = False
-                for sweep in range(_SWEEP_LIMIT):
-                    change, largest, lost = 0.0, 0.0, 0.0
-                    for c in range(contacts):
-                        df = e[c] - free[c]
-                        for other in range(contacts):
-                            if other != c:
-                                df -= G[c, other] * F[other]
-                        own = G[c, c] + 2.0 * series[c]
-                        guess = F[c] if sweep > 0 else 2.0 * F[c] - F_before[c]
-                        force, hint[c], loss = solve_step(
-                            law_kind[c],
-                            law_data,
-                            law_start[c],
-                            chi[c],
-                            own,
-                            -gap[c] - e[c],
-                            df,
-                            guess,
-                            hint[c],
-                        )
-                        if sweep == 0:
-                            F_before[c] = F[c]
-                        change = max(change, abs(force - F[c]) * own)
-                        largest = max(largest, force * own)
-                        lost += loss
-                        F[c] = force
-                        closed = closed or force > 0.0
-                    if contacts == 1 or change <= _SWEEP_ACCEPTED * largest:
-                        break
-                    if sweep == _SWEEP_LIMIT - 1:
-                        return STATUS_CONTACTS
+            if _near(modes, contacts, now):
+                settled, closed, lost = _settle(contacts, now)
+                if not settled:
+                    return STATUS_CONTACTS
                 contact_loss += lost
             elif pending:
                 F[:] = 0.0
-                F_before[:] = 0.0
-
-            if damped:
+                now.F_before[:] = 0.0
+            if losses.damped:
                 # flight: energy at its two ends; contact: the exact loss of each step
                 if closed:
-                    for i in range(modes):
+                    for i in range(f.size):
                         f_before[i] = f[i]
                     if in_flight:
-                        damping += flight_energy - _damped_energy(
-                            q0, v0, B, f_before, damped_weight
-                        )
+                        damping += flight_energy - _damped_energy(q0, v0, B, f_before, weight)
                         in_flight = False
                     _modal_force(rows, F, f)
-                    damping += _damping_loss(q0, v0, B, f_before, f, damped_loss)
+                    damping += _damping_loss(q0, v0, B, f_before, f, losses.forms)
                 elif not in_flight:
                     # the step that has just gone was the first of the flight
-                    flight_energy = _damped_energy(q0, v0, B, f, damped_weight)
+                    flight_energy = _damped_energy(q0, v0, B, f, weight)
                     in_flight = True
                     f[:] = 0.0
             elif closed:
                 _modal_force(rows, F, f)
             pending = closed
-
-            for c in range(contacts):
-                after = free[c]
-                if closed:
-                    for other in range(contacts):
-                        after += G[c, other] * F[other]
-                    sum_force[c] += F[c]
-                    peak[c] = max(peak[c], F[c])
-                sum_gap[c] += 0.5 * (gap[c] + after)
-                gap[c] = after
-                if series[c] > 0.0:
-                    if F[c] > 0.0:
-                        e[c] = 2.0 * series[c] * F[c] - e[c]
-                    elif e[c] != 0.0:
-                        release_loss += 0.5 * e[c] * e[c] / series[c]
-                        # a clipped law is still pressed in: the way of the spring is now its own
-                        kind, start = law_kind[c], law_start[c]
-                        release_loss += law_potential(kind, law_data, start, e[c] - after)
-                        release_loss -= law_potential(kind, law_data, start, -after)
-                        e[c] = 0.0
-                if not approaching[c]:
-                    deepest[c] = max(deepest[c], -after)
-                    if after > SEPARATED * deepest[c]:
-                        approaching[c] = True
-                        chi[c] = deepest[c] = 0.0
-
-        for c in range(contacts):
-            out_force[record, c] = sum_force[c] / steps_per_record
-            out_peak[record, c] = peak[c]
-            out_gap[record, c] = sum_gap[c] / steps_per_record
-        for k in range(pushes):
-            q[push_index[k]] += pushed_q[k]
-            v[push_index[k]] += pushed_v[k]
-            pushed_q[k] = pushed_v[k] = 0.0
-        _watch_all(watch_q, watch_q_force, q, F, out_q, record + 1)
-        _watch_all(watch_v, watch_v_force, v, F, out_v, record + 1)
+            release_loss = _end_step(contacts, now, closed, release_loss)
+        _end_record(modes, q, v, now, record, place, steps_per_record)
+        _watch_all(watched.q, watched.q_force, q, F, record.q, place + 1)
+        _watch_all(watched.v, watched.v_force, v, F, record.v, place + 1)
 
     if pending:
         _modal_force(rows, F, f)
-        for i in range(modes):
+        for i in range(f.size):
             q[i] += B[0, i] * f[i]
             v[i] += B[1, i] * f[i]
-    if damped and in_flight:
+    if losses.damped and in_flight:
         f[:] = 0.0
-        damping += flight_energy - _damped_energy(q, v, B, f, damped_weight)
-    books[0] = contact_loss
-    books[1] = release_loss
-    books[2] = damping
-    for c in range(contacts):
-        books[3 + 2 * c] = gap[c]
-        books[4 + 2 * c] = e[c]
+        damping += flight_energy - _damped_energy(q, v, B, f, weight)
+    books[0], books[1], books[2] = contact_loss, release_loss, damping
+    for c in range(F.size):
+        books[3 + 2 * c] = now.gap[c]
+        books[4 + 2 * c] = now.e[c]
     return STATUS_FINE

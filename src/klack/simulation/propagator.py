@@ -15,12 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import TAYLOR_BELOW, TAYLOR_TERMS
 from klack.errors import InputError, require_positive
 
 __all__ = ["DampingLoss", "Propagator", "damping_loss", "modal_propagator"]
-
-_SERIES_BELOW = 0.05  # of max(1, zeta) omega h; the closed form of B1 has 1e-14 left there
-_SERIES_TERMS = 14  # (0.1)^14: below round-off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,7 +91,7 @@ def modal_propagator(
     for part, formula in (((w > 0.0) & ~over, _underdamped), ((w > 0.0) & over, _overdamped)):
         if np.any(part):
             A11[part], A12[part], A22[part], B1[part] = formula(w[part], z[part], h)
-    small = (w > 0.0) & (np.maximum(z, 1.0) * w * h < _SERIES_BELOW)
+    small = (w > 0.0) & (np.maximum(z, 1.0) * w * h < TAYLOR_BELOW)
     B1[small] = _series_B1(w[small] * h, z[small]) * h * h
     return Propagator(step=h, A11=A11, A12=A12, A21=-(w**2) * A12, A22=A22, B1=B1, B2=A12.copy())
 
@@ -176,7 +174,7 @@ def _series_B1(x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.flo
     """B1/h^2 as Taylor series of q'' = 1 - 2 z x q' - x^2 q at unit time."""
     before, now = np.zeros(x.size), np.full(x.size, 0.5)
     total = now.copy()
-    for n in range(1, _SERIES_TERMS):
+    for n in range(1, TAYLOR_TERMS):
         before, now = now, -(2.0 * z * x * (n + 1) * now + x**2 * before) / ((n + 1) * (n + 2))
         total += now
     return total

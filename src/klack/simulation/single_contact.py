@@ -6,13 +6,17 @@ to nine numbers per mode and is bound by that, so state and matrices are packed 
 which costs as much as the pass itself.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.contact.laws import LAW_LINEAR
-from klack.simulation.contact_step import law_potential, solve_linear, solve_step
-from klack.simulation.kernel import FAST, SEPARATED, STATUS_FINE, push_on
+from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
+from klack.simulation.contact_step import solve_linear, solve_step
+from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
+from klack.simulation.kernel import FAST, STATUS_FINE, add_release, push_on
+from klack.simulation.phase import compiled, phase
 
 __all__ = ["run_one_contact"]
 
@@ -25,7 +29,7 @@ _LANES = 8  # modes that a pass over them takes at once
 _DOT_LANES = 16  # the same for a sum of products
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _free(S: Vector, K: Vector, count: int) -> float:
     """Free motion of a chunk over a step; returns its part of the free gap."""
     y = 0.0
@@ -38,7 +42,7 @@ def _free(S: Vector, K: Vector, count: int) -> float:
     return y
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _forced(S: Vector, K: Vector, count: int, F: float) -> float:
     """As :func:`_free`, after the contact force ``F`` of the step before."""
     y = 0.0
@@ -51,7 +55,7 @@ def _forced(S: Vector, K: Vector, count: int, F: float) -> float:
     return y
 
 
-@njit(cache=True)
+@phase
 def _whole(modes: int) -> int:
     """Modes that fill whole vector registers."""
     return _LANES * ((modes + _LANES - 1) // _LANES)
@@ -126,6 +130,16 @@ def _watch(
         out[at, k] = y
 
 
+@phase
+def _push_in(S: Matrix, index: NDArray[np.int64], pushed_q: Vector, pushed_v: Vector) -> None:
+    """Let the motion under constant forces join that of all modes."""
+    for k in range(index.size):
+        c, i = index[k] // CHUNK, index[k] % CHUNK
+        S[c, i] += pushed_q[k]
+        S[c, i + CHUNK] += pushed_v[k]
+        pushed_q[k] = pushed_v[k] = 0.0
+
+
 @njit(cache=True)
 def _unpack(S: Matrix, q: Vector, v: Vector) -> None:
     """Modal state as two plain arrays (no views: counting their references costs more)."""
@@ -153,7 +167,7 @@ def _damped_energy_chunk(S: Matrix, L: Matrix, c: int, F: float) -> float:
     return energy
 
 
-@njit(cache=True)
+@compiled()
 def _damped_energy(S: Matrix, L: Matrix, F: float) -> float:
     """Energy of the damped modes after the pending contact force ``F``."""
     total = 0.0
@@ -173,7 +187,7 @@ def _damping_loss_chunk(S: Matrix, L: Matrix, c: int, F_before: float, F: float)
     return loss
 
 
-@njit(cache=True)
+@compiled()
 def _damping_loss(S: Matrix, L: Matrix, F_before: float, F: float) -> float:
     """Loss of a step with the force ``F`` that started after the pending force ``F_before``."""
     total = 0.0
@@ -182,146 +196,171 @@ def _damping_loss(S: Matrix, L: Matrix, F_before: float, F: float) -> float:
     return total
 
 
+class _Contact(NamedTuple):
+    """Where the contact is."""
+
+    F: float  # [N] of the last step
+    F_before: float  # of the step before
+    gap: float  # [m]
+    e: float  # [m] compression of the series spring
+    chi: float  # [1/m] dissipation of the law over the speed of approach
+    approaching: bool
+    deepest: float  # [m] since a damped contact was touched
+    hint: int  # interval of a table
+
+
+class _Damped(NamedTuple):
+    """Energy of the damped modes."""
+
+    loss: float  # [J] so far
+    in_flight: bool
+    flight_energy: float  # [J] when the flight began
+
+
+@phase
+def _move(S: Matrix, K: Matrix, modes: int, F: float, gap: float) -> float:
+    """All modes over a step, after the force of the step before; adds to the gap."""
+    # modes of the first and of the last chunk: no numbers that the compiler knows, or it unrolls
+    # all 64, which takes twice as long
+    chunks = S.shape[0]
+    count, last = _whole(min(modes, CHUNK)), _whole(modes - (chunks - 1) * CHUNK)
+    if F > 0.0:
+        for c in range(chunks):
+            gap += _forced(S[c], K[c], last if c == chunks - 1 else count, F)
+    else:
+        for c in range(chunks):
+            gap += _free(S[c], K[c], last if c == chunks - 1 else count)
+    return gap
+
+
+@phase
+def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tuple[_Contact, float]:
+    """Solve for the contact force of the step; returns also what it loses [J]."""
+    own = contacts.G[0, 0] + 2.0 * contacts.series[0]
+    d0, d_free = -now.gap - now.e, now.e - free
+    force, lost, chi, approaching, hint = 0.0, 0.0, now.chi, now.approaching, now.hint
+    if d0 > 0.0 or d_free > 0.0:
+        if linear:
+            force = solve_linear(contacts.law_data[contacts.law_start[0]], own, d0, d_free)
+        else:
+            if contacts.alpha[0] > 0.0 and approaching and free < 0.0:
+                # mean rate of the gap over the step of onset: no force has acted yet
+                chi, approaching = contacts.alpha[0] / max(now.gap - free, LEAST_WAY), False
+            force, hint, lost = solve_step(
+                contacts.law_kind[0],
+                contacts.law_data,
+                contacts.law_start[0],
+                chi,
+                own,
+                d0,
+                d_free,
+                2.0 * now.F - now.F_before,
+                hint,
+            )
+    return _Contact(force, now.F, now.gap, now.e, chi, approaching, now.deepest, hint), lost
+
+
+@phase
+def _damp(L: Matrix, S: Matrix, now: _Contact, at: _Damped) -> _Damped:
+    """Damping loss; flight: energy at its two ends, contact: the exact loss of each step.
+
+    ``S`` is the state before the step.
+    """
+    loss, in_flight, flight_energy = at
+    if now.F > 0.0:
+        if in_flight:
+            loss += flight_energy
+            loss -= _damped_energy(S, L, now.F_before)
+            in_flight = False
+        loss += _damping_loss(S, L, now.F_before, now.F)
+    elif not in_flight:
+        # the step that has just gone was the first of the flight
+        flight_energy = _damped_energy(S, L, now.F_before)
+        in_flight = True
+    return _Damped(loss, in_flight, flight_energy)
+
+
+@phase
+def _end_step(
+    contacts: Contacts, now: _Contact, after: float, loss: float
+) -> tuple[_Contact, float]:
+    """Series spring and dissipation after the step; returns also the losses at release [J]."""
+    e, chi, approaching, deepest = now.e, now.chi, now.approaching, now.deepest
+    if now.F > 0.0:
+        e = 2.0 * contacts.series[0] * now.F - e
+    elif e != 0.0:
+        loss = add_release(loss, contacts, 0, e, after)
+        e = 0.0
+    if not approaching:
+        deepest = max(deepest, -after)
+        if after > SEPARATED * deepest:
+            approaching, chi, deepest = True, 0.0, 0.0
+    return _Contact(now.F, now.F_before, after, e, chi, approaching, deepest, now.hint), loss
+
+
 @njit(cache=True)
 def run_one_contact(
     steps_per_record: int,
     q: Vector,
     v: Vector,
-    A: Matrix,
-    B: Matrix,
-    P: Matrix,
-    rows: Matrix,
-    gap_offset: Vector,
-    G: Matrix,
-    push_index: NDArray[np.int64],
-    push: Matrix,
-    law_kind: NDArray[np.int64],
-    law_data: Vector,
-    law_start: NDArray[np.int64],
-    alpha: Vector,
-    series: Vector,
-    damped: bool,
-    damped_weight: Matrix,
-    damped_loss: Matrix,
-    watch_q: Matrix,
-    watch_q_force: Matrix,
-    watch_v: Matrix,
-    watch_v_force: Matrix,
-    out_force: Matrix,
-    out_peak: Matrix,
-    out_gap: Matrix,
-    out_q: Matrix,
-    out_v: Matrix,
+    modes: StepMatrices,
+    contacts: Contacts,
+    losses: Losses,
+    watched: Watched,
+    record: Record,
     books: Vector,
 ) -> int:
     """As :func:`klack.simulation.kernel.run_steps`, for exactly one contact."""
-    modes = q.size
-    row = rows[0].copy()
-    S, K = _pack(q, v, A, P, row)
-    chunks = S.shape[0]
-    watched_q, q_counts = _pack_watched(watch_q)
-    watched_v, v_counts = _pack_watched(watch_v)
-    parts = S.reshape(chunks, 2, CHUNK)
-    S0, K0 = S[0], K[0]
-    # modes of the first and of the last chunk: no numbers that the compiler knows, or it unrolls
-    # all 64, which takes twice as long
-    count = _whole(min(modes, CHUNK))
-    last_count = _whole(modes - (chunks - 1) * CHUNK)
-    kind, start, alpha0 = law_kind[0], law_start[0], alpha[0]
-    D, yields = series[0], G[0, 0]
-    own = yields + 2.0 * D
-    linear = kind == LAW_LINEAR and alpha0 == 0.0
-    stiffness = law_data[start]
-    offset = gap_offset[0]
-    pushes = push_index.size
-    pushed_q, pushed_v = np.zeros(pushes), np.zeros(pushes)
-    gap = gap_offset[0] + row @ q
-    F, F_before, e, chi, lost, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    hint = 0
-    approaching, in_flight = True, True
-    L = _pack_losses(B, damped_weight, damped_loss, row)
-    S_before = S.copy()
-    flight_energy = _damped_energy(S, L, 0.0) if damped else 0.0
-    contact_loss, release_loss, damping = 0.0, 0.0, 0.0
+    B, push_index = modes.B, modes.push_index
+    row = contacts.rows[0].copy()
+    S, K = _pack(q, v, modes.A, modes.P, row)
+    L = _pack_losses(B, losses.weight, losses.forms, row)
+    S_before, parts = S.copy(), S.reshape(S.shape[0], 2, CHUNK)
+    watched_q, q_counts = _pack_watched(watched.q)
+    watched_v, v_counts = _pack_watched(watched.v)
+    pushed_q, pushed_v = np.zeros(push_index.size), np.zeros(push_index.size)
+    linear = contacts.law_kind[0] == LAW_LINEAR and contacts.alpha[0] == 0.0
+    now = _Contact(0.0, 0.0, contacts.gap[0] + row @ q, 0.0, 0.0, True, 0.0, 0)
+    contact_loss, release_loss = 0.0, 0.0
+    damped = _Damped(0.0, True, _damped_energy(S, L, 0.0) if losses.damped else 0.0)
 
-    for record in range(out_force.shape[0]):
+    for place in range(record.force.shape[0]):
         sum_gap, sum_force, peak = 0.0, 0.0, 0.0
         for _ in range(steps_per_record):
-            if damped:
+            if losses.damped:
                 _copy(S, S_before)
-            if F > 0.0:
-                free = offset + _forced(S0, K0, count, F)
-                for c in range(1, chunks):
-                    free += _forced(S[c], K[c], last_count if c == chunks - 1 else count, F)
-            else:
-                free = offset + _free(S0, K0, count)
-                for c in range(1, chunks):
-                    free += _free(S[c], K[c], last_count if c == chunks - 1 else count)
-            push_on(push_index, push, A, pushed_q, pushed_v)
-            for k in range(pushes):
+            free = _move(S, K, q.size, now.F, contacts.gap[0])
+            push_on(modes, pushed_q, pushed_v)
+            for k in range(push_index.size):
                 free += row[push_index[k]] * pushed_q[k]
-            d0, d_free, before, force = -gap - e, e - free, F, 0.0
-            if d0 > 0.0 or d_free > 0.0:
-                if linear:
-                    force = solve_linear(stiffness, own, d0, d_free)
-                else:
-                    if alpha0 > 0.0 and approaching and free < 0.0:
-                        # mean rate of the gap over the step of onset: no force has acted yet
-                        chi, approaching = alpha0 / max(gap - free, 1e-30), False
-                    force, hint, lost = solve_step(
-                        kind, law_data, start, chi, own, d0, d_free, 2.0 * F - F_before, hint
-                    )
-                    contact_loss += lost
-            F_before, F = F, force
-            if damped:
-                # flight: energy at its two ends; contact: the exact loss of each step
-                if F > 0.0:
-                    if in_flight:
-                        damping += flight_energy
-                        damping -= _damped_energy(S_before, L, before)
-                        in_flight = False
-                    damping += _damping_loss(S_before, L, before, F)
-                elif not in_flight:
-                    # the step that has just gone was the first of the flight
-                    flight_energy = _damped_energy(S_before, L, before)
-                    in_flight = True
-            after = free + yields * F
-            sum_gap += 0.5 * (gap + after)
-            sum_force += F
-            peak = max(peak, F)
-            gap = after
-            if F > 0.0:
-                e = 2.0 * D * F - e
-            elif e != 0.0:
-                # a clipped law is still pressed in: the way of the spring is now its own
-                release_loss += 0.5 * e * e / D
-                release_loss += law_potential(kind, law_data, start, e - after)
-                release_loss -= law_potential(kind, law_data, start, -after)
-                e = 0.0
-            if not approaching:
-                deepest = max(deepest, -after)
-                if after > SEPARATED * deepest:
-                    approaching, chi, deepest = True, 0.0, 0.0
-        out_force[record, 0] = sum_force / steps_per_record
-        out_peak[record, 0] = peak
-        out_gap[record, 0] = sum_gap / steps_per_record
-        for k in range(pushes):
-            c, i = push_index[k] // CHUNK, push_index[k] % CHUNK
-            S[c, i] += pushed_q[k]
-            S[c, i + CHUNK] += pushed_v[k]
-            pushed_q[k] = pushed_v[k] = 0.0
-        _watch(watched_q, q_counts, watch_q_force, parts, 0, F, out_q, record + 1)
-        _watch(watched_v, v_counts, watch_v_force, parts, 1, F, out_v, record + 1)
+            now, loss = _press(contacts, linear, now, free)
+            contact_loss += loss
+            if losses.damped:
+                damped = _damp(L, S_before, now, damped)
+            after = free + contacts.G[0, 0] * now.F
+            sum_gap += 0.5 * (now.gap + after)
+            sum_force += now.F
+            peak = max(peak, now.F)
+            now, release_loss = _end_step(contacts, now, after, release_loss)
+        record.force[place, 0] = sum_force / steps_per_record
+        record.peak[place, 0] = peak
+        record.gap[place, 0] = sum_gap / steps_per_record
+        _push_in(S, push_index, pushed_q, pushed_v)
+        _watch(watched_q, q_counts, watched.q_force, parts, 0, now.F, record.q, place + 1)
+        _watch(watched_v, v_counts, watched.v_force, parts, 1, now.F, record.v, place + 1)
 
     _unpack(S, q, v)
-    for i in range(modes):
-        q[i] += B[0, i] * row[i] * F
-        v[i] += B[1, i] * row[i] * F
-    if damped and in_flight:
-        damping += flight_energy - _damped_energy(S, L, F)
-    books[0] = contact_loss
-    books[1] = release_loss
-    books[2] = damping
-    books[3] = gap
-    books[4] = e
+    for i in range(q.size):
+        q[i] += B[0, i] * row[i] * now.F
+        v[i] += B[1, i] * row[i] * now.F
+    damping = damped.loss
+    if losses.damped and damped.in_flight:
+        damping += damped.flight_energy - _damped_energy(S, L, now.F)
+    books[0], books[1], books[2], books[3], books[4] = (
+        contact_loss,
+        release_loss,
+        damping,
+        now.gap,
+        now.e,
+    )
     return STATUS_FINE

@@ -17,9 +17,8 @@ centred, eccentric, tilted, or touching in a few places.  The contact points car
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,18 +184,6 @@ class InterfaceModel:
     def mass(self) -> float:
         """Mass of the moving body [kg]."""
         return self.masses[0]
-
-    def with_gap(self, gap: NDArray[np.float64]) -> Self:
-        """Return the same model with other initial gaps, shape (nc,) [m]."""
-        gap = np.asarray(gap, dtype=float)
-        if gap.shape != self.gap.shape or not np.all(np.isfinite(gap)):
-            raise InputError(
-                "interface model: gap",
-                got=f"shape {gap.shape}, finite: {bool(np.all(np.isfinite(gap)))}",
-                expected=f"{len(self.gap)} finite gaps",
-                hint="give one gap per contact point, in metres.",
-            )
-        return replace(self, gap=gap)
 
 
 def interface_model(

@@ -8,7 +8,6 @@ impact stays linear.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import ceil
 from time import perf_counter
 
@@ -23,6 +22,24 @@ from klack.errors import ConvergenceError, InputError, require_nonnegative, requ
 from klack.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.guide import Guide
+from klack.transient.interface_arrays import (
+    CONTACT_STEPS,
+    DAMPING,
+    DEBT,
+    DIRECTION,
+    GUIDE,
+    GUIDE_STRAIN,
+    OPEN_STEPS,
+    ROUNDS,
+    WORK,
+    ActiveSet,
+    Bore,
+    ContactPoints,
+    Modes,
+    Outside,
+    Record,
+    State,
+)
 from klack.transient.interface_kernel import (
     FAILED,
     OPEN,
@@ -143,22 +160,15 @@ def simulate_interface(
     return result
 
 
-@dataclass(frozen=True, slots=True)
-class _Stepper:
+def _modes(model: InterfaceModel, step: float) -> Modes:
     """Everything that depends on the length of the step."""
-
-    step: float
-    propagator: NDArray[np.float64]
-    loss: NDArray[np.float64]
-
-
-def _stepper(model: InterfaceModel, step: float) -> _Stepper:
     P = modal_propagator(model.omega, model.damping, step)
     loss = np.zeros((0, model.mode_count))
     if np.any(model.damping > 0):
         L = damping_loss(model.omega, model.damping, step)
         loss = np.array([L.Q11, L.Q12, L.Q22, L.L1, L.L2, L.S])
-    return _Stepper(step, np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]), loss)
+    push = np.ascontiguousarray(model.rigid[2])
+    return Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, loss, push, model.drift)
 
 
 class _Segment:
@@ -171,7 +181,7 @@ class _Segment:
         self.drift = [run.model.drift @ run.v]
         self.parts: list[tuple[NDArray[np.float64], ...]] = []
         self.point_force: list[NDArray[np.float32]] = []
-        self.contact_steps = run.books[7]
+        self.contact_steps = run.books[CONTACT_STEPS]
 
     @property
     def steps(self) -> int:
@@ -194,9 +204,8 @@ class _Run:
         self.model, self.step, self.guide, self.gaps, self.points = model, step, guide, gaps, points
         self.constant, self.spring = -force, spring
         n, M = model.count, model.mode_count
-        self.steppers: dict[int, _Stepper] = {}
-        B1 = self.stepper(0).propagator[4]
-        self.push = np.ascontiguousarray(model.rigid[2])
+        self.steppers: dict[int, Modes] = {}
+        B1, self.push = self.stepper(0).B1, self.stepper(0).push
         self.A = contact_compliance(model.compliance, model.traces, B1, self.push, spring)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.gap0 = np.array(model.gap)
@@ -204,15 +213,10 @@ class _Run:
         self.clearance = max(
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
-        self.q, self.v, self.lam = np.zeros(M), np.zeros(M), np.zeros(n)
-        self.active = np.zeros(n, dtype=bool)
-        self.index = np.zeros(n, dtype=np.int64)
-        self.B = np.zeros((n, n))
-        self.counts = np.zeros(2, dtype=np.int64)
-        self.books = np.zeros(9)
-        self.carried = np.zeros(n, dtype=bool)
-        self.guide_arrays = _guide_arrays(guide, M)
-        self.guide_force = np.zeros((len(self.guide_arrays[3]), 2))
+        self.bore = _bore(guide, M)
+        self.state = State.still(M, n, len(self.bore.clearance))
+        self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
+        self.in_flight = self.state._replace(lam=np.zeros(0), contact=ActiveSet.none(0))
         self.taken_at = np.zeros(6)
         first, last = model.contacts[0][1:]
         self.arm = np.zeros(3)
@@ -225,9 +229,9 @@ class _Run:
         self.lowest, self.highest = np.inf, -np.inf
         self.touched_at: float | None = None
 
-    def stepper(self, doublings: int) -> _Stepper:
+    def stepper(self, doublings: int) -> Modes:
         if doublings not in self.steppers:
-            self.steppers[doublings] = _stepper(self.model, self.step * 2.0**doublings)
+            self.steppers[doublings] = _modes(self.model, self.step * 2.0**doublings)
         return self.steppers[doublings]
 
     # ------------------------------------------------------------------ placement
@@ -310,7 +314,10 @@ class _Run:
 
     def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
         """Jump until a gap may close soon; recompute the gaps meanwhile."""
-        empty = np.zeros((0, self.model.mode_count))
+        nothing = np.zeros(0)
+        away = ContactPoints(
+            np.zeros((0, 0)), np.zeros((0, self.model.mode_count)), nothing, nothing
+        )
         while self.time < duration:
             stale = self.stale()
             horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
@@ -325,7 +332,7 @@ class _Run:
                 safe, doublings = _WARY_SHARE * safe, _GUIDED_DOUBLINGS
             length = self.step * 2.0**doublings
             steps = max(1, int(min(safe, _FLIGHT_CHUNK) / length))
-            self.march(self.stepper(doublings), steps, 0, empty, np.zeros(0), np.zeros((0, 0)))
+            self.march(self.stepper(doublings), steps, 0, away, self.in_flight)
             self.time += steps * length
             self.keep_motion()
             if progress is not None:
@@ -353,7 +360,7 @@ class _Run:
         """Whether the shaft surely stays clear of its guide for this time."""
         if self.guide is None:
             return True
-        if np.any(self.guide_force):
+        if np.any(self.state.guide_force):
             return False
         elastic = self.model.omega > 0
         swing = np.zeros(self.model.mode_count)
@@ -369,95 +376,55 @@ class _Run:
     def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
         """Fine steps through one impact, or to the end of the run."""
         segment = _Segment(self)
-        self.books[5], self.books[8] = -1.0, 0.0
+        self.books[OPEN_STEPS], self.books[DIRECTION] = -1.0, 0.0
         status = 0
         while self.time < duration * (1.0 - 1e-9) and status not in (OPEN, TURNED):
             steps = min(_CHUNK, ceil((duration - self.time) / self.step * (1.0 - 1e-9)))
             status = self.fine(segment, steps, wait)
             if progress is not None:
                 progress(min(self.time / duration, 1.0))
-            touched = self.books[7] > segment.contact_steps
+            touched = self.books[CONTACT_STEPS] > segment.contact_steps
             if wait and not touched and self.safe(self.gap0, self.step * 1e3) > _FAR * self.step:
                 return  # it went by
-        if self.books[7] > segment.contact_steps or not wait:
+        if self.books[CONTACT_STEPS] > segment.contact_steps or not wait:
             self.check_rim()
             self.segments.append(self.close(segment))
 
     def fine(self, segment: _Segment, steps: int, wait: int) -> int:
-        out = self.march(
-            self.stepper(0), steps, wait, self.model.traces, self.gap0, self.A, self.points
-        )
-        taken, status, force, gap, drift, outside, point_force = out
+        points = ContactPoints(self.A, self.model.traces, self.gap0, self.model.axial)
+        taken, status, record = self.march(self.stepper(0), steps, wait, points, self.state)
         if status == FAILED:
             raise ConvergenceError(
                 f"interface level: no contact forces found at {1e6 * self.time:.4g} us.\n"
                 "Try: a shorter step, or fewer kept modes."
             )
-        segment.parts.append((force[:taken], gap[:taken], outside[:taken]))
-        segment.drift.extend(drift[:taken])
+        force, drift = record.force[:taken], record.drift[:taken]
+        segment.parts.append((force, record.gap[:taken], record.outside[:taken]))
+        segment.drift.extend(drift)
         if self.points:
-            segment.point_force.append(point_force[:taken])
+            segment.point_force.append(record.points[:taken])
         self.time += taken * self.step
         self.steps += taken
         self.keep_motion()
-        if self.books[7] > segment.contact_steps:
-            way = np.concatenate([[0.0], np.cumsum(drift[:taken, 0]) * self.step])
+        if self.books[CONTACT_STEPS] > segment.contact_steps:
+            way = np.concatenate([[0.0], np.cumsum(drift[:, 0]) * self.step])
             end = float(self.push @ self.q)
             path = end - way[-1] + way
             if self.touched_at is None:
-                closed = np.flatnonzero(force[:taken] > 0)
+                closed = np.flatnonzero(force > 0)
                 self.touched_at = float(path[closed[0]]) if len(closed) else None
             self.lowest = min(self.lowest, float(path.min()))
             self.highest = max(self.highest, float(path.max()))
         return status
 
-    def march(  # type: ignore[no-untyped-def]
-        self,
-        stepper: _Stepper,
-        steps: int,
-        wait: int,
-        traces: NDArray[np.float64],
-        gap0: NDArray[np.float64],
-        A: NDArray[np.float64],
-        points: bool = False,
-    ):
-        model, n = self.model, len(gap0)
-        outside, force, gap = np.zeros((3, steps))
-        drift = np.zeros((steps, len(model.bodies)))
-        point_force = np.zeros((steps if points else 0, n), dtype=np.float32)
-        taken, status = march(
-            steps,
-            wait,
-            stepper.step,
-            A,
-            traces,
-            gap0,
-            model.axial[:n],
-            model.drift,
-            stepper.propagator,
-            stepper.loss,
-            self.push,
-            self.constant,
-            self.spring,
-            *self.guide_arrays,
-            _SLIP_SPEED,
-            self.q,
-            self.v,
-            self.lam[:n],
-            self.active[:n],
-            self.index,
-            self.B,
-            self.counts,
-            self.guide_force,
-            self.books,
-            self.carried,
-            force,
-            gap,
-            drift,
-            outside,
-            point_force,
-        )
-        return taken, status, force, gap, drift, outside, point_force
+    def march(
+        self, modes: Modes, steps: int, wait: int, points: ContactPoints, state: State
+    ) -> tuple[int, int, Record]:
+        n = len(points.gap)
+        record = Record.empty(steps, len(self.model.bodies), n, keep_points=self.points and n > 0)
+        outside = Outside(self.constant, self.spring)
+        taken, status = march(steps, wait, modes, outside, points, self.bore, state, record)
+        return taken, status, record
 
     # ------------------------------------------------------------------ records
 
@@ -471,14 +438,19 @@ class _Run:
         self.motion.append((self.time, position, velocity))
 
     def contact_energy(self) -> float:
-        return float(-0.5 * self.lam @ (self.gap0 + self.model.traces @ self.q))
+        return float(-0.5 * self.state.lam @ (self.gap0 + self.model.traces @ self.q))
 
     def spring_energy(self) -> float:
         return float(0.5 * self.spring * (self.push @ self.q) ** 2)
 
     def energy(self) -> float:
         modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
-        return float(modal) + self.contact_energy() + self.spring_energy() + float(self.books[4])
+        return (
+            float(modal)
+            + self.contact_energy()
+            + self.spring_energy()
+            + float(self.books[GUIDE_STRAIN])
+        )
 
     def ledger_start(self) -> tuple[float, float, NDArray[np.float64]]:
         modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
@@ -539,10 +511,10 @@ class _Run:
                 initial=initial,
                 bodies=self.body_energies(),
                 contact=self.contact_energy(),
-                contact_dissipation=float(spent[2]),
-                damping=float(spent[0]),
-                work=float(spent[1]),
-                spring=self.spring_energy() - spring + float(spent[4]),
+                contact_dissipation=float(spent[GUIDE]),
+                damping=float(spent[DAMPING]),
+                work=float(spent[WORK]),
+                spring=self.spring_energy() - spring + float(spent[GUIDE_STRAIN]),
             ),
             external_force=side * outside,
             longest_period=model.longest_period,
@@ -583,7 +555,7 @@ class _Run:
 
     def check_rim(self) -> None:
         """Refuse a contact that has grown to the border of the candidate points."""
-        at_rim = self.carried & self.model.rim
+        at_rim = self.state.carried & self.model.rim
         if not np.any(at_rim):
             return
         axial = self.model.axial[at_rim]
@@ -603,7 +575,7 @@ class _Run:
 
     def result(self, wall_time: float) -> InterfaceResult:
         times, positions, velocities = zip(*self.motion, strict=True)
-        contact_steps = int(self.books[7])
+        contact_steps = int(self.books[CONTACT_STEPS])
         return InterfaceResult(
             impacts=tuple(self.segments),
             motion=RigidMotion(
@@ -614,14 +586,14 @@ class _Run:
             energy=InterfaceEnergy(
                 initial=self.start_energy,
                 final=self.energy(),
-                damping=float(self.books[0]),
-                guide=float(self.books[2]),
-                work=float(self.books[1]),
-                debt=float(self.books[3]),
+                damping=float(self.books[DAMPING]),
+                guide=float(self.books[GUIDE]),
+                work=float(self.books[WORK]),
+                debt=float(self.books[DEBT]),
             ),
             steps=self.steps,
             steps_in_contact=contact_steps,
-            rounds_per_step=float(self.books[6]) / max(contact_steps, 1),
+            rounds_per_step=float(self.books[ROUNDS]) / max(contact_steps, 1),
             approach=self.approach(),
             wall_time=wall_time,
         )
@@ -631,19 +603,10 @@ _SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
 """A millimetre of translation weighs like a radian over a metre: lengths of valves."""
 
 
-def _guide_arrays(guide: Guide | None, modes: int) -> tuple[NDArray[np.float64], ...]:
+def _bore(guide: Guide | None, modes: int) -> Bore:
     if guide is None:
-        none = np.zeros(0)
-        return (
-            np.zeros((0, 2, modes)),
-            np.zeros((0, modes)),
-            np.zeros((0, 2)),
-            none,
-            np.zeros((0, 2, 2)),
-            none,
-            none,
-        )
-    return (
+        return Bore.none(modes)
+    return Bore(
         np.ascontiguousarray(guide.traces),
         np.ascontiguousarray(guide.slide),
         np.ascontiguousarray(guide.offset),
@@ -651,4 +614,5 @@ def _guide_arrays(guide: Guide | None, modes: int) -> tuple[NDArray[np.float64],
         np.ascontiguousarray(guide.compliance),
         guide.friction,
         guide.viscous,
+        _SLIP_SPEED,
     )

@@ -197,11 +197,6 @@ class FullOrderResult:
         return int(np.argmax(self.history.force))
 
     @property
-    def contact_area(self) -> NDArray[np.float64]:
-        """Area of the points that carry a force, shape (n,) [m^2]."""
-        return (self.point_force > 0) @ self.area
-
-    @property
     def energy_loss(self) -> float:
         """Energy that the scheme lost, relative to the energy at the start [-]."""
         given = self.energy.total[0] + self.energy.work[-1]

@@ -13,8 +13,9 @@ from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
+from klack.transient.active_set import solve_active
 from klack.transient.full_order import simulate_full_order
-from klack.transient.interface_kernel import solve_active
+from klack.transient.interface_arrays import ActiveSet
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
@@ -490,12 +491,11 @@ def _complementarity() -> list[Check]:
     rng = np.random.default_rng(11)
     B = rng.standard_normal((60, 60))
     A, q = B @ B.T / 60 + 0.05 * np.eye(60), rng.standard_normal(60)
-    active, index = np.zeros(60, dtype=bool), np.zeros(60, dtype=np.int64)
-    inverse, counts = np.zeros((60, 60)), np.zeros(2, dtype=np.int64)
+    carrying = ActiveSet.none(60)
     lam, gap, worst = np.zeros(60), np.zeros(60), 0.0
     for jump in (0.0, *np.repeat([0.05, 0.5, 3.0], 20)):
         q = q + jump * rng.standard_normal(60)
-        solve_active(A, q, active, index, inverse, counts, lam, gap, 1e-13, 1.0)
+        solve_active(A, q, carrying, lam, gap, 1e-13, 1.0)
         exact, _, _ = solve_lcp(A, q)
         worst = max(worst, float(np.max(np.abs(lam - exact)) / np.max(exact, initial=1e-300)))
     return [

@@ -11,11 +11,19 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.elasticity import eigen
 from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
+from klack.transient.interface_arrays import (
+    Bore,
+    ContactPoints,
+    Modes,
+    Outside,
+    Record,
+    State,
+)
 from klack.transient.interface_kernel import contact_compliance, march
 from klack.transient.interface_model import (
     InterfaceBody,
@@ -226,9 +234,9 @@ def reduce_bodies(
     items = []
     for body, count in zip(bodies, counts, strict=True):
         flexibility = Flexibility(body)
-        modes = Modes(np.zeros(0), np.zeros((body.dof_count, 0)))
+        modes = eigen.Modes(np.zeros(0), np.zeros((body.dof_count, 0)))
         if count:
-            modes = eigenmodes(body, count=count, flexibility=flexibility)
+            modes = eigen.eigenmodes(body, count=count, flexibility=flexibility)
         items.append(
             InterfaceBody(
                 body=body, flexibility=flexibility, modes=modes, damping=np.zeros(len(modes.omega))
@@ -248,47 +256,21 @@ class ModalState:
 
 def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: int) -> ModalState:
     """Take ``steps`` steps of the compiled loop from an open contact, without outside forces."""
-    n, modes = model.count, model.mode_count
+    n, M = model.count, model.mode_count
     P = modal_propagator(model.omega, model.damping, step)
     push = np.ascontiguousarray(model.rigid[2])
-    q, v, lam = np.array(q, dtype=float), np.array(v, dtype=float), np.zeros(n)
-    out = np.zeros((3, steps))
+    A = contact_compliance(model.compliance, model.traces, P.B1, push, 0.0)
+    none = np.zeros((0, M))
+    state = State.still(M, n, 0)
+    state.q[:], state.v[:] = q, v
     march(
         steps,
         0,
-        step,
-        contact_compliance(model.compliance, model.traces, P.B1, push, 0.0),
-        model.traces,
-        model.gap,
-        model.axial,
-        model.drift,
-        np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]),
-        np.zeros((0, modes)),
-        push,
-        0.0,
-        0.0,
-        np.zeros((0, 2, modes)),
-        np.zeros((0, modes)),
-        np.zeros((0, 2)),
-        np.zeros(0),
-        np.zeros((0, 2, 2)),
-        np.zeros(0),
-        np.zeros(0),
-        1.0,
-        q,
-        v,
-        lam,
-        np.zeros(n, dtype=bool),
-        np.zeros(n, dtype=np.int64),
-        np.zeros((n, n)),
-        np.zeros(2, dtype=np.int64),
-        np.zeros((0, 2)),
-        np.zeros(9),
-        np.zeros(n, dtype=bool),
-        out[0],
-        out[1],
-        np.zeros((steps, len(model.bodies))),
-        out[2],
-        np.zeros((0, n), dtype=np.float32),
+        Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift),
+        Outside(0.0, 0.0),
+        ContactPoints(A, model.traces, model.gap, model.axial),
+        Bore.none(M),
+        state,
+        Record.empty(steps, len(model.bodies), n, keep_points=False),
     )
-    return ModalState(q=q, v=v, force=lam)
+    return ModalState(q=state.q, v=state.v, force=state.lam)

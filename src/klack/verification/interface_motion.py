@@ -7,10 +7,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.contact.laws import ContactLaw, FlatLaw, HuntCrossley
+from klack.contact.step_constants import NO_LAW, SEPARATED
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
-from klack.simulation.interface_step import NO_LAW, interface_store, solve_interface
-from klack.simulation.kernel import SEPARATED
+from klack.simulation.interface_step import interface_store, solve_interface
 from klack.simulation.propagator import modal_propagator
 
 __all__ = ["InterfaceMotion", "interface_motion"]

@@ -45,7 +45,7 @@ __all__ = [
 
 
 def report_content(study: ImpactStudy) -> Content:
-    """Put a study into words, tables and figures."""
+    """Texts, tables and figures of a study."""
     found = charts(study)
     by_name = {chart.name: chart for chart in found}
     transfer = tuple(chart for chart in found if chart.name.startswith("transfer-"))
@@ -262,8 +262,8 @@ def _energy_table(study: ImpactStudy) -> Table:
 
 def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     return (
-        *glossary(measure for measure in LEVEL_MEASURES if measure.page),
-        *glossary(measure for measure in DEVIATION_MEASURES if measure.page),
+        *glossary(LEVEL_MEASURES),
+        *glossary(DEVIATION_MEASURES),
         (
             "spectrum",
             "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "

@@ -43,7 +43,7 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PressureFigure:
-    """Picture (SVG) and what has to be said about it."""
+    """Picture (SVG) and its caption."""
 
     image: bytes
     note: str

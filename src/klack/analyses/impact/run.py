@@ -51,7 +51,8 @@ from klack.assembling.reduced_pair import (
 )
 from klack.assembling.structures import impact_structures
 from klack.cache.setting import result_cache
-from klack.case.schema import Case, SubmodelLocalLaw
+from klack.case.impact_sections import SubmodelLocalLaw
+from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
@@ -234,7 +235,7 @@ def _require_time_to_touch(case: Case, gap: float | None) -> None:
         raise InputError(
             f"{case.path or 'case'}: run.duration",
             got=at,
-            expected="a time that holds the impact",
+            expected="a time that covers the impact",
             hint="give contact.gap (for example 0 um): the upper body is then moved there."
             if drawn
             else "enlarge run.duration or make contact.gap smaller.",

@@ -38,7 +38,7 @@ _CRUSHED = 0.2
 
 @dataclass(frozen=True, slots=True)
 class SectionFigure:
-    """Picture (SVG) and what has to be said about it."""
+    """Picture (SVG) and its caption."""
 
     image: bytes
     magnification: float

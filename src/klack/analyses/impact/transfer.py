@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.problem import ContactProblem
-from klack.case.schema import TransferSweep
+from klack.case.impact_sections import TransferSweep
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility

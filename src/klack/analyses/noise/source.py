@@ -25,9 +25,11 @@ from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.structures import IMPACT_STOP
 from klack.case.bodies import CaseMaterial
+from klack.case.impact_sections import LEVELS
 from klack.case.noise import CaseNoise
-from klack.case.schema import LEVELS, Case
-from klack.case.valve import VARIANTS, ValveCase
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.case.valve_sections import VARIANTS
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.progress import Progress, silent

@@ -40,7 +40,7 @@ _MOST = 4  # pictures side by side
 
 @dataclass(frozen=True, slots=True)
 class SurfaceFigure:
-    """Picture (SVG) and what has to be said about it."""
+    """Picture (SVG) and its caption."""
 
     image: bytes
     note: str

@@ -39,7 +39,7 @@ _RELATED, _FEWEST = 0.5, 5
 
 
 def shots_content(study: ShotsStudy) -> Content:
-    """Put a study into words, tables and figures."""
+    """Texts, tables and figures of a study."""
     sections = [
         Section(
             title="Is the highest rebound the centred one?",

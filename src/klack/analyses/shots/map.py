@@ -19,7 +19,7 @@ _MAP = "viridis"
 
 @dataclass(frozen=True, slots=True)
 class ShotsMap:
-    """Picture (SVG) and what has to be said about it."""
+    """Picture (SVG) and its caption."""
 
     image: bytes
     note: str

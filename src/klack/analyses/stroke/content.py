@@ -41,7 +41,7 @@ _ROUND_OFF = 1e-12
 
 
 def stroke_content(study: StrokeStudy) -> Content:
-    """Put a study into words, tables and figures."""
+    """Texts, tables and figures of a study."""
     sections = [
         Section(
             title="The actuation",
@@ -359,11 +359,11 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "together. A touch slower than 2 % of the fastest impact on a stop does not count as its "
         "first impact.",
     ),
-    *glossary(measure for measure in EVENT_MEASURES if measure.page),
+    *glossary(EVENT_MEASURES),
     *glossary(
         measure
         for measure in VARIANT_MEASURES
-        if measure.page and measure.key not in ("opening_time", "closing_time")  # above
+        if measure.key not in ("opening_time", "closing_time")  # above
     ),
     (
         "echo time 2L/a",

@@ -24,8 +24,9 @@ from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
-from klack.case.valve import ValveCase, Variant
+from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
+from klack.case.valve_sections import Variant
 from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop

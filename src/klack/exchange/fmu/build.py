@@ -16,7 +16,7 @@ from klack.exchange.fmu.compiler import (
     require_compilers,
     this_platform,
 )
-from klack.exchange.fmu.data_header import data_header
+from klack.exchange.fmu.data_header import constants_header, data_header
 from klack.exchange.fmu.documentation import documentation_files
 from klack.exchange.fmu.model_description import SOURCE_FILES, model_description
 from klack.exchange.modal_model import ModalModel
@@ -91,6 +91,7 @@ def source_texts(model: ModalModel, fmi: Literal[2, 3], guid: str) -> dict[str, 
     texts = {name: (_HERE / "sources" / name).read_bytes() for name in names}
     standard = sorted((_HERE / "headers" / f"fmi{fmi}").glob("*.h"))
     texts |= {file.name: file.read_bytes() for file in standard}
+    texts["klack_constants.h"] = constants_header().encode()
     texts["klack_data.h"] = data_header(model, guid).encode()
     if fmi == 3:
         texts["buildDescription.xml"] = build_description(model).encode()

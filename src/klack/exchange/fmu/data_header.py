@@ -1,4 +1,4 @@
-"""``klack_data.h``: the numbers of one model for the C sources of its FMU.
+"""Headers of numbers for the C sources of an FMU: of one model, and shared constants.
 
 Names and counts are seen by every source file; the arrays only by the one that defines
 ``KLACK_ARRAYS`` before.  Every number has 17 digits, so the compiler reads the same double.
@@ -9,17 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from klack.contact.step_constants import LANES, NO_LAW, shared_constants
 from klack.errors import InputError
 from klack.exchange.fmu.model_exchange import supports_model_exchange
 from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import ModalModel
 
-__all__ = ["LANES", "data_header"]
-
-LANES = 8
-"""Modes are filled up to a multiple of this, so that loops over them need no rest."""
-
-_NO_LAW = -1
+__all__ = ["constants_header", "data_header"]
 
 
 def data_header(model: ModalModel, guid: str) -> str:
@@ -87,7 +83,7 @@ def data_header(model: ModalModel, guid: str) -> str:
         _array("klack_gap", [contact.gap for contact in model.contacts]),
         _array("klack_series", [contact.series_compliance for contact in model.contacts]),
         _integers("klack_contact_first", first_of_contact),
-        _integers("klack_law_kind", [_NO_LAW if law is None else law.kind for law in laws]),
+        _integers("klack_law_kind", [NO_LAW if law is None else law.kind for law in laws]),
         _integers("klack_law_first", np.concatenate(([0], np.cumsum(sizes)))),
         _array(
             "klack_law",
@@ -105,7 +101,23 @@ def data_header(model: ModalModel, guid: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def constants_header() -> str:
+    """Text of ``klack_constants.h``: what the C sources share with klack's own time step."""
+    lines = [
+        f"#define KLACK_{name} ({value}) /* {meaning} */"
+        for name, value, meaning in shared_constants("C")
+    ]
+    head = [
+        "/* Constants of laws and steps, SI units; written by klack. */",
+        "#ifndef KLACK_CONSTANTS_H",
+        "#define KLACK_CONSTANTS_H",
+        "",
+    ]
+    return "\n".join([*head, *lines, "", "#endif"]) + "\n"
+
+
 def _padded(modes: int) -> int:
+    """Modes are filled up, so that loops over them need no rest."""
     return LANES * max(1, -(-modes // LANES))
 
 

@@ -74,11 +74,11 @@ switch c.law_kind
     n = c.law_parameters(2);
     d = closing;
     if D > 0
-      for step = 1:60
+      for step = 1:@MATLAB_TURNS@
         f = K * d^(n - 1);
         change = (d + D * f * d - closing) / (1 + D * n * f);
         d = max(d - change, 0);
-        if abs(change) < 1e-15 * closing
+        if abs(change) < @MATLAB_LEFT@ * closing
           break
         end
       end
@@ -93,7 +93,7 @@ switch c.law_kind
       low = 0;
       high = rest;
       s = rest / (1 + D * L(row, 3));
-      for step = 1:60
+      for step = 1:@MATLAB_TURNS@
         excess = s + D * s * (L(row, 3) + s * (L(row, 4) + s * L(row, 5))) - rest;
         if excess < 0
           low = s;
@@ -105,7 +105,7 @@ switch c.law_kind
         if s < low || s > high
           s = 0.5 * (low + high);
         end
-        if abs(change) <= 1e-15 * rest
+        if abs(change) <= @MATLAB_LEFT@ * rest
           break
         end
       end

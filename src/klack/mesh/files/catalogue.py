@@ -61,7 +61,7 @@ class MeshFormat:
 # A new format is a folder with its reader, and one line here.  Of formats with the same ending
 # those with a mark stand first.  Nothing is imported before a file is read.
 FORMATS = (
-    MeshFormat("abaqus.reader.read_abaqus_model", "Abaqus or CalculiX input", (".inp",)),
+    MeshFormat("abaqus.reader.read_abaqus", "Abaqus or CalculiX input", (".inp",)),
     MeshFormat(
         "ansys.reader.read_ansys_archive", "ANSYS archive", (".cdb", ".dat"), rb"^\s*nblock\s*,"
     ),

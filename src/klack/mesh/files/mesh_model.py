@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
-from klack.materials import Material
 from klack.mesh.mesh import Mesh
 
 __all__ = ["FileMaterial", "MeshModel"]
@@ -29,25 +27,6 @@ class FileMaterial:
     young: float
     poisson: float
     density: float | None
-
-    def in_si(self, *, stress: float, density: float) -> Material:
-        """Convert to SI: ``stress`` [Pa] and ``density`` [kg/m^3] are the units of the file.
-
-        For a model in tonne, mm, s, N these are 1e6 Pa and 1e12 kg/m^3.
-        """
-        if self.density is None:
-            raise InputError(
-                f"material '{self.name}'",
-                got="no density",
-                expected="Young's modulus, Poisson's ratio and density",
-                hint="add the density to the file, or name a material in the case.",
-            )
-        return Material(
-            name=self.name,
-            young=self.young * stress,
-            poisson=self.poisson,
-            density=self.density * density,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,6 @@
 
 #include "klack_law.h"
 
-#define KLACK_ROUND_OFF 1e-15   /* of the equation, over its gaps */
-#define KLACK_LEFT_BY_FILM 0.01 /* share of e that a film must have made to end at first touch */
-
 typedef struct {
     int kind;
     const double *law;
@@ -29,7 +26,7 @@ static double klack_film_mean(const klack_interface *i, double x0, double x1, do
     double damping = 0.5 * i->cubic * total * inverses * inverses;
     if (i->linear != 0.0) {
         double r = closed / total, r2 = r * r;
-        if (fabs(r) > 0.05) return closed * damping + i->linear * log(x0 * inverse1);
+        if (fabs(r) > KLACK_LOG_SERIES_BELOW) return closed * damping + i->linear * log(x0 * inverse1);
         return closed * damping +
                i->linear * r *
                    (2.0 +
@@ -69,7 +66,7 @@ static int klack_film_alone(const klack_interface *i, double S, double z0, doubl
     double rate = 1.0 / i->h, x0 = z0 + i->cut_off, inverse0 = 1.0 / x0;
     double z = klack_largest(base + S * guess, 0.0);
     int turn;
-    for (turn = 0; turn < 100; turn++) {
+    for (turn = 0; turn < KLACK_FILM_NEWTON_LIMIT; turn++) {
         double x = z + i->cut_off, inverse = 1.0 / x, slope = 0.0, curvature = 0.0, excess, step;
         double film = rate * klack_film_mean(i, x0, x, inverse0, inverse, z0 - z);
         int pulled = film <= -i->suction;
@@ -98,7 +95,7 @@ static int klack_film_alone(const klack_interface *i, double S, double z0, doubl
 static klack_force klack_contact(const klack_interface *i, double z0, double z, double *longest,
                                  int *hint) {
     double deep = -klack_least(z0, z);
-    if (i->kind == KLACK_LINEAR && z0 <= 0.0 && z <= 0.0 && i->chi == 0.0) {
+    if (i->kind == KLACK_LAW_LINEAR && z0 <= 0.0 && z <= 0.0 && i->chi == 0.0) {
         klack_force f = {-0.5 * i->law[0] * (z0 + z), 0.5 * i->law[0]};
         return f;
     }
@@ -118,7 +115,7 @@ static klack_forces klack_both(const klack_interface *i, double theta, double z0
     int turn;
     klack_line(i, theta, g_free, e0, &S, &base);
     z = base + S * guess;
-    for (turn = 0; turn < 100; turn++) {
+    for (turn = 0; turn < KLACK_FILM_NEWTON_LIMIT; turn++) {
         klack_force contact = {0.0, 0.0};
         double curvature = 0.0, film_slope = 0.0, open1 = klack_largest(z, 0.0);
         double longest = INFINITY;

@@ -9,11 +9,7 @@
 
 #include <math.h>
 
-enum { KLACK_NO_LAW = -1, KLACK_LINEAR = 0, KLACK_HERTZ = 1, KLACK_TABLE = 2 };
-
-#define KLACK_FORCE_LEFT 1e-11 /* accepted error of a force over the force */
-#define KLACK_STEP_LEFT 3e-7   /* last Newton step over the indentation */
-#define KLACK_TOUCH 1e-150     /* [m] that a contact is closed by at least; squares of less are 0 */
+#include "klack_constants.h"
 
 typedef struct {
     double force, slope;
@@ -35,10 +31,10 @@ static int klack_interval(const double *p, double d, int hint) {
 /* force at an indentation above zero, and its slope */
 static klack_force klack_law_at(int kind, const double *p, double d, int *hint) {
     klack_force f;
-    if (kind == KLACK_LINEAR) {
+    if (kind == KLACK_LAW_LINEAR) {
         f.force = p[0] * d;
         f.slope = p[0];
-    } else if (kind == KLACK_HERTZ) {
+    } else if (kind == KLACK_LAW_HERTZ) {
         f.force = p[0] * klack_power(d, p[1]);
         f.slope = d > 0.0 ? p[1] * f.force / d : 0.0;
     } else {
@@ -56,7 +52,7 @@ static klack_force klack_law_at(int kind, const double *p, double d, int *hint) 
 /* mean of K d^n between two indentations above zero */
 static double klack_hertz_mean(double K, double n, double low, double high) {
     double middle = 0.5 * (low + high), r = 0.5 * (high - low) / middle;
-    if (r < 5e-3) {
+    if (r < KLACK_HERTZ_SERIES_BELOW) {
         double r2 = r * r, tail = 1.0 + (n - 2.0) * (n - 3.0) / 20.0 * r2;
         return K * klack_power(middle, n) * (1.0 + n * (n - 1.0) / 6.0 * r2 * tail);
     }
@@ -108,7 +104,7 @@ static klack_force klack_table_mean(const double *p, double d0, double d1, int *
 static klack_force klack_mean_force(int kind, const double *p, double d0, double d1, int *hint) {
     klack_force f = {0.0, 0.0};
     if (d0 <= KLACK_TOUCH && d1 <= KLACK_TOUCH) return f;
-    if (kind == KLACK_LINEAR) {
+    if (kind == KLACK_LAW_LINEAR) {
         double k = p[0], high = klack_largest(d0, d1);
         if (d0 >= 0.0 && d1 >= 0.0) {
             f.force = 0.5 * k * (d0 + d1);
@@ -119,10 +115,10 @@ static klack_force klack_mean_force(int kind, const double *p, double d0, double
         f.slope = (k * klack_largest(d1, 0.0) - f.force) / (d1 - d0);
         return f;
     }
-    if (kind == KLACK_HERTZ) {
+    if (kind == KLACK_LAW_HERTZ) {
         double low = klack_least(d0, d1), high = klack_largest(d0, d1);
         f.force = klack_hertz_mean(p[0], p[1], klack_largest(low, 0.0), high);
-        if (high - low < 1e-8 * high) {
+        if (high - low < KLACK_HERTZ_EQUAL * high) {
             f.slope = 0.5 * p[1] * f.force / high;
             return f;
         }
@@ -172,11 +168,11 @@ static double klack_solve_step(int kind, const double *p, double chi, double G, 
     klack_force f = {0.0, 0.0};
     int turn;
     if (d0 <= KLACK_TOUCH && df <= KLACK_TOUCH) return 0.0;
-    if (kind == KLACK_LINEAR && chi == 0.0) return klack_solve_linear(p[0], G, d0, df);
-    for (turn = 0; turn < 60; turn++) {
+    if (kind == KLACK_LAW_LINEAR && chi == 0.0) return klack_solve_linear(p[0], G, d0, df);
+    for (turn = 0; turn < KLACK_NEWTON_LIMIT; turn++) {
         double excess, step;
         int last;
-        if (kind == KLACK_TABLE && chi == 0.0 && klack_within(p, *hint, d0, d1)) {
+        if (kind == KLACK_LAW_TABLE && chi == 0.0 && klack_within(p, *hint, d0, d1)) {
             const double *c = p + 1 + 6 * *hint;
             f = klack_cubic_mean(c, d0 - c[0], d1 - c[0]);
             excess = d1 - df + G * f.force;

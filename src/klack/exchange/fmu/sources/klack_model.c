@@ -28,7 +28,7 @@ int klack_check(klack_model *m) {
     m->message[sizeof m->message - 1] = '\0';
     for (c = 0; c < C; c++) {
         const double *law = klack_law + klack_law_first[c];
-        int last = klack_law_kind[c] == KLACK_TABLE ? (int)law[0] - 1 : 0;
+        int last = klack_law_kind[c] == KLACK_LAW_TABLE ? (int)law[0] - 1 : 0;
         wrong = wrong || m->contacts[c].hint < 0 || m->contacts[c].hint > last;
     }
     return wrong ? failed(m, "the saved state is not one of this model") : 0;
@@ -241,7 +241,7 @@ int klack_update_events(klack_model *m) {
         double g = gap_now(m, c), rate = dot(klack_gap_row[c], m->v);
         k->closed = fabs(g) > 1e-12 ? g < 0.0 : rate < 0.0;
         if (k->closed && k->approaching && klack_dissipation[c] > 0.0) {
-            k->rate = klack_dissipation[c] / klack_largest(-rate, KLACK_FILMS ? SLOWEST : 1e-30);
+            k->rate = klack_dissipation[c] / klack_largest(-rate, KLACK_FILMS ? KLACK_SLOWEST : KLACK_LEAST_WAY);
             k->approaching = 0;
         } else if (!k->closed) { /* events are located: each touch has its own speed */
             k->approaching = 1;

@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "klack_constants.h"
+
 typedef struct {
     double A11, A12, A21, A22, B1, B2;
 } klack_step;
@@ -12,7 +14,7 @@ typedef struct {
 static double klack_taylor(double x, double z) {
     double before = 0.0, now = 0.5, total = 0.5;
     int n;
-    for (n = 1; n < 14; n++) {
+    for (n = 1; n < KLACK_TAYLOR_TERMS; n++) {
         double next = -(2.0 * z * x * (n + 1) * now + x * x * before) / ((n + 1.0) * (n + 2.0));
         before = now;
         now = next;
@@ -43,7 +45,7 @@ static klack_step klack_mode_step(double w, double z, double h) {
         lost = -expm1(slow * h) + slow * s.A12;
     }
     s.A21 = -w * w * s.A12;
-    s.B1 = (z > 1.0 ? z : 1.0) * w * h < 0.05 ? klack_taylor(w * h, z) * h * h : lost / (w * w);
+    s.B1 = (z > 1.0 ? z : 1.0) * w * h < KLACK_TAYLOR_BELOW ? klack_taylor(w * h, z) * h * h : lost / (w * w);
     s.B2 = s.A12;
     return s;
 }

@@ -18,10 +18,7 @@
 #define FIRST_STATE (KLACK_INTERNAL_STEP + 1 + 2 * KLACK_PAIR)
 #define FIRST_RATE (FIRST_STATE + 2 * M)
 
-#define SEPARATED 0.1    /* gap over the deepest indentation so far at which a contact forgets its
-                            approach speed */
 #define LEAST_STEP 1e-12 /* [s] */
-#define SLOWEST 1e-3     /* [m/s] least approach speed of a damped law beside films */
 
 typedef struct {
     double gap, rate; /* derivatives of a force over the gap and over its rate */

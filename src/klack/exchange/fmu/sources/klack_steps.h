@@ -11,11 +11,8 @@
 #include "klack_state.h"
 
 #define SOFT 100.0 /* [rad/s] slower modes are not counted from their rest position */
-#define SWEEPS 500
-#define SETTLED 1e-11    /* change of a gap over the largest change that a force makes */
 #define ROUND_OFF 1e-16  /* of a gap: no film force is known better */
 #define MOST_STEPS 1e12
-#define LANES 8 /* of these sums, on every processor, so that all give the same numbers */
 
 /* versions of the pass for several processors, chosen when the library is loaded */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
@@ -40,21 +37,21 @@ typedef struct {
 FOR_PROCESSORS
 static void pass_free(double *restrict q, double *restrict v, const matrices *restrict A,
                       double *restrict y) {
-    double sum[C + 1][LANES] = {{0.0}};
+    double sum[C + 1][KLACK_LANES] = {{0.0}};
     int i, j, c;
-    for (i = 0; i < P; i += LANES) {
-        for (j = 0; j < LANES; j++) {
+    for (i = 0; i < P; i += KLACK_LANES) {
+        for (j = 0; j < KLACK_LANES; j++) {
             double q1 = A->A11[i + j] * q[i + j] + A->A12[i + j] * v[i + j];
             v[i + j] = A->A21[i + j] * q[i + j] + A->A22[i + j] * v[i + j];
             q[i + j] = q1;
         }
         for (c = 0; c < C; c++) {
-            for (j = 0; j < LANES; j++) sum[c][j] += klack_gap_row[c][i + j] * q[i + j];
+            for (j = 0; j < KLACK_LANES; j++) sum[c][j] += klack_gap_row[c][i + j] * q[i + j];
         }
     }
     for (c = 0; c < C; c++) {
         y[c] = 0.0;
-        for (j = 0; j < LANES; j++) y[c] += sum[c][j];
+        for (j = 0; j < KLACK_LANES; j++) y[c] += sum[c][j];
     }
 }
 
@@ -62,25 +59,25 @@ static void pass_free(double *restrict q, double *restrict v, const matrices *re
 FOR_PROCESSORS
 static void pass_forced(double *restrict q, double *restrict v, const matrices *restrict A,
                         const double *restrict F, double *restrict y) {
-    double sum[C + 1][LANES] = {{0.0}};
+    double sum[C + 1][KLACK_LANES] = {{0.0}};
     int i, j, c;
-    for (i = 0; i < P; i += LANES) {
-        double f[LANES] = {0.0};
+    for (i = 0; i < P; i += KLACK_LANES) {
+        double f[KLACK_LANES] = {0.0};
         for (c = 0; c < C; c++) {
-            for (j = 0; j < LANES; j++) f[j] += klack_gap_row[c][i + j] * F[c];
+            for (j = 0; j < KLACK_LANES; j++) f[j] += klack_gap_row[c][i + j] * F[c];
         }
-        for (j = 0; j < LANES; j++) {
+        for (j = 0; j < KLACK_LANES; j++) {
             double q1 = A->A11[i + j] * q[i + j] + A->A12[i + j] * v[i + j] + A->P1[i + j] * f[j];
             v[i + j] = A->A21[i + j] * q[i + j] + A->A22[i + j] * v[i + j] + A->P2[i + j] * f[j];
             q[i + j] = q1;
         }
         for (c = 0; c < C; c++) {
-            for (j = 0; j < LANES; j++) sum[c][j] += klack_gap_row[c][i + j] * q[i + j];
+            for (j = 0; j < KLACK_LANES; j++) sum[c][j] += klack_gap_row[c][i + j] * q[i + j];
         }
     }
     for (c = 0; c < C; c++) {
         y[c] = 0.0;
-        for (j = 0; j < LANES; j++) y[c] += sum[c][j];
+        for (j = 0; j < KLACK_LANES; j++) y[c] += sum[c][j];
     }
 }
 
@@ -192,12 +189,12 @@ static int settle(klack_model *m, const double *free, klack_forces *f, double *F
         contact *k = &m->contacts[c];
         if (klack_dissipation[c] > 0.0 && k->approaching && free[c] < 0.0) {
             /* mean rate of the gap over the step of onset: no force has acted yet */
-            double way = k->gap - free[c], least = KLACK_FILMS ? SLOWEST * m->h : 1e-30;
+            double way = k->gap - free[c], least = KLACK_FILMS ? KLACK_SLOWEST * m->h : KLACK_LEAST_WAY;
             k->rate = klack_dissipation[c] * m->h / klack_largest(way, least);
             k->approaching = 0;
         }
     }
-    for (sweep = 0; sweep < SWEEPS; sweep++) {
+    for (sweep = 0; sweep < KLACK_SWEEPS; sweep++) {
         double change = 0.0, largest = 0.0, unseen = 0.0;
         for (c = 0; c < C; c++) {
             double own = free[c], before = F[c], guess = before;
@@ -212,7 +209,7 @@ static int settle(klack_model *m, const double *free, klack_forces *f, double *F
             largest = klack_largest(largest, fabs(F[c]) * way);
             if (KLACK_FILMS) unseen = klack_largest(unseen, ROUND_OFF * fabs(m->contacts[c].gap));
         }
-        if (C == 1 || change <= klack_largest(SETTLED * largest, unseen)) return 0;
+        if (C == 1 || change <= klack_largest(KLACK_SETTLED * largest, unseen)) return 0;
     }
     return 1;
 }
@@ -235,7 +232,7 @@ static void commit(klack_model *m, const double *free, const klack_forces *f, co
         k->peak = klack_largest(k->peak, k->force);
         if (!k->approaching) {
             k->deepest = klack_largest(k->deepest, -gap);
-            if (gap > SEPARATED * k->deepest) {
+            if (gap > KLACK_SEPARATED * k->deepest) {
                 k->approaching = 1;
                 k->rate = k->deepest = 0.0;
             }

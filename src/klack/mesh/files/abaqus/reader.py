@@ -28,30 +28,29 @@ from klack.mesh.files.plausible import require_unit
 from klack.mesh.files.sound_mesh import require_right_of_axis, require_sound
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 
-__all__ = ["read_abaqus", "read_abaqus_model"]
+__all__ = ["read_abaqus"]
 
 
 def read_abaqus(
-    path: str | Path, unit_length: float, *, solids: Sequence[str] | None = None
-) -> Mesh:
-    """Read the mesh of an Abaqus or CalculiX file.
+    path: str | Path,
+    unit_length: float | None,
+    *,
+    solids: Sequence[str] | None = None,
+    solids_only: bool = False,
+) -> MeshModel:
+    """Read mesh, materials and sections of an Abaqus or CalculiX file.
 
-    Parameters
-    ----------
-    path : path
-    unit_length : float [m]
-        What the file's unit of length is: 1e-3 for millimetres.  Such files do not say.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
 
     Returns
     -------
-    Mesh
+    MeshModel
         Of dimension 3 (C3D elements), or 2 (CAX elements: x is r, y is z).  The solids are called
         after the element sets of *SOLID SECTION; without sections after the sets of *ELEMENT, or
         after the *ELSET that is made of whole such sets (a physical group of gmsh).  Where there
         are several instances of parts, sets and surfaces are called ``instance.set``, and ``set``
-        too if that is unique; solids have the shorter name.
+        too if that is unique; solids have the shorter name.  Numbers of nodes and elements are
+        those of the file; where instances repeat them, they are counted on through it from 1.
 
     Raises
     ------
@@ -63,23 +62,6 @@ def read_abaqus(
     -----
     AccuracyWarning
         Once, if constraints between nodes (*TIE, *EQUATION, ...) or *TRANSFORM are ignored.
-    """
-    return read_abaqus_model(path, unit_length, solids=solids).mesh
-
-
-def read_abaqus_model(
-    path: str | Path,
-    unit_length: float | None,
-    *,
-    solids: Sequence[str] | None = None,
-    solids_only: bool = False,
-) -> MeshModel:
-    """Read mesh, materials and sections; see :func:`read_abaqus`.
-
-    With ``solids_only`` beams, springs, masses and shells on no solid are left out, and counted.
-
-    Numbers of nodes and elements are those of the file.  Where instances repeat them, they are
-    counted on through the file from 1.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)

@@ -56,15 +56,7 @@ def read_ansys_archive(
 ) -> MeshModel:
     """Read mesh, components and materials of an ANSYS archive.
 
-    Parameters
-    ----------
-    path : path
-    unit_length : float [m] or None
-        Unit of the coordinates.  None takes the one of the /UNITS command.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
-    solids_only : bool
-        Leave out beams, springs, masses and shells, and count them.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
 
     Returns
     -------
@@ -86,7 +78,7 @@ def read_ansys_archive(
     unit = _unit(path, archive) if unit_length is None else unit_length
     kinds, options = _element_types(archive)
     left_out = _left_out(archive, kinds) if solids_only else {}
-    _require_known(path, archive, kinds, solids_only=solids_only)
+    _require_known(archive, kinds, solids_only=solids_only)
     element_kind = _look_up(kinds, archive.elements.kind)
     solid = np.isin(element_kind, list(_SOLID_TYPES))
     table = _subset(archive.elements, solid)
@@ -187,9 +179,7 @@ def _left_out(archive: Archive, kinds: Mapping[int, int]) -> dict[str, int]:
     return counts
 
 
-def _require_known(
-    path: Path, archive: Archive, kinds: Mapping[int, int], *, solids_only: bool
-) -> None:
+def _require_known(archive: Archive, kinds: Mapping[int, int], *, solids_only: bool) -> None:
     for label in np.unique(archive.elements.kind).tolist():
         kind = kinds.get(label, 0)
         if kind in _SOLID_TYPES | _MARKERS | _PASSED_OVER:

@@ -56,15 +56,8 @@ def read_gmsh(
 ) -> MeshModel:
     """Read the mesh of a Gmsh file.
 
-    Parameters
-    ----------
-    path : path
-    unit_length : float [m]
-        What the file's unit of length is.  Such files do not say.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
-    solids_only : bool
-        Leave out shells on no solid, and count them; curves and points are node sets anyway.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
+    ``solids_only`` leaves out shells on no solid; curves and points are node sets anyway.
 
     Returns
     -------

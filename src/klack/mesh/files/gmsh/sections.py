@@ -203,7 +203,7 @@ class _Reader:
         self._content.node_parts.append(numbers)
         self._content.point_parts.append(points)
 
-    def _take(self, place: str, kind: int, groups: tuple[int, ...], rows: Ints) -> None:
+    def _take(self, kind: int, groups: tuple[int, ...], rows: Ints) -> None:
         """Take elements: number and nodes in every row."""
         self._content.elements.append(GmshElements(kind, groups, rows[:, 0], rows[:, 1:]))
 
@@ -253,7 +253,7 @@ class _Reader:
         for label in np.unique(group).tolist():
             own = rows[group == label]
             groups = (abs(label),) if label else ()
-            self._take(place, kind, groups, np.delete(own, np.s_[1 : 1 + tags], axis=1))
+            self._take(kind, groups, np.delete(own, np.s_[1 : 1 + tags], axis=1))
 
     def _new(self, name: str, place: str, stream: Stream) -> None:
         if name == "Entities":
@@ -276,7 +276,7 @@ class _Reader:
                 width = 1 + self._node_count(place, third)
                 rows = stream.sizes(count * width).reshape(count, width)
                 groups = self._content.groups.get((first, second), ())
-                self._take(place, third, groups, rows)
+                self._take(third, groups, rows)
 
     def _entity(self, dimension: int, stream: Stream) -> None:
         tag = int(stream.whole(1)[0])

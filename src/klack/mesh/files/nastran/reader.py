@@ -73,15 +73,7 @@ def read_nastran(
 ) -> MeshModel:
     """Read mesh, materials and sections of a Nastran file.
 
-    Parameters
-    ----------
-    path : path
-    unit_length : float [m]
-        What the file's unit of length is.  Such files do not say.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
-    solids_only : bool
-        Leave out beams, springs, masses and shells on no solid, and count them.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
 
     Returns
     -------

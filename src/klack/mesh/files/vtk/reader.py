@@ -76,16 +76,7 @@ def read_vtk(
 ) -> MeshModel:
     """Read the mesh of a VTK file.
 
-    Parameters
-    ----------
-    path : path
-        Ends in ``.vtk`` or ``.vtu``.
-    unit_length : float [m]
-        What the file's unit of length is.  Such files do not say.
-    solids : sequence of str or None
-        Keep these solids only; None keeps all.
-    solids_only : bool
-        Leave out surface cells on no solid, and flat cells of other kinds, and count them.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
 
     Returns
     -------

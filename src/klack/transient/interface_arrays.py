@@ -1,0 +1,148 @@
+"""What the compiled step of the interface level works on: named groups of arrays."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "CONTACT_STEPS",
+    "DAMPING",
+    "DEBT",
+    "DIRECTION",
+    "GUIDE",
+    "GUIDE_STRAIN",
+    "OPEN_STEPS",
+    "ROUNDS",
+    "WORK",
+    "ActiveSet",
+    "Bore",
+    "ContactPoints",
+    "Modes",
+    "Outside",
+    "Record",
+    "State",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Cube = NDArray[np.float64]
+
+DAMPING = 0
+WORK = 1  # of the constant force
+GUIDE = 2  # loss: friction and its numerical part
+DEBT = 3  # energy that the contact has still to pay
+GUIDE_STRAIN = 4  # energy held
+OPEN_STEPS = 5  # since the last contact, -1 before the first
+ROUNDS = 6  # of the complementarity solver
+CONTACT_STEPS = 7
+DIRECTION = 8  # sign of the last axial contact force, 0 before the first
+_BOOKS = 9
+
+
+class Modes(NamedTuple):
+    """Modal coordinates of all bodies over one step."""
+
+    A11: Vector  # (M,) exact propagator, :mod:`klack.simulation.propagator`
+    A12: Vector
+    A21: Vector
+    A22: Vector
+    B1: Vector
+    B2: Vector
+    loss: Matrix  # (6, M) Q11, Q12, Q22, L1, L2, S of the damping; (0, M): undamped
+    push: Vector  # (M,) modal force of 1 N along +z on the moving body, spread over its mass
+    drift: Matrix  # (bodies, M) centres of mass along z
+
+
+class Outside(NamedTuple):
+    """Forces along +z on the moving body."""
+
+    constant: float  # [N]
+    spring: float  # [N/m] pulls back to where q = 0
+
+
+class ContactPoints(NamedTuple):
+    """Points that may close; none in flight, where no contact is looked at."""
+
+    A: Matrix  # (n, n) [m/N] of ``contact_compliance``
+    traces: Matrix  # (n, M)
+    gap: Vector  # (n,) [m] at q = 0
+    axial: Vector  # (n,)
+
+
+class Bore(NamedTuple):
+    """Guide at k heights of the shaft."""
+
+    traces: Cube  # (k, 2, M) displacement of the shaft across the axis
+    slide: Matrix  # (k, M) the same along it
+    offset: Matrix  # (k, 2) [m] position across the axis at q = 0
+    clearance: Vector  # (k,) [m]
+    compliance: Cube  # (k, 2, 2) [m/N]
+    friction: Vector  # (k,) [-]
+    viscous: Vector  # (k,) [N s/m]
+    slip_speed: float  # [m/s] below it Coulomb friction fades out
+
+    @classmethod
+    def none(cls, modes: int) -> Self:
+        """Return a guide without a height."""
+        empty = np.zeros(0)
+        across, along = np.zeros((0, 2, modes)), np.zeros((0, modes))
+        return cls(across, along, np.zeros((0, 2)), empty, np.zeros((0, 2, 2)), empty, empty, 1.0)
+
+
+class ActiveSet(NamedTuple):
+    """Contact points that carry, and the inverse of their compliance."""
+
+    active: NDArray[np.bool_]  # (n,)
+    points: NDArray[np.int64]  # (n,) the first ``counts[0]`` of them carry
+    inverse: Matrix  # (n, n) [N/m] of A over these points, in this order
+    counts: NDArray[np.int64]  # points that carry; changes since the inverse was computed afresh
+
+    @classmethod
+    def none(cls, points: int) -> Self:
+        """Return the set in which no point carries."""
+        order = np.zeros(points, dtype=np.int64)
+        inverse, counts = np.zeros((points, points)), np.zeros(2, dtype=np.int64)
+        return cls(np.zeros(points, dtype=bool), order, inverse, counts)
+
+
+class State(NamedTuple):
+    """Where the bodies and their contact are, changed in place."""
+
+    q: Vector  # (M,)
+    v: Vector  # (M,)
+    lam: Vector  # (n,) [N] contact forces
+    contact: ActiveSet
+    carried: NDArray[np.bool_]  # (n,) points that have carried a force
+    guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
+    books: Vector  # sums, see ``DAMPING`` and the following names
+
+    @classmethod
+    def still(cls, modes: int, points: int, heights: int) -> Self:
+        """Return a state of rest at q = 0."""
+        return cls(
+            np.zeros(modes),
+            np.zeros(modes),
+            np.zeros(points),
+            ActiveSet.none(points),
+            np.zeros(points, dtype=bool),
+            np.zeros((heights, 2)),
+            np.zeros(_BOOKS),
+        )
+
+
+class Record(NamedTuple):
+    """Out: one entry per step."""
+
+    force: Vector  # [N] mean axial contact force
+    gap: Vector  # [m] mean smallest gap
+    drift: Matrix  # (steps, bodies) [m/s] speed of the centres of mass at the end of the step
+    outside: Vector  # [N] mean axial force from outside
+    points: NDArray[np.float32]  # (steps, n) [N] mean force of every point, or (0, n)
+
+    @classmethod
+    def empty(cls, steps: int, bodies: int, points: int, *, keep_points: bool) -> Self:
+        """Return room for so many steps."""
+        force, gap, outside = np.zeros((3, steps))
+        rows = np.zeros((steps if keep_points else 0, points), dtype=np.float32)
+        return cls(force, gap, np.zeros((steps, bodies)), outside, rows)
