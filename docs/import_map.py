@@ -46,7 +46,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("transient", "acoustics", "measurement"),
     # from a case to results
     ("case", "report"),
-    ("assembling",),
+    ("assembling", "terminal"),
     ("analyses",),
     ("exchange",),
     ("verification", "api"),
@@ -57,17 +57,6 @@ FLOORS: tuple[tuple[str, ...], ...] = (
 
 GROUND = 6
 """Floors of single small modules that everything stands on: one row of the picture."""
-
-KNOWN_CIRCLES: Mapping[str, int] = {
-    "network": 2,  # a component adds rows, and rows know their component by type
-}
-"""Files in circles, by room.  The list may only shrink."""
-
-KNOWN_UPWARD: Mapping[tuple[str, str], str] = {
-    ("klack.network.network", "klack.hydraulics.fluid"): "type of the fluid that it hands on",
-    ("klack.network.rows", "klack.hydraulics.fluid"): "type of the fluid that it hands on",
-}
-"""Imports of a higher floor, with the reason.  The list may only shrink."""
 
 Graph = Mapping[str, Iterable[str]]
 
@@ -155,7 +144,7 @@ def room_graph(graph: Graph) -> dict[str, set[str]]:
     for importer, targets in graph.items():
         for imported in targets:
             pair = room_of(importer), room_of(imported)
-            if DOOR not in pair and pair[0] != pair[1] and (importer, imported) not in KNOWN_UPWARD:
+            if DOOR not in pair and pair[0] != pair[1]:
                 rooms[pair[0]].add(pair[1])
     return rooms
 

@@ -31,6 +31,7 @@ collect_ignore_glob = [
     "json_schema_check.py",
     "mutated_cases.py",
     "property_profiles.py",
+    "quoted_output.py",
     "rigid_valve.py",
     "data/*.py",
 ]

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from klack.analyses.json_results import result_schema
-from klack.cli import output
+from klack.terminal import output
 
 __all__ = ["every_result_is_documented", "require_documented"]
 

@@ -5,6 +5,7 @@ returned it, and returns a :class:`Result`.
 """
 
 import json
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +13,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
@@ -26,7 +27,6 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.progress import Progress, silent
-from klack.report.chart import BarChart
 
 __all__ = [
     "CaseOnHand",
@@ -132,6 +132,9 @@ class CaseOnHand:
                 where, got=problem.got, expected=problem.expected, hint=problem.hint
             ) from None
 
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.title} ({self.tree.path.name})"
+
     def _repr_html_(self) -> str:
         return (
             f"<b>{escape(self.title or self.name)}</b><br>{escape(self.checked.description)}"
@@ -179,7 +182,7 @@ class Result:
     """
 
     record: Any
-    analysis: Analysis[Any]
+    analysis: StoredAnalysis[Any]
 
     @cached_property
     def measures(self) -> Mapping[str, Mapping[str, Number]]:
@@ -187,8 +190,9 @@ class Result:
         found: dict[str, dict[str, Number]] = {}
         for name, of, measures in self.analysis.measured(self.record):
             values = json_of(measures, of)
+            settled = {item.json_key: item.settled(of) for item in measures}
             found[name] = {
-                item.key: Number(values[item.json_key], item.unit, item) for item in measures
+                item.key: Number(values[key], item.unit, item) for key, item in settled.items()
             }
         return found
 
@@ -233,7 +237,7 @@ class Result:
         """
         from klack.exchange.results.dataset import dataset_of
 
-        return dataset_of(self.record, run)
+        return dataset_of(self.record, self.analysis.measured(self.record), run)
 
     def __repr__(self) -> str:
         lines = [f"{self.analysis.form.command}: {self.record.title or self.record.case}"]
@@ -252,11 +256,10 @@ class Result:
         charts = [chart for section in content.sections for chart in section.charts]
         figure = ""
         if charts:
-            from klack.report.printed import svg_bars, svg_chart
+            from klack.report.printed import png_chart
 
-            first = charts[0]
-            drawn = svg_bars(first) if isinstance(first, BarChart) else svg_chart(first)
-            figure = drawn.decode()[drawn.decode().index("<svg") :]
+            pixels = b64encode(png_chart(charts[0])).decode()
+            figure = f'<img alt="{escape(charts[0].title)}" src="data:image/png;base64,{pixels}">'
         return (
             f"<b>{escape(content.title)}</b><br>{escape(content.subtitle)}"
             f"<p>{escape(content.answer)}</p>"

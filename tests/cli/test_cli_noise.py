@@ -16,7 +16,7 @@ import pytest
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
-from klack.analyses.noise.summary import NOISE_COLUMNS, noise_rows
+from klack.analyses.noise.summary import noise_told
 from klack.cli.main import main
 
 ROOT = Path(__file__).parents[2]
@@ -126,8 +126,9 @@ def test_sounds_have_the_stated_level(heard, numbers):
 def test_the_table_says_how_levels_are_weighted(heard):
     """A-weighting takes from what is radiated below 1 kHz and adds a decibel at 2 to 4 kHz."""
     study = NOISE.load(heard)
-    (row,) = noise_rows(study)
-    shown = dict(zip(NOISE_COLUMNS, row, strict=True))
+    (table,) = noise_told(study)
+    (row,) = table.rows
+    shown = dict(zip(table.columns, row, strict=True))
     levels = study.designs[0].sound.statistics
 
     assert float(shown["SEL [dBA]"]) == pytest.approx(levels.exposure_level_A, abs=0.05)
@@ -197,9 +198,9 @@ def test_differences_of_two_designs_are_levels(heard):
     bodies = tuple(replace(body, injected=2.0 * body.injected) for body in design.bodies)
     loud = replace(design, name="loud", net_share=4.0 * design.net_share, bodies=bodies)
 
-    *_, row = noise_rows(replace(study, designs=(design, loud)))
+    (table,) = noise_told(replace(study, designs=(design, loud)))
 
-    shown = dict(zip(NOISE_COLUMNS, row, strict=True))
+    shown = dict(zip(table.columns, table.rows[-1], strict=True))
     assert shown["design"] == f"loud - {design.name}"
     assert shown["force [dB]"] == "+6.0 dB"
     assert shown["injected [uJ]"] == "+3.0 dB"
@@ -284,7 +285,7 @@ def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):
         for name, unit in (
             ("structure-borne energy injected", "uJ"),
             ("sound exposure level", "dB"),
-            ("the same, A-weighted", "dB"),
+            ("the same, A-weighted", "dBA"),
             ("loudness, loudest moment", "sone"),
         )
     )

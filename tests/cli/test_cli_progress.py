@@ -9,7 +9,7 @@ import pytest
 
 pty = pytest.importorskip("pty")
 
-from klack.cli.progress import show_progress  # noqa: E402
+from klack.terminal.progress import show_progress  # noqa: E402
 
 
 class Screen:

@@ -116,7 +116,7 @@ def test_ctrl_c_keeps_the_finished_shots(monkeypatch, capsys):
 
     assert main(["shots", str(CASE), "-q"]) == 130
     error = capsys.readouterr().err
-    assert f"2 of 6 shots are kept in klack-results/guided_needle/{SHOT_LOG.file}" in error
+    assert f"2 finished shots are kept in klack-results/guided_needle/{SHOT_LOG.file}" in error
 
 
 @pytest.mark.parametrize(

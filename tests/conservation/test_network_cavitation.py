@@ -11,7 +11,7 @@ from rigid_valve import RELIEF_VALVE
 
 from klack.case.reader import parse, validated
 from klack.case.valve import ValveCase
-from klack.simulation.network_kernel import _bracketed
+from klack.simulation.network_pressures import bracketed
 from klack.simulation.network_run import simulate_network
 
 
@@ -40,5 +40,5 @@ def test_a_root_between_two_misleading_slopes_is_found():
 
     x, lower, upper = 2.0, 0.0, np.inf
     for _ in range(60):
-        x, lower, upper = _bracketed(x + step(x), x, lower, upper)
+        x, lower, upper = bracketed(x + step(x), x, lower, upper)
     assert x == pytest.approx(0.9, abs=1e-12)

@@ -209,7 +209,7 @@ def readable(out: Path) -> bool:
 
 def can_be_read(out: Path) -> bool:
     from klack.analyses.catalogue import load_result
-    from klack.cli.stored import is_result
+    from klack.analyses.result_folder import is_result
     from klack.errors import InputError
 
     if not is_result(out):
@@ -275,7 +275,12 @@ def warm() -> None:
     """
     import importlib
 
-    modules = ["scipy.sparse.linalg", "zarr", "klack.cli.stored", "klack.case.valve_reader"]
+    modules = [
+        "scipy.sparse.linalg",
+        "zarr",
+        "klack.analyses.result_folder",
+        "klack.case.valve_reader",
+    ]
     stored = ("impact", "stroke", "shots", "noise")
     for analysis in (*stored, "reduction", "calibration"):
         modules += [f"klack.analyses.{analysis}.run"]

@@ -102,7 +102,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     """Which of the two results stands in a folder: a, b, none or mixed."""
     from klack.analyses.catalogue import load_result
     from klack.analyses.noise.summary import noise_to_json
-    from klack.cli.stored import is_result
+    from klack.analyses.result_folder import is_result
     from klack.errors import InputError
     from klack.whole_file import completed
 

@@ -11,12 +11,12 @@ import pytest
 from numba import njit
 
 from klack.network.step_function import first
-from klack.simulation.network_kernel import _solve
+from klack.simulation.network_pressures import solve_mass_balance
 
 
 @njit
 def solved(A, own, r):
-    _solve(first(A), first(own), first(r), len(r))
+    solve_mass_balance(first(A), first(own), first(r), len(r))
 
 
 def exactly(storage, channels, r):

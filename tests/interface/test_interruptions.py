@@ -19,7 +19,7 @@ from rigid_valve import write_bench
 from klack.analyses.calibration.log import TRIAL_LOG, TrialKey, trial_log
 from klack.analyses.calibration.motion import Motion
 from klack.analyses.catalogue import load_result
-from klack.cli.stored import is_result
+from klack.analyses.result_folder import is_result
 from klack.errors import InputError
 from klack.folder_lock import locked
 from klack.held_folder import HeldFolder

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from klack.analyses.json_results import MEASURES, result_schema
+from klack.analyses.catalogue import ANALYSES, analyses
+from klack.analyses.json_results import result_schema
 from klack.analyses.measures import Column, Measure, json_of
+from klack.analyses.named import named
 
 DOCS = Path(__file__).parents[2] / "docs"
+MEASURES = {of: found for a in analyses() for of, found in a.measures.items()}
 EVERY = [(of, item) for of, measures in MEASURES.items() for item in measures]
 
 
@@ -22,21 +25,64 @@ def test_a_measure_is_described_whole(of: str, measure: Measure):
 
 def test_keys_are_unique_in_their_catalogue():
     for of, measures in MEASURES.items():
-        keys = [item.json_key for item in measures]
-        assert len(keys) == len(set(keys)), of
+        for keys in ([item.json_key for item in measures], [item.key for item in measures]):
+            assert len(keys) == len(set(keys)), of
 
 
 def test_the_schema_has_every_measure():
-    parts = result_schema()["$defs"]
-    for part, of in (
-        ("LevelJson", "impact level"),
-        ("DeviationJson", "difference of two levels"),
-        ("EventJson", "impact of a stroke"),
-        ("VariantJson", "stroke variant"),
-        ("ShotJson", "shot"),
-    ):
-        for item in MEASURES[of]:
-            assert parts[part]["properties"][item.json_key]["description"] == item.definition
+    parts = result_schema()["$defs"].values()
+    described = [part["properties"] for part in parts]
+    for of, measures in MEASURES.items():
+        words = {item.json_key: item.definition for item in measures}
+        assert any(
+            all(keys.get(key, {}).get("description") == text for key, text in words.items())
+            for keys in described
+        ), of
+
+
+@pytest.mark.parametrize("entry", ANALYSES, ids=lambda entry: entry.place)
+def test_what_the_catalogue_names_is_there(entry):
+    """Texts that name an analysis, its page and its command lead somewhere; forms are its own."""
+    analysis = named(entry.place)
+
+    assert (analysis.form.name if entry.form else "") == entry.form
+    if entry.form:
+        assert callable(named(analysis.page))
+    if entry.example:
+        assert entry.command.__name__ == entry.example.split()[1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "value", "other", "shown"),
+    [
+        ("difference", "dB", 61.25, 58.25, "+3.0 dB"),
+        ("difference", "dB", 58.249, 58.25, "+0.0 dB"),  # no minus in front of nothing
+        ("energy", "J", 2.0, 1.0, "+3.0 dB"),  # 10 lg 2 = 3.01
+        ("amplitude", "N", 1.0, 2.0, "-6.0 dB"),  # 20 lg 2 = 6.02
+        ("factor", "sone", 3.0, 2.0, "x 1.5"),
+        ("energy", "J", 0.0, 1.0, "–"),
+        ("factor", "sone", 1.0, float("nan"), "–"),
+        ("difference", "dB", float("nan"), 1.0, "–"),
+    ],
+)
+def test_how_far_two_designs_are_apart(kind, unit, value, other, shown):
+    measure = Measure[float](
+        key="level", name="level", symbol="", unit=unit, definition="A.", source="",
+        read=lambda number: number, deviation=kind,
+    )  # fmt: skip
+    assert measure.apart(value, other) == shown
+
+
+def test_a_number_in_the_unit_of_its_own():
+    measure = Measure[tuple[float, str]](
+        key="value", name="value", symbol="", unit="", definition="A.", source="",
+        read=lambda of: of[0], unit_of=lambda of: of[1], digits_of=lambda of: 3,
+    )  # fmt: skip
+    assert measure.json_key == "value"
+    assert measure.on_page((1.5e-5, "m")).split() == ["15.0", "µm"]
+    assert measure.cell((1.5e-5, "m")).split() == ["15", "um"]
+    assert measure.on_page((0.0123, "")) == "0.0123"
+    assert measure.on_page((float("inf"), "m")) == measure.cell((float("nan"), "m")) == "–"
 
 
 def test_what_does_not_exist_is_null_and_a_dash():

@@ -40,6 +40,10 @@ class TestValues:
         same = [line for line in case.text.splitlines() if line in other.text.splitlines()]
         assert len(same) == len(case.text.splitlines()) - 1
 
+    def test_a_case_prints_as_one_line(self):
+        case = klack.load_case("two-rods")
+        assert repr(case) == f"two-rods: {case.title} (case.yaml)"
+
     def test_a_default_is_written_where_it_was_not(self):
         case = klack.load_case("two-rods")
         assert "interface_step" not in case.text
@@ -96,10 +100,35 @@ class TestResults:
         with pytest.raises(InputError, match="one of: reduced"):
             rods.to_xarray("full")
 
+    def test_noise_as_a_dataset(self):
+        """Truth = the record, and Parseval: the bands hold the energy of the sound."""
+        case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
+        heard = klack.noise_of(klack.run_impact(case, ["reduced"], certify=False))
+        design = heard.record.reference
+        data = heard.to_xarray()
+        sound = design.sound
+        assert sound is not None
+        np.testing.assert_array_equal(data.sound_pressure, sound.pressure.values)
+        assert data.sound_pressure.attrs["units"] == "Pa"
+        # between 20 Hz and 20 kHz lies nearly all of it
+        exposure = float((data.sound_pressure**2).integrate("sound_pressure_time"))
+        audible = data.band < 20.5e3
+        assert float(data.sound_exposure.sum()) <= exposure
+        assert bool(data.sound_exposure[audible].notnull().all())
+        assert bool(data.sound_exposure[~audible].isnull().all())
+        middle = sound.bands.middle
+        np.testing.assert_allclose(data.sound_exposure.sel(band=middle), sound.bands.energy, rtol=0)
+        force = design.stops[0]
+        np.testing.assert_array_equal(data.contact_force_energy, force.bands.energy)
+        np.testing.assert_array_equal(data.contact_force_level, force.level)
+        with pytest.raises(InputError, match=f"one of: {design.name}"):
+            heard.to_xarray("loud")
+
     def test_a_notebook_shows_numbers_warnings_and_a_figure(self, rods: klack.Result):
         page = rods._repr_html_()
         assert "<table>" in page
-        assert "<svg" in page
+        assert "data:image/png" in page
+        assert len(page) < 200_000
         assert "peak force" in page
 
     def test_a_stored_result_is_the_same(self, rods: klack.Result, tmp_path: Path):

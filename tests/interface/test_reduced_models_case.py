@@ -13,6 +13,7 @@ from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.summary import study_to_json
+from klack.analyses.reduction.analysis import REDUCTION
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.given_pair import build_given_pair
 from klack.case import load_case, shipped_cases
@@ -123,8 +124,10 @@ def test_study_is_stored_reported_and_exported(tmp_path):
     assert [model.name for model in models.body_models()] == ["needle", "seat"]
     reduced = run_reduce(case)
     assert [body.name for body in reduced.bodies] == ["needle", "seat"]
-    assert reduced.to_json()["bodies"]["needle"]["mass_kg"] == pytest.approx(NEEDLE.mass)
-    assert len(reduced.rows()) == 2
+    numbers = REDUCTION.to_json(reduced)
+    assert numbers["bodies"]["needle"]["mass_kg"] == pytest.approx(NEEDLE.mass)
+    (table,) = REDUCTION.told(reduced)
+    assert len(table.rows) == 2
 
 
 def test_hertz_law_by_its_modulus(tmp_path):

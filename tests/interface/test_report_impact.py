@@ -23,7 +23,7 @@ from klack.report.chart import AxisSpec, BarChart, Chart, Curve, Mark, Panel
 from klack.report.html import render_html, write_report
 from klack.report.interactive import plotly_bars, plotly_chart
 from klack.report.pdf import render_pdf, write_pdf
-from klack.report.printed import svg_bars, svg_chart
+from klack.report.printed import svg_chart
 from klack.report.wording import quantity
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
@@ -232,7 +232,7 @@ def test_bars_are_drawn_by_both_renderers(impact_study: ImpactStudy) -> None:
     bars = next(chart for chart in charts(impact_study) if isinstance(chart, BarChart))
 
     go.Figure(json.loads(json.dumps(plotly_bars(bars), allow_nan=False)))
-    assert svg_bars(bars).startswith(b"<?xml")
+    assert svg_chart(bars).startswith(b"<?xml")
 
 
 def test_section_figure_leaves_the_closing_motion_out_of_the_shape(

@@ -8,11 +8,10 @@ import pytest
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.summary import (
-    SUMMARY_COLUMNS,
     answer_line,
     contact_doubt,
     study_to_json,
-    summary_rows,
+    study_told,
 )
 from klack.analyses.impact.wording import answer
 from klack.report.wording import listed, quantity, share, signed, signed_share
@@ -82,10 +81,11 @@ def test_a_doubtful_contact_goes_with_every_number(impact_study: ImpactStudy) ->
 
 
 def test_summary_rows_fit_their_columns(impact_study: ImpactStudy) -> None:
-    rows = summary_rows(impact_study)
+    table = next(iter(study_told(impact_study)))
+    rows = table.rows
 
     assert [row[0] for row in rows] == ["full", "reduced"]
-    assert all(len(row) == len(SUMMARY_COLUMNS) for row in rows)
+    assert all(len(row) == len(table.columns) for row in rows)
     assert rows[0][2] == "15.000"
 
 
@@ -103,7 +103,7 @@ def test_a_rebound_that_loses_little_is_not_rounded_to_none(lonely_study: Impact
 def test_a_run_that_ends_in_the_contact_says_so_everywhere(lonely_study: ImpactStudy) -> None:
     """Terminal, report, JSON: no peak, contact time or impulse that was not reached."""
     study = with_restitution(lonely_study, float("nan"))
-    row = summary_rows(study)[0]
+    row = next(iter(study_told(study))).rows[0]
     assert all(cell.endswith(" (cut off)") for cell in row[1:4])
     assert row[4] == "–"
     assert "cut off in contact" in answer_line(study)
@@ -127,7 +127,7 @@ def test_peak_and_contact_time_of_several_contacts_are_told_apart(
     level = lonely_study.levels["reduced"]
     measures = replace(level.measures, sub_contacts=3, strongest=2)
     study = replace(lonely_study, levels={"reduced": replace(level, measures=measures)})
-    row = summary_rows(study)[0]
+    row = next(iter(study_told(study))).rows[0]
     assert row[1].endswith("(contact 2 of 3)")
     assert row[2].endswith("(contact 1 of 3)")
     assert study_to_json(study)["levels"]["reduced"]["strongest_contact"] == 2

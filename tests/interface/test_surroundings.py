@@ -15,8 +15,8 @@ import pytest
 
 from klack.analyses.catalogue import load_result
 from klack.cli.main import main
-from klack.cli.printable import printable
 from klack.errors import InputError
+from klack.terminal.printable import printable
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="mounts and capabilities")
 

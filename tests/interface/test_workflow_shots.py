@@ -13,15 +13,15 @@ from klack.analyses.shots.log import SHOT_LOG, shot_log, shots_mark
 from klack.analyses.shots.measures import FIRST_IMPACT
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
-from klack.analyses.shots.pool import run_shots_on
 from klack.analyses.shots.record import ShotColumns
-from klack.analyses.shots.run import judge_rule, run_shots
+from klack.analyses.shots.run import judge_rule, run_shots, run_shots_on
 from klack.analyses.shots.summary import (
     DISTRIBUTION_COLUMNS,
     distribution_rows,
     shots_to_json,
 )
 from klack.analyses.store import stored_format
+from klack.api import Result
 from klack.case import load_case
 from klack.errors import ConvergenceError, InputError
 from klack.progress import silent
@@ -192,9 +192,7 @@ def test_shots_whose_workers_die_end_with_a_way_out(model, draws, alone, tmp_pat
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     log = shot_log(None, "")
     log.add(0, alone[0])
-    words = (
-        r"shots: a worker process died with exit code 3; 1 of 4 shots are finished\.\nTry: fewer"
-    )
+    words = r"a worker process died with exit code 3; finished shots so far: 1\.\nTry: fewer"
     with pytest.raises(ConvergenceError, match=words):
         run_shots_on(2, model.setup, draws, log, silent)
 
@@ -257,3 +255,27 @@ def test_the_rule_is_judged_by_the_restitution_of_the_highest_shot():
     assert wrong.rank == 0
     assert "wrong for this valve" in wrong.sentence
     assert "-2.50 %" in wrong.sentence
+
+
+def test_shots_as_a_dataset(study):
+    """Truth = the record, shot by shot; the last row is the centred drop."""
+    xarray = pytest.importorskip("xarray")
+    data = Result(study, SHOTS).to_xarray()
+    assert isinstance(data, xarray.Dataset)
+    assert data.shot.values.tolist() == [1, 2, 3, 4, 0]
+    for index in range(4):
+        row = study.shots.row(index)
+        shot = data.sel(shot=index + 1)
+        assert {key: float(shot[key]) for key in row} == pytest.approx(row, nan_ok=True, rel=0)
+        np.testing.assert_array_equal(shot.height, study.shot_traces.height[index])
+        np.testing.assert_array_equal(shot.contact_force, study.shot_traces.force[index])
+    assert float(data.restitution.sel(shot=0)) == study.centric.restitution[0]
+    np.testing.assert_array_equal(data.contact_force.sel(shot=0), study.centric_traces.force[0])
+    # mechanics: the impulse is the integral of the force, sampled 400 times
+    force = data.contact_force.sel(shot=0)
+    assert float(force.integrate("force_time")) == pytest.approx(
+        float(data.impulse.sel(shot=0)), rel=1e-3
+    )
+    assert data.peak_force.attrs["units"] == "N"
+    with pytest.raises(InputError, match="one of: shots"):
+        Result(study, SHOTS).to_xarray("1")

@@ -5,7 +5,9 @@ Truth: the exact answer of what the recipe makes, and the files that the pages n
 
 import ast
 import importlib.util
+import json
 import re
+import subprocess
 import sys
 from math import exp
 from pathlib import Path
@@ -15,11 +17,13 @@ import numpy as np
 import pytest
 
 from klack.case.valve_reader import load_valve_case
+from klack.cli.main import main
 from klack.errors import InputError
 from klack.mesh.files import catalogue as mesh_catalogue
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.network import catalogue
 from klack.network.network import Network
+from klack.report.wording import quantity
 from klack.simulation.network_run import simulate_network
 from klack.verification.lattice import lattice_mesh
 
@@ -147,6 +151,110 @@ def test_the_recipe_of_a_mesh_format_refuses_a_damaged_file(damage, medit_format
         read_mesh_file(file, None)
 
 
+RODS = ROOT / "tests" / "data" / "tiny_rods.yaml"
+EVERYWHERE = """
+import json
+from klack.analyses.catalogue import load_result, analysis_in
+from pathlib import Path
+from pydantic import TypeAdapter
+
+folder = Path("result")
+analysis, record = analysis_in(folder), load_result(folder)
+(table, *_) = analysis.told(record)
+content = analysis.content(record)
+print(json.dumps({
+    "told": dict(zip(table.columns, table.rows[0])),
+    "json": analysis.to_json(record),
+    "answer": content.answer,
+    "page": dict(content.numbers.rows),
+    "glossary": dict(content.definitions),
+    "schema": TypeAdapter(analysis.json).json_schema(),
+}))
+"""
+
+
+def python(code: str, folder: Path) -> dict:
+    """What a Python of its own prints as the last line, as JSON."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_the_recipe_of_a_measure(tmp_path, monkeypatch):
+    """One entry in one file; then tables, JSON, schema, report and glossary have it."""
+    (entry,) = blocks("a measure", "python")
+    monkeypatch.chdir(tmp_path)
+    words = ["--level", "reduced", "--no-certify", "--no-report", "--out", "result", "-q"]
+    assert main(["impact", str(RODS), *words]) == 0
+    source = ROOT / "src" / "klack" / "analyses" / "impact" / "measures.py"
+    text, end = source.read_text(encoding="utf-8"), ')\n"""In the order of JSON'
+    assert text.count(end) == 1
+    changed = tmp_path / "measures.py"
+    changed.write_text(text.replace(end, f"    {entry.rstrip()},\n{end}"), encoding="utf-8")
+
+    found = python(REPLACED.format(file=str(changed)) + EVERYWHERE, tmp_path)
+
+    level = found["json"]["levels"]["reduced"]
+    mean = level["impulse_Ns"] / level["total_contact_time_s"]
+    assert level["mean_force_N"] == pytest.approx(mean, rel=1e-12)
+    assert found["told"]["mean force [N]"] == f"{mean:.2f}"
+    assert found["page"]["mean force"].split() == quantity(mean, "N").split()
+    words = found["glossary"]["mean force"]
+    assert words == "Impulse over the time from first touch to the end of the last contact."
+    described = found["schema"]["$defs"]["LevelJson"]["properties"]["mean_force_N"]
+    assert described["description"] == words
+
+
+REPLACED = """
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location("klack.analyses.impact.measures", {file!r})
+sys.modules[spec.name] = module_from_spec(spec)
+spec.loader.exec_module(sys.modules[spec.name])
+"""
+ADDED = """
+import klack.analyses
+klack.analyses.__path__.append({folder!r})
+from klack.analyses import catalogue
+from klack.analyses.catalogue import Entry
+catalogue.ANALYSES = (*catalogue.ANALYSES, {line})
+from klack.cli.main import main
+words = ["--out", "result", "--json", "numbers.json", "--no-report"]
+assert main(["flight", {case!r}, *words]) == 0
+"""
+
+
+def test_the_recipe_of_an_analysis(tmp_path):
+    """One folder and one line; then there is a command, and what it leaves behind is read.
+
+    Truth: 3 um at 1.5 m/s are 2 us.
+    """
+    analysis, command, line = blocks("an analysis", "python")
+    folder = tmp_path / "more" / "flight"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    (folder / "analysis.py").write_text(analysis, encoding="utf-8")
+    (folder / "command.py").write_text(command, encoding="utf-8")
+    case = tmp_path / "rods.yaml"
+    text = RODS.read_text(encoding="utf-8")
+    case.write_text(
+        text.replace("gap: 0 um", "gap: 3 um").replace("speed: 1 m/s", "speed: 1.5 m/s")
+    )
+
+    code = ADDED.format(folder=str(folder.parent), line=line.strip(), case=str(case))
+    found = python(code + EVERYWHERE, tmp_path)
+
+    assert found["told"] == {"case": "rods", "flight time [us]": "2.000"}
+    assert found["json"]["flight_time_s"] == pytest.approx(2e-6, rel=1e-12)
+    assert found["json"] == json.loads((tmp_path / "numbers.json").read_text())
+    assert found["page"]["flight time"].split() == ["2.000", "µs"]
+    assert found["glossary"]["flight time"] == "Gap over speed."
+    assert found["schema"]["properties"]["flight_time_s"]["description"] == "Gap over speed."
+    assert found["answer"].split() == ["The", "needle", "flies", "for", "2.000", "µs."]
+
+
 def test_files_that_the_pages_name_are_there():
     package = ROOT / "src" / "klack"
     named = set(re.findall(r"`([\w/]+\.py)`", ARCHITECTURE + PAGE))
@@ -155,17 +263,25 @@ def test_files_that_the_pages_name_are_there():
 
     assert len(named) > 15
     # the recipes make them
-    assert missing == {"mechanics/dashpot.py", "mesh/files/medit/reader.py"}
+    assert missing == {
+        "mechanics/dashpot.py",
+        "mesh/files/medit/reader.py",
+        "flight/analysis.py",
+        "flight/command.py",
+    }
 
 
-def test_names_of_the_way_of_a_load_pattern_are_where_the_page_says():
+def test_names_that_stand_after_a_file_are_made_there():
     """A name after a file is made in that file: ``file``, ``name``."""
     pairs = re.findall(r"`([\w/]+\.py)`,\s+`(\w+)", ARCHITECTURE)
 
     assert len(pairs) >= 6
     for file, name in pairs:
         text = (ROOT / "src" / "klack" / file).read_text(encoding="utf-8")
-        assert re.search(rf"^(?:class|def) {name}\b", text, re.MULTILINE), (file, name)
+        assert re.search(rf"^(?:(?:class|def) {name}\b|{name}\b.* = )", text, re.MULTILINE), (
+            file,
+            name,
+        )
 
 
 @pytest.mark.parametrize("folder", ["exact", "convergence", "conservation", "reference", "cli"])

@@ -1,34 +1,19 @@
 """What every analysis has: how its record is stored, told, and put on a page."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from klack.analyses.measures import Measure
+from klack.analyses.named import named
 from klack.analyses.store import RecordFormat, load_record, save_record
 from klack.report.page import Content
+from klack.terminal.tables import Notes, TextTable
 
-__all__ = ["Analysis", "Measured", "Notes", "TextTable"]
+__all__ = ["Analysis", "Measured", "StoredAnalysis"]
 
 Kept = TypeVar("Kept")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextTable:
-    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Notes:
-    """Notes on what stands above them."""
-
-    notes: Sequence[str]
 
 
 Measured = tuple[str, Any, Sequence[Measure[Any]]]
@@ -49,26 +34,48 @@ class Analysis(Generic[Kept]):
 
     Parameters
     ----------
-    form : RecordFormat
-        How the record is stored.
-    content : callable
-        The report of a record.
+    json : type
+        Of what ``to_json`` returns: a typed dictionary whose ``schema`` names it.
     to_json : callable
         Its numbers, SI, the unit in the key.
     told : callable
         What a terminal shows of it: tables, lines and notes, in their order.
+    measures : mapping of str to tuple of Measure
+        Its catalogue, by what they are of.
     measured : callable
         What its measures are of: levels, variants, impacts, shots, by name.
+    """
+
+    json: Any
+    to_json: Callable[[Kept], Mapping[str, Any]]
+    told: Callable[[Kept], Iterable[TextTable | Notes | str]]
+    measures: Mapping[str, tuple[Measure[Any], ...]] = field(default_factory=dict)
+    measured: Callable[[Kept], Iterable[Measured]] = _nothing
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredAnalysis(Analysis[Kept]):
+    """An analysis whose record is stored and reported.
+
+    Parameters
+    ----------
+    form : RecordFormat
+        How the record is stored.
+    page : str
+        Function that makes the report of a record, ``"noise.content:noise_content"``; loaded with
+        all its figures when a report is asked for.
     renewed : callable
         Brings what an earlier version has stored to what this one stores.
     """
 
     form: RecordFormat
-    content: Callable[[Kept], Content]
-    to_json: Callable[[Kept], Mapping[str, Any]]
-    told: Callable[[Kept], Iterable[TextTable | Notes | str]]
-    measured: Callable[[Kept], Iterable[Measured]] = _nothing
+    page: str
     renewed: Callable[[Kept], Kept] = _unchanged
+
+    def content(self, record: Kept) -> Content:
+        """Report of a record, in words, tables and figures."""
+        content: Content = named(self.page)(record)
+        return content
 
     def save(self, record: Kept, folder: Path) -> Path:
         """Write ``folder/result.zarr``; an earlier result stays whole until this one is complete.

@@ -1,27 +1,87 @@
-"""All analyses that leave a record, by the name of its format; loaded when one is asked for."""
+"""All analyses; what a user can ask of klack is named here, and loaded when it is asked for."""
 
-from importlib import import_module
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from klack.analyses.analysis import Analysis
-from klack.analyses.store import stored_format
+from klack.analyses.named import named
 from klack.errors import InputError
 
-__all__ = ["analysis_in", "load_result"]
+if TYPE_CHECKING:
+    from klack.analyses.analysis import Analysis, StoredAnalysis
 
-_ANALYSES = {
-    "klack impact study": "impact.analysis:IMPACT",
-    "klack stroke study": "stroke.analysis:STROKE",
-    "klack shots study": "shots.analysis:SHOTS",
-    "klack noise study": "noise.analysis:NOISE",
-    "klack calibration": "calibration.analysis:CALIBRATION",
-    "klack measured strokes": "comparison.analysis:MEASURED_STROKES",
-    "klack measured shots": "comparison.analysis:MEASURED_SHOTS",
-}
+__all__ = ["ANALYSES", "Entry", "analyses", "analysis_in", "commands", "load_result"]
 
 
-def analysis_in(folder: Path) -> Analysis[Any]:
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One analysis.
+
+    Parameters
+    ----------
+    place : str
+        Of its :class:`~klack.analyses.analysis.Analysis`, ``"shots.analysis:SHOTS"``.
+    form : str
+        Name of the format of its record; empty where none is stored.
+    example : str
+        Of its command, ``"klack shots demo-shots"``: the function ``shots`` of the module
+        ``command`` in the same folder; empty without one.
+    """
+
+    place: str
+    form: str = ""
+    example: str = ""
+
+    @property
+    def command(self) -> Callable[..., int]:
+        """Function behind its command."""
+        found: Callable[..., int] = named(
+            f"{self.place.partition('.')[0]}.command:{self.example.split()[1]}"
+        )
+        return found
+
+
+ANALYSES: tuple[Entry, ...] = (
+    Entry(
+        "impact.analysis:IMPACT",
+        "klack impact study",
+        "klack impact demo-valve-axisymmetric --level reduced,interface",
+    ),
+    Entry(
+        "stroke.analysis:STROKE",
+        "klack stroke study",
+        "klack stroke demo-stroke --variant wet,dry",
+    ),
+    Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
+    Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
+    Entry(
+        "reduction.analysis:REDUCTION",
+        example="klack reduce demo-valve-axisymmetric --json reduced.json",
+    ),
+    Entry("advice.analysis:ADVICE", example="klack advise demo-valve-axisymmetric --error '2 %'"),
+    Entry("comparison.analysis:MEASURED_STROKES", "klack measured strokes"),
+    Entry("comparison.analysis:MEASURED_SHOTS", "klack measured shots"),
+    Entry("comparison.analysis:CALCULIX"),
+    Entry(
+        "calibration.analysis:CALIBRATION",
+        "klack calibration",
+        "klack calibrate measured --measurement dry=dry_strokes_synthetic.csv",
+    ),
+)
+
+
+def analyses() -> tuple["Analysis[Any]", ...]:
+    """All of them, loaded."""
+    return tuple(named(entry.place) for entry in ANALYSES)
+
+
+def commands() -> dict[Callable[..., int], str]:
+    """Commands of the analyses, with the example that the help of each shows."""
+    return {entry.command: entry.example for entry in ANALYSES if entry.example}
+
+
+def analysis_in(folder: Path) -> "StoredAnalysis[Any]":
     """Which analysis a stored result is of.
 
     Raises
@@ -29,8 +89,11 @@ def analysis_in(folder: Path) -> Analysis[Any]:
     InputError
         If there is no result, or it is of another kind.
     """
+    from klack.analyses.store import stored_format
+
     name = stored_format(folder)
-    if name not in _ANALYSES:
+    places = {entry.form: entry.place for entry in ANALYSES if entry.form}
+    if name not in places:
         raise InputError(
             f"result {folder}",
             got=f"a Zarr store with format {name!r}",
@@ -38,8 +101,7 @@ def analysis_in(folder: Path) -> Analysis[Any]:
             hint="give the folder that a command of klack wrote its result to; a later klack may "
             "know other kinds.",
         )
-    module, _, attribute = _ANALYSES[name].partition(":")
-    found: Analysis[Any] = getattr(import_module(f"klack.analyses.{module}"), attribute)
+    found: StoredAnalysis[Any] = named(places[name])
     return found
 
 

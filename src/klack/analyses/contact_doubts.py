@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from klack.analyses.json_results import ContactJson
+from klack.analyses.json_parts import ContactJson
 from klack.analyses.measures import number_or_none
 
 __all__ = ["MeshedContact", "contact_doubt", "contact_to_json"]

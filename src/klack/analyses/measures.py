@@ -4,30 +4,40 @@ From the description of a measure come its key in JSON, its column in tables, it
 its entry in the glossary, its attributes in exported files and its line in the reference.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from math import isfinite
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import isfinite, log10
+from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
+from klack.terminal.tables import TextTable
+from klack.units import format_si
 
 __all__ = [
     "Column",
     "Measure",
+    "cells",
     "described",
+    "described_in",
     "glossary",
+    "heads",
     "json_of",
-    "json_type",
     "number_or_none",
+    "page_cells",
+    "page_heads",
+    "text_table",
+    "with_measures",
 ]
 
 Of = TypeVar("Of", contravariant=True)
 
+Kind = TypeVar("Kind", bound=type)
+
 Value = float | int | bool | None
-Form = Literal["quantity", "fixed", "share", "power", "count", "signed", "signed share"]
 
 _SUFFIXES = {
     "N": "_N",
@@ -43,8 +53,13 @@ _SUFFIXES = {
     "acum": "_acum",
     "dB": "_dB",
     "dBA": "_dBA",
+    "um": "_um",
+    "kg": "_kg",
+    "m/N": "_m_per_N",
     "1": "",
+    "": "",
 }
+_LEVELS = {"amplitude": 20.0, "energy": 10.0}
 _KINDS: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": bool}
 
 
@@ -70,6 +85,16 @@ class Column:
     head: str = ""
 
 
+def _unread(_: Any) -> Value:
+    return None
+
+
+def _under(key: str, of: Any) -> Value:
+    """What stands under a key of a mapping, or is called so in a record."""
+    value: Value = of[key] if isinstance(of, Mapping) else getattr(of, key)
+    return value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measure(Generic[Of]):
     """One number that people name.
@@ -77,25 +102,27 @@ class Measure(Generic[Of]):
     Parameters
     ----------
     key : str
-        In JSON, before its unit.
+        In JSON, before its unit; ``json_name`` is used where that differs.
     name : str
-        In words; ``title`` is what a report calls it where that differs.
+        In words, those of the key by default; ``title`` is what a report calls it where that
+        differs.
     symbol : str
         In formulas.
     unit : str
-        SI, ``"1"`` for a pure number.
+        SI, ``"1"`` for a pure number; empty where ``unit_of`` tells it of each thing.
     definition : str
         One sentence; ``note`` may add to it in a glossary.
     source : str
-        Page of the theory, or standard.
+        Page of the documentation; see :func:`described_in`.
     read : callable
-        Its value [unit], nan or None where it does not exist.
+        Its value [unit], nan or None where it does not exist; what stands under its key by
+        default.
     kind : str
         A ``"number"``, a ``"whole"`` number or a ``"truth"`` value.
     form : str
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
-        ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, or
-        with a sign.
+        ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
+        is that of whole numbers, or with a sign.
     digits : int
     column : Column, optional
         Of tables on a terminal that show it.
@@ -104,20 +131,23 @@ class Measure(Generic[Of]):
     remark : callable
         Behind the value in tables, for example that it was cut off.
     deviation : str
-        How two runs are compared: ``"relative"`` or by their ``"difference"``.
+        How two runs are compared: by their ``"relative"`` or plain ``"difference"``, by the
+        ``"factor"`` between them, or by its level in dB, of an ``"amplitude"`` or an ``"energy"``.
     page : bool
         Whether it stands among the key numbers of a report.
     absent : str
         What tables say where there is no value.
+    unit_of, digits_of : callable, optional
+        Unit of the value of one thing, empty for a pure number; its significant digits.
     """
 
     key: str
-    name: str
-    symbol: str
-    unit: str
     definition: str
-    source: str
-    read: Callable[[Of], Value]
+    name: str = ""
+    symbol: str = ""
+    unit: str = "1"
+    source: str = ""
+    read: Callable[[Of], Value] = _unread
     kind: Literal["number", "whole", "truth"] = "number"
     form: Literal["quantity", "fixed", "share", "power", "count", "signed", "signed share"] = (
         "quantity"
@@ -126,11 +156,23 @@ class Measure(Generic[Of]):
     column: Column | None = None
     given: Callable[[Of], bool] = lambda _: True
     remark: Callable[[Of], str] = lambda _: ""
-    deviation: Literal["", "relative", "difference"] = ""
+    deviation: Literal["", "relative", "difference", "factor", "amplitude", "energy"] = ""
     page: bool = False
     absent: str = "–"
     title: str = ""
     note: str = ""
+    json_name: str = ""
+    unit_of: Callable[[Of], str] | None = None
+    digits_of: Callable[[Of], int] | None = None
+
+    def __post_init__(self) -> None:
+        """Take from the key what is not said."""
+        if not self.name:
+            object.__setattr__(self, "name", self.key.replace("_", " "))
+        if self.read is _unread:
+            object.__setattr__(self, "read", partial(_under, self.key))
+        if self.kind != "number" and self.form == "quantity":
+            object.__setattr__(self, "form", "count")
 
     @property
     def json_key(self) -> str:
@@ -140,7 +182,7 @@ class Measure(Generic[Of]):
         ...         source="", read=float).json_key
         'impulse_Ns'
         """
-        return self.key + _SUFFIXES[self.unit]
+        return self.json_name or self.key + _SUFFIXES[self.unit]
 
     @property
     def head(self) -> str:
@@ -152,6 +194,8 @@ class Measure(Generic[Of]):
     def cell(self, of: Of) -> str:
         """Value in its column on a terminal; a dash where it does not exist."""
         value = self.read(of)
+        if value is not None and isfinite(value) and self.unit_of is not None:
+            return format_si(value, self.unit_of(of), self.settled(of).digits)
         if self.column is None or value is None or not isfinite(value):
             return self.absent
         # whole numbers stay whole
@@ -169,14 +213,24 @@ class Measure(Generic[Of]):
     def on_page(self, of: Of) -> str:
         """Value in a report."""
         value = self.read(of)
-        return (self.absent if value is None else self.printed(value)) + self.remark(of)
+        if value is None or (self.unit_of is not None and not isfinite(value)):
+            return self.absent
+        return self.settled(of).printed(value) + self.remark(of)
+
+    def settled(self, of: Of) -> "Measure[Of]":
+        """The same in the unit of one thing, and in its digits."""
+        if self.unit_of is None:
+            return self
+        digits = self.digits if self.digits_of is None else self.digits_of(of)
+        return replace(self, unit=self.unit_of(of) or "1", digits=digits, unit_of=None)
 
     def printed(self, value: float) -> str:
         """A value of this kind as a report prints it."""
+        unit = {"1": "", "um": "µm"}.get(self.unit, self.unit)
         if self.form == "count":
             return count(int(value))
         if self.form == "fixed":
-            return fixed(value, self.digits, self.unit if self.unit != "1" else "")
+            return fixed(value, self.digits, unit)
         if self.form == "share":
             return share(value, self.digits)
         if self.form == "power":
@@ -185,7 +239,57 @@ class Measure(Generic[Of]):
             return signed(value, self.digits)
         if self.form == "signed share":
             return signed_share(value, self.digits)
-        return quantity(value, self.unit if self.unit != "1" else "", self.digits)
+        return quantity(value, unit, self.digits)
+
+    def apart(self, of: Of, reference: Of) -> str:
+        """How far a value is from that of a reference on a terminal: ``+3.0 dB``, ``x 1.2``.
+
+        Differences are those of levels.
+        """
+        values = (self.read(of), self.read(reference))
+        value, other = (float("nan") if item is None else float(item) for item in values)
+        if self.deviation == "factor" and value > 0.0 and other > 0.0:
+            return f"x {value / other:.3g}"
+        if self.deviation == "difference":
+            level = value - other
+        elif self.deviation in _LEVELS and value > 0.0 and other > 0.0:
+            level = _LEVELS[self.deviation] * log10(value / other)
+        else:
+            return self.absent
+        return f"{round(level, 1) + 0.0:+.1f} dB" if isfinite(level) else self.absent
+
+
+def described_in(source: str, *measures: Measure[Of]) -> tuple[Measure[Of], ...]:
+    """A catalogue: measures whose equations stand on one page of the documentation."""
+    return tuple(replace(item, source=item.source or source) for item in measures)
+
+
+def heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
+    """Heads of the columns of a terminal; measures without a column are left out."""
+    return tuple(measure.head for measure in measures if measure.column is not None)
+
+
+def cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
+    """One row below :func:`heads`."""
+    return tuple(measure.cell(of) for measure in measures if measure.column is not None)
+
+
+def text_table(
+    title: str, first: str, measures: Sequence[Measure[Of]], named: Iterable[tuple[str, Of]]
+) -> TextTable:
+    """A table for a terminal: things down, below their names, and their measures across."""
+    rows = tuple((name, *cells(measures, of)) for name, of in named)
+    return TextTable(title=title, columns=(first, *heads(measures)), rows=rows)
+
+
+def page_heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
+    """What a report calls its key numbers, those with ``page``."""
+    return tuple(measure.title or measure.name for measure in measures if measure.page)
+
+
+def page_cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
+    """Key numbers of a report in the order of :func:`page_heads`."""
+    return tuple(measure.on_page(of) for measure in measures if measure.page)
 
 
 def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
@@ -207,17 +311,20 @@ def _plain(value: Value, kind: str) -> Value:
     return {"number": float, "whole": int, "truth": bool}[kind](value)
 
 
-def json_type(
-    name: str, words: str, measures: Iterable[Measure[Any]], more: Mapping[str, Any] | None = None
-) -> Any:
-    """Type of what :func:`json_of` returns, with further keys, for the schema of results."""
+def with_measures(measures: Iterable[Measure[Any]]) -> Callable[[Kind], Kind]:
+    """Add what :func:`json_of` returns to a typed dictionary, for the schema of results."""
     keys: dict[str, Any] = {
         item.json_key: Annotated[_KINDS[item.kind], Field(description=item.definition)]
         for item in measures
     }
-    found: Any = TypedDict(name, {**keys, **(more or {})})  # type: ignore[misc]
-    found.__doc__ = words
-    return found
+
+    def extended(kind: Kind) -> Kind:
+        every = {**keys, **kind.__annotations__}
+        found: Any = TypedDict(kind.__name__, every)  # type: ignore[misc]
+        found.__doc__ = kind.__doc__
+        return cast(Kind, found)
+
+    return extended
 
 
 def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
@@ -227,7 +334,7 @@ def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
             "key": item.json_key,
             "name": item.name,
             "symbol": item.symbol,
-            "unit": item.unit,
+            "unit": item.unit or "that of the quantity",
             "definition": item.definition,
             "source": item.source,
         }
@@ -236,7 +343,9 @@ def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
 
 
 def glossary(measures: Iterable[Measure[Any]]) -> tuple[tuple[str, str], ...]:
-    """Names and definitions, for the end of a report."""
+    """Names and definitions of the key numbers of a report, for its end."""
     return tuple(
-        (item.title or item.name, f"{item.definition} {item.note}".strip()) for item in measures
+        (item.title or item.name, f"{item.definition} {item.note}".strip())
+        for item in measures
+        if item.page
     )

@@ -73,52 +73,33 @@ class CaseRecord(Record):
     own_components: Mapping[str, str] = field(default_factory=dict)
 
 
-class AnyRecord(Protocol):
-    """What can be read of every record, be it of one case or of several."""
-
+class _Head(Protocol):
     @property
-    def case(self) -> str:
-        """Name of the case, or names of all."""
-
+    def case(self) -> str: ...
     @property
-    def case_text(self) -> str:
-        """The files themselves."""
-
+    def case_text(self) -> str: ...
     @property
-    def own_components(self) -> Mapping[str, str]:
-        """Components that are not part of klack."""
-
+    def own_components(self) -> Mapping[str, str]: ...
     @property
-    def title(self) -> str:
-        """Of the case."""
-
+    def title(self) -> str: ...
     @property
-    def description(self) -> str:
-        """Of the case."""
-
+    def description(self) -> str: ...
     @property
-    def version(self) -> str:
-        """Of klack."""
-
+    def version(self) -> str: ...
     @property
-    def versions(self) -> Mapping[str, str]:
-        """Of the libraries."""
-
+    def versions(self) -> Mapping[str, str]: ...
     @property
-    def created(self) -> str:
-        """ISO 8601."""
-
+    def created(self) -> str: ...
     @property
-    def wall_time(self) -> float:
-        """Of the whole analysis [s]."""
-
+    def wall_time(self) -> float: ...
     @property
-    def stage_times(self) -> Mapping[str, float]:
-        """Wall time of each stage [s]."""
-
+    def stage_times(self) -> Mapping[str, float]: ...
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to know about the numbers."""
+    def warnings(self) -> tuple[str, ...]: ...
+
+
+class AnyRecord(_Head, Protocol):
+    """What can be read of every record, be it of one case (:class:`CaseRecord`) or of several."""
 
 
 class RunFields(TypedDict):

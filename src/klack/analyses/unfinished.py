@@ -7,13 +7,15 @@ a crash, and all behind it, is cut off and computed again.
 
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import FileIO
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
 
 import klack
 from klack.case.bodies import CaseBody
@@ -40,17 +42,21 @@ class LogForm(Generic[Key, Part]):
         With its version; a file of another one is written over.
     parts : str
         In words, for messages.
-    line : callable
-        Key and part as one line of JSON, without its end.
+    data : callable
+        Key and part as JSON has them; the shortest text of a double is read back exactly.
     read : callable
-        The same back; None for a line that is damaged.
+        The same back.
     """
 
     file: str
     format: str
     parts: str
-    line: Callable[[Key, Part], str] = field(repr=False)
-    read: Callable[[bytes], tuple[Key, Part] | None] = field(repr=False)
+    data: Callable[[Key, Part], Mapping[str, Any]] = field(repr=False)
+    read: Callable[[Mapping[str, Any]], tuple[Key, Part]] = field(repr=False)
+
+    def open(self, folder: Path | None, mark: str) -> "UnfinishedLog[Key, Part]":
+        """Open the log in a folder; in memory without one."""
+        return UnfinishedLog(self, folder, mark)
 
     def count(self, folder: Path) -> int:
         """How many finished parts the file in a folder holds."""
@@ -132,7 +138,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
         if self.path is None or self._file is None:
             return
         try:
-            _append(self._file, self.form.line(key, part).encode() + b"\n")
+            _append(self._file, json.dumps(self.form.data(key, part)).encode() + b"\n")
         except OSError as error:
             raise self._refuse(self.path, error) from error
 
@@ -165,10 +171,11 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
         """Read what an earlier run left, up to the first damaged line, and cut off the rest."""
         whole = file.tell()
         for line in file.read().split(b"\n")[:-1]:  # what follows the last end of line was cut off
-            found = self.form.read(line)
-            if found is None:
+            try:
+                key, part = self.form.read(json.loads(line))
+            except (ValueError, KeyError, TypeError, AttributeError):  # it is damaged
                 break
-            self.done[found[0]] = found[1]
+            self.done[key] = part
             whole += len(line) + 1
         file.truncate(whole)
 
@@ -206,20 +213,28 @@ def _opened(path: Path) -> int:
     return handle
 
 
-def fingerprint(bodies: Iterable[CaseBody], parts: Iterable[bytes]) -> str:
-    """Digest of all that decides the numbers of a work.
+class _Case(Protocol):
+    @property
+    def source(self) -> str: ...
+    @property
+    def bodies(self) -> Mapping[str, CaseBody]: ...
+
+
+def fingerprint(case: _Case, parts: Iterable[bytes]) -> str:
+    """Digest of all that decides the numbers of a work: case, its files, klack, NumPy, and more.
 
     Parameters
     ----------
-    bodies : iterable of CaseBody
-        Their meshes and drawings are read.
+    case : Case or ValveCase
+        Meshes and drawings of its bodies are read.
     parts : iterable of bytes
-        Text of the case, seeds, versions of libraries, measured values, ...
+        Seeds, measured values, ...
     """
     digest = sha256()
-    for part in parts:
+    heads = (word.encode() for word in (klack.__version__, np.__version__, case.source))
+    for part in (*heads, *parts):
         digest.update(part + b"\0")
-    for body in bodies:
+    for body in case.bodies.values():
         for file in _files_of(body):
             digest.update(file.read_bytes() + b"\0")
     # klack itself, as it is on this machine

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Json
-from klack.cli.output import require_json_target, write_json
+from klack.terminal.options import Json
+from klack.terminal.output import require_json_target, write_json
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import CacheJson

@@ -1,22 +1,19 @@
 """``klack compare``: a stored result beside that of another program, or beside a measurement."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.notes import print_notes
-from klack.cli.options import Components, Json, Quiet, imported
-from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
-from klack.cli.progress import show_progress
-from klack.cli.tables import print_table
+from klack.analyses.ending import Ending
 from klack.errors import InputError
+from klack.terminal.options import Components, imported
+from klack.terminal.output import require_folder, staged_folder
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
-    from klack.analyses.comparison.calculix import Comparison
     from klack.case.measurement import CaseMeasurement
     from klack.case.valve_reader import OwnComponents
 
@@ -76,11 +73,9 @@ def compare(
         ),
     ] = None,
     component: Components = None,
-    json: Json = None,
-    quiet: Quiet = False,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Compare a result with a measurement, or with CalculiX: curves, numbers, residuals."""
-    require_json_target(json)
     if variant is not None:
         raise InputError(
             "--variant",
@@ -97,11 +92,11 @@ def compare(
         )
     if calculix is not None:
         folder = out if out is not None else result
-        _with_calculix(result, calculix, level, folder, json, quiet)
+        _with_calculix(result, calculix, level, folder, wanted)
         return 0
     folder = out if out is not None else result / _MEASURED
     own = imported(component)
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
+    ending = Ending(json=wanted.json, quiet=wanted.quiet, folder=folder, report=report)
     return _with_measurement(result, measurement or [], case, own, ending)
 
 
@@ -130,7 +125,6 @@ def _with_measurement(
             expected="one of klack stroke or klack shots",
             hint="run `klack stroke CASE` for strokes, `klack shots CASE` for drops.",
         )
-    ending.require_possible()
     section, text = _section(study.case_text, result, case, own)
     if isinstance(study, StrokeStudy):
         files = _files(given, study.reference.name)
@@ -180,15 +174,9 @@ def _section(
 # --------------------------------------------------------------------------- CalculiX
 
 
-def _with_calculix(
-    result: Path, calculix: Path, level: str, folder: Path, json: Path | None, quiet: bool
-) -> None:
-    from klack.analyses.comparison.calculix import (
-        compare_with,
-        comparison_to_json,
-        level_of,
-        with_other,
-    )
+def _with_calculix(result: Path, calculix: Path, level: str, folder: Path, wanted: Shown) -> None:
+    from klack.analyses.comparison.analysis import CALCULIX
+    from klack.analyses.comparison.calculix import compare_with, level_of, with_other
     from klack.analyses.impact.analysis import IMPACT
     from klack.analyses.impact.figures import force_chart
     from klack.analyses.incomplete import missing_in
@@ -197,33 +185,12 @@ def _with_calculix(
 
     study = IMPACT.load(result)
     require_folder(folder)
-    print_notes(missing_in(study), to_stderr=True)
+    wanted.warn(missing_in(study))
     history = level_of(study, level).history
     comparison = compare_with(study, level, other_run(read_calculix(calculix), history))
     with staged_folder(folder) as stage:
         chart = force_chart(with_other(study, comparison))
         (stage / _PICTURE).write_bytes(svg_chart(chart))
-    if not quiet:
-        _print(comparison, study.title, folder / _PICTURE, to_stderr=str(json) == "-")
-    if json is not None:
-        write_json(json, comparison_to_json(comparison))
-
-
-def _print(comparison: "Comparison", title: str, picture: Path, *, to_stderr: bool) -> None:
-    from klack.analyses.comparison.calculix import COMPARISON_COLUMNS, comparison_rows
-
-    print_table(title, COMPARISON_COLUMNS, comparison_rows(comparison), to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    d = comparison.deviation
-    print(
-        f"Force history: {100 * d.history_l2:.2f} % rms of the peak; third octaves within "
-        f"{d.third_octave_max_dB:.2g} dB up to {d.third_octave_up_to_Hz / 1e3:.4g} kHz.",
-        file=stream,
-    )
-    if (swing := comparison.other.energy_swing) is not None:
-        print(
-            f"Energy of {comparison.other.program} within {swing:.1e} of that at the start "
-            "at all times.",
-            file=stream,
-        )
-    print(f"Picture: {picture}", file=stream)
+    wanted.show(CALCULIX.told(comparison))
+    wanted.say(f"Picture: {folder / _PICTURE}")
+    wanted.write(lambda: CALCULIX.to_json(comparison))

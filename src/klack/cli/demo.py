@@ -7,8 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.impact import run_case
-from klack.cli.options import Json, Out, Quiet, Threads
+from klack.analyses.impact.command import run_case
+from klack.terminal.options import Out
+from klack.terminal.wanted import WANTED, Wanted, WantedResult
 
 __all__ = ["demo"]
 
@@ -19,9 +20,7 @@ def demo(
     *,
     open: Annotated[bool, Parameter(help="Show the report in the browser.")] = True,
     out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: Wanted = WANTED,
 ) -> int:
     """Compute the shipped valve, reduced and in full, and show the report."""
     from klack.case import shipped_cases
@@ -29,7 +28,7 @@ def demo(
     # by its full path: a file of the same name in the working folder is not the demo
     case = shipped_cases().get(_CASE.name, _CASE)
     levels = ["reduced", "full"]
-    folder = run_case(case, levels, report=True, out=out, json=json, threads=threads, quiet=quiet)
+    folder = run_case(case, levels, WantedResult(**vars(wanted), out=out))
     if open and _has_display():
         import webbrowser
 

@@ -1,17 +1,16 @@
 """``klack export``: models, decks and results for other programs, through one door."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
-from klack.cli.options import Components, Json, Out, Quiet, Threads, imported, require_threads
-from klack.cli.output import Written, require_folder, require_json_target, write_json
-from klack.cli.stored import is_result
+from klack.analyses.result_folder import is_result
 from klack.errors import InputError
+from klack.terminal.options import Components, Out, imported
+from klack.terminal.output import Written, require_folder
+from klack.terminal.wanted import WANTED, Wanted
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import ExportJson
@@ -121,13 +120,10 @@ def export(
     time_limit: _TimeLimit = None,
     component: Components = None,
     out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: Wanted = WANTED,
 ) -> int:
     """Write models, results or decks of a case for another program."""
-    require_json_target(json)
-    require_threads(threads)
+    threads, quiet = wanted.threads, wanted.quiet
     _require_used(
         to,
         {
@@ -145,8 +141,8 @@ def export(
         },
     )
     if is_result(source):
-        name, made = _export_stored(source, to, out)
-        _tell(name, to, made, json, quiet=quiet)
+        name, made = _export_stored(source, to, out, wanted)
+        _tell(name, to, made, wanted)
         return 0
 
     from klack.case.shipped import find_case
@@ -183,24 +179,22 @@ def export(
         from klack.cli.export_results import run_and_export
 
         made, incomplete = run_and_export(case, to, folder, threads=threads, quiet=quiet)
-    _tell(case.name, to, made, json, quiet=quiet)
+    _tell(case.name, to, made, wanted)
     if incomplete:
         raise incomplete
     return 0
 
 
-def _tell(case: str, to: str, made: Written, json: Path | None, *, quiet: bool) -> None:
-    if not quiet:
-        print("\n".join(made.lines), file=sys.stderr if str(json) == "-" else sys.stdout)
-    if json is not None:
-        result: ExportJson = {
-            "schema": "klack-export/1",
-            "case": case,
-            "to": to,
-            "folder": str(made.folder),
-            "files": list(made.files),
-        }
-        write_json(json, result)
+def _tell(case: str, to: str, made: Written, wanted: Wanted) -> None:
+    wanted.say("\n".join(made.lines))
+    result: ExportJson = {
+        "schema": "klack-export/1",
+        "case": case,
+        "to": to,
+        "folder": str(made.folder),
+        "files": list(made.files),
+    }
+    wanted.write(lambda: result)
 
 
 def _require_used(to: str, options: Mapping[str, object]) -> None:
@@ -214,7 +208,7 @@ def _require_used(to: str, options: Mapping[str, object]) -> None:
             )
 
 
-def _export_stored(source: Path, to: str, out: Path | None) -> tuple[str, Written]:
+def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> tuple[str, Written]:
     if to not in _RESULTS:
         raise InputError(
             str(source),
@@ -229,7 +223,7 @@ def _export_stored(source: Path, to: str, out: Path | None) -> tuple[str, Writte
     folder = out if out is not None else source
     require_folder(folder)
     study = load_result(source)
-    print_notes(missing_in(study), to_stderr=True)
+    wanted.warn(missing_in(study))
     return study.case, export_result(study, to, folder)
 
 

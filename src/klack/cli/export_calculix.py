@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from klack.cli.output import Written, staged_folder
-from klack.cli.progress import show_progress
+from klack.terminal.output import Written, staged_folder
+from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
     from klack.case.schema import Case

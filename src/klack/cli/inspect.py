@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Components, Json, Quiet, imported
-from klack.cli.output import require_json_target, write_json
-from klack.cli.tables import print_table
+from klack.terminal.options import Components, imported
+from klack.terminal.tables import TextTable
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.inspection import Row
@@ -38,8 +38,7 @@ def inspect(
         Parameter(name="--matrix", help="Name of one matrix in a file of several. [default: all]"),
     ] = None,
     component: Components = None,
-    json: Json = None,
-    quiet: Quiet = False,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
@@ -50,13 +49,12 @@ def inspect(
     from klack.errors import InputError
     from klack.units import LENGTH, parse_quantity
 
-    require_json_target(json)
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()
     if is_case or (not file.exists() and str(file) in shipped_cases()):
         from klack.case.valve_reader import load_any_case
 
         parts = inspect_case(load_any_case(find_case(file), imported(component)))
-        _show(str(file), parts, json, quiet=quiet)
+        _show(str(file), parts, wanted)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
     if unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS:
@@ -66,24 +64,16 @@ def inspect(
             expected="no --unit",
             hint="leave it out; klack shows sizes in mm.",
         )
-    _show(str(file), [(file.name, inspect_file(file, length, matrix))], json, quiet=quiet)
+    _show(str(file), [(file.name, inspect_file(file, length, matrix))], wanted)
     return 0
 
 
-def _show(
-    file: str,
-    parts: "Iterable[tuple[str, tuple[Row, ...]]]",
-    json: Path | None,
-    *,
-    quiet: bool,
-) -> None:
+def _show(file: str, parts: "Iterable[tuple[str, tuple[Row, ...]]]", wanted: Shown) -> None:
     """Print each part as soon as it is known, and write all of them as JSON."""
     found: InspectionJson = {"schema": "klack-inspect/1", "file": file, "parts": {}}
     for name, rows in parts:
-        if not quiet:
-            print_table(name, _COLUMNS, rows, left=3, to_stderr=str(json) == "-")
+        wanted.show([TextTable(title=name, columns=_COLUMNS, rows=rows, left=3)])
         found["parts"][name] = [
             {"what": what, "name": of, "content": content} for what, of, content in rows
         ]
-    if json is not None:
-        write_json(json, found)
+    wanted.write(lambda: found)

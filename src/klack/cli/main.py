@@ -25,24 +25,8 @@ from typing import Any
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
-from klack.cli import (
-    advise,
-    cache,
-    calibrate,
-    compare,
-    demo,
-    export,
-    impact,
-    inspect,
-    noise,
-    reduce,
-    report,
-    schema,
-    shots,
-    stroke,
-    verify,
-)
-from klack.cli.printable import printable
+from klack.analyses.catalogue import commands
+from klack.cli import cache, compare, demo, export, inspect, report, schema, verify
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
@@ -58,6 +42,7 @@ from klack.errors import (
     KlackError,
     LeftAloneWarning,
 )
+from klack.terminal.printable import printable
 
 __all__ = ["COMMANDS", "app", "main"]
 
@@ -73,17 +58,11 @@ app = App(
 )
 COMMANDS: Mapping[Callable[..., int], str] = {
     demo.demo: "klack demo",
-    impact.impact: "klack impact demo-valve-axisymmetric --level reduced,interface",
-    stroke.stroke: "klack stroke demo-stroke --variant wet,dry",
-    shots.shots: "klack shots demo-shots --shots 20",
-    noise.noise: "klack noise demo-valve-axisymmetric",
-    reduce.reduce: "klack reduce demo-valve-axisymmetric --json reduced.json",
-    advise.advise: "klack advise demo-valve-axisymmetric --error '2 %'",
+    **commands(),
     inspect.inspect: "klack inspect needle.step",
     report.report: "klack report klack-results/demo-stroke --out report",
     export.export: "klack export demo-valve-axisymmetric --to mat --out models",
     compare.compare: "klack compare klack-results/demo-stroke --measurement wet=strokes.csv",
-    calibrate.calibrate: "klack calibrate measured --measurement dry=dry_strokes_synthetic.csv",
     verify.verify: "klack verify --group contact",
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",

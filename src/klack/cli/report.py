@@ -1,14 +1,12 @@
 """``klack report``: the report of a stored result, of whichever kind."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.notes import print_notes
-from klack.cli.options import Json, Quiet
-from klack.cli.output import require_folder, require_json_target, staged_folder, write_json
+from klack.terminal.output import require_folder, staged_folder
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import ReportJson
@@ -26,15 +24,13 @@ def report(
     out: Annotated[
         Path | None, Parameter(name="--out", help="Folder for the report. [default: RESULT]")
     ] = None,
-    json: Json = None,
-    quiet: Quiet = False,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
     from klack.analyses.catalogue import analysis_in
     from klack.analyses.incomplete import missing_in
-    from klack.cli.reports import REPORTS, beside_result, write_reports
+    from klack.analyses.result_folder import REPORTS, beside_result, write_reports
 
-    require_json_target(json)
     folder = out if out is not None else result
     beside = beside_result(folder) if folder.absolute() == result.absolute() else {}
     analysis = analysis_in(result)
@@ -42,17 +38,14 @@ def report(
     require_folder(folder)
     with staged_folder(folder, beside) as stage:
         write_reports(analysis.content(record), stage)
-    print_notes(missing_in(record), to_stderr=True)
-    if not quiet:
-        stream = sys.stderr if str(json) == "-" else sys.stdout
-        print(f"Report in {folder}: {', '.join(REPORTS)}", file=stream)
-    if json is not None:
-        made: ReportJson = {
-            "schema": "klack-report/1",
-            "case": record.case,
-            "result": str(result),
-            "folder": str(folder),
-            "files": list(REPORTS),
-        }
-        write_json(json, made)
+    wanted.warn(missing_in(record))
+    wanted.say(f"Report in {folder}: {', '.join(REPORTS)}")
+    made: ReportJson = {
+        "schema": "klack-report/1",
+        "case": record.case,
+        "result": str(result),
+        "folder": str(folder),
+        "files": list(REPORTS),
+    }
+    wanted.write(lambda: made)
     return 0

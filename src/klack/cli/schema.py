@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.cli.output import require_json_target, write_json
+from klack.terminal.output import require_json_target, write_json
 
 __all__ = ["schema"]
 

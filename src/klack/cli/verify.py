@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import Json, Quiet
-from klack.cli.output import require_file_target, require_json_target, write_json
-from klack.cli.progress import show_progress
 from klack.cli.verify_text import print_checks, print_groups
+from klack.terminal.output import require_file_target
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import SHOWN, Shown
 from klack.verification.registry import GROUPS
 
 if TYPE_CHECKING:
@@ -39,8 +39,7 @@ def verify(
     listing: Annotated[
         bool, Parameter(name="--list", negative="", help="Say what each group covers, and stop.")
     ] = False,
-    json: Json = None,
-    quiet: Quiet = False,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Compare klack with exact and published results; exit code 1 if a check fails."""
     if listing:
@@ -49,31 +48,31 @@ def verify(
     from klack.verification import iterate_checks
     from klack.verification.run_conditions import run_conditions
 
-    require_json_target(json)
     require_file_target("--html", html)
-    wanted = tuple(group) if group else GROUPS
+    groups = tuple(group) if group else GROUPS
     checks: list[Check] = []
-    with show_progress(quiet) as progress:
-        for _, found in iterate_checks(wanted, started=lambda name: progress(name, 0.0)):
+    with show_progress(wanted.quiet) as progress:
+        for _, found in iterate_checks(groups, started=lambda name: progress(name, 0.0)):
             checks += found
         if html is not None:
             from klack.verification.page import write_page
 
             progress("page", 0.0)
             write_page(html, checks, run_conditions())
-    if not quiet:
-        print_checks(checks, every=every, to_stderr=str(json) == "-")
-        if html is not None and str(json) != "-":
+    if not wanted.quiet:
+        print_checks(checks, every=every, to_stderr=wanted.to_stderr)
+        if html is not None and not wanted.to_stderr:
             print(f"Page in {html}")
-    if json is not None:
-        about = run_conditions().words()
-        result: VerificationJson = {
-            "schema": "klack-verify/1",
-            "about": about,
-            "checks": [_numbers(check) for check in checks],
-        }
-        write_json(json, result)
+    wanted.write(lambda: _results(run_conditions().words(), checks))
     return 0 if all(check.passed for check in checks) else 1
+
+
+def _results(about: dict[str, str], checks: "list[Check]") -> "VerificationJson":
+    return {
+        "schema": "klack-verify/1",
+        "about": about,
+        "checks": [_numbers(check) for check in checks],
+    }
 
 
 def _numbers(check: "Check") -> "CheckJson":

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from klack.cli.tables import print_table
+from klack.terminal.tables import print_table
 from klack.verification.registry import COVERS
 
 if TYPE_CHECKING:

@@ -13,17 +13,6 @@ from klack.errors import InputError
 
 __all__ = ["BodyEnergy", "EnergyLedger", "ImpactHistory"]
 
-_ARRAYS = (
-    "force",
-    "peak_force",
-    "gap",
-    "velocity_a",
-    "velocity_b",
-    "displacement_a",
-    "displacement_b",
-    "external_force",
-)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyEnergy:

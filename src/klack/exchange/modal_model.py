@@ -19,9 +19,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.laws import ContactLaw
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
+from klack.network.protocols import InterfaceLaw
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.compile import flatten
@@ -123,7 +123,7 @@ class ModelContact:
     name: str
     shape: NDArray[np.float64]
     gap: float
-    law: ContactLaw | None
+    law: InterfaceLaw | None
     series_compliance: float = 0.0
     film: FilmRow | None = None
 

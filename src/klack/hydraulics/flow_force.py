@@ -13,7 +13,7 @@ from pydantic import Field
 from klack.input.section import Section
 from klack.units import Angle, Length, Ratio
 
-__all__ = ["FlowForce", "jet_force"]
+__all__ = ["FlowForce"]
 
 
 class FlowForce(Section):
@@ -45,18 +45,3 @@ class FlowForce(Section):
         """``C_v cos(theta)`` [-]; ``angle`` [rad] is that of the seat's surface."""
         theta = angle if self.jet_angle is None else self.jet_angle
         return self.velocity_coefficient * cos(theta)
-
-
-def jet_force(
-    mass_flow: float, density: float, area: float, discharge: float, momentum: float
-) -> float:
-    r"""Closing force of a steady jet [N], :math:`C_v \cos\theta\,\dot m^2/(\varrho C_q A)`.
-
-    Parameters
-    ----------
-    mass_flow, density, area : float [kg/s], [kg/m^3], [m^2]
-        ``area`` is that of the seat.
-    discharge, momentum : float [-]
-        ``C_q`` and ``C_v cos(theta)``.
-    """
-    return momentum * mass_flow**2 / (density * discharge * area)

@@ -81,6 +81,11 @@ class Fluid:
         return self.vapour.pressure
 
     @property
+    def all_liquid_from(self) -> float:
+        """Pressure [Pa] above which no vapour is left."""
+        return self.vapour.kinks[1]
+
+    @property
     def pressure_range(self) -> PressureRange:
         """Absolute pressures for which the fluid is described, and where that comes from."""
         return self.known_range or self.liquid.pressure_range

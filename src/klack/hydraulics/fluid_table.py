@@ -22,9 +22,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, require_positive
-from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.mixture import LOWEST_PRESSURE
+from klack.network.protocols import NetworkFluid
 
 __all__ = ["fluid_at", "fluid_table", "pressure_at"]
 
@@ -41,7 +41,7 @@ _TESTED = np.array([0.04, 0.15, 0.5, 0.85, 0.96])
 Vector = NDArray[np.float64]
 
 
-def fluid_table(fluid: Fluid, ambient_pressure: float) -> Vector:
+def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
     """Tabulate a fluid for :func:`fluid_at`.
 
     Pieces are halved until the specific volume is right to 1e-10 everywhere between 1 Pa and
@@ -49,7 +49,7 @@ def fluid_table(fluid: Fluid, ambient_pressure: float) -> Vector:
 
     Parameters
     ----------
-    fluid : Fluid
+    fluid : NetworkFluid
     ambient_pressure : float [Pa]
         Where the pressure energy ``g`` counts from, absolute.
 
@@ -75,7 +75,7 @@ def fluid_table(fluid: Fluid, ambient_pressure: float) -> Vector:
     return np.concatenate((head, rows.ravel(), last.ravel()))
 
 
-def _pieces(fluid: Fluid, ambient_pressure: float) -> tuple[Vector, Vector]:
+def _pieces(fluid: NetworkFluid, ambient_pressure: float) -> tuple[Vector, Vector]:
     """Ends of all pieces and their six factors, halving those that are not accurate."""
     ends = np.geomspace(LOWEST_PRESSURE, HIGHEST_PRESSURE, 40)
     special = [p for p in (*fluid.kinks, ambient_pressure) if ends[0] < p < ends[-1]]
@@ -104,7 +104,7 @@ def _pieces(fluid: Fluid, ambient_pressure: float) -> tuple[Vector, Vector]:
     return np.append(starts[order], ends[-1]), all_factors
 
 
-def _quintic(fluid: Fluid, left: Vector, right: Vector) -> Vector:
+def _quintic(fluid: NetworkFluid, left: Vector, right: Vector) -> Vector:
     """Factors, shape (n, 6), from value and slope at both ends and values at two places inside."""
     h = right - left
     va, da = fluid.specific_volume(left)
@@ -125,7 +125,7 @@ def _quintic(fluid: Fluid, left: Vector, right: Vector) -> Vector:
     return np.asarray(unit / h[:, None] ** np.arange(6))
 
 
-def _error(fluid: Fluid, left: Vector, right: Vector, factors: Vector) -> Vector:
+def _error(fluid: NetworkFluid, left: Vector, right: Vector, factors: Vector) -> Vector:
     """Largest relative error of each piece in value, and whether it falls with pressure."""
     s = _TESTED[:, None] * (right - left)
     v, slope = fluid.specific_volume(left + s)

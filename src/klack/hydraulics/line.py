@@ -1,7 +1,7 @@
 """Line with water hammer: a bore in which pressure travels as waves."""
 
 from math import pi
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +15,9 @@ from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW
+from klack.network.protocols import NetworkFluid
 from klack.network.rows import LimitRow, Rows
 from klack.units import Length, Modulus, Pressure
-
-if TYPE_CHECKING:
-    from klack.hydraulics.fluid import Fluid
 
 __all__ = ["Line"]
 
@@ -98,12 +96,12 @@ class Line(Component):
         """Number of segments in use."""
         return self.segments or (1 if self.friction == "none" else _SEGMENTS)
 
-    def wave_speed(self, fluid: "Fluid", pressure: float | None = None) -> float:
+    def wave_speed(self, fluid: NetworkFluid, pressure: float | None = None) -> float:
         r"""Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``.
 
         Parameters
         ----------
-        fluid : Fluid
+        fluid : NetworkFluid
         pressure : float, optional [Pa]
             Absolute, about which they run; by default the one that the line was given.
         """
@@ -117,14 +115,14 @@ class Line(Component):
             )
         return float(self._speeds(fluid, about))
 
-    def _speeds(self, fluid: "Fluid", pressure: ArrayLike) -> NDArray[np.float64]:
+    def _speeds(self, fluid: NetworkFluid, pressure: ArrayLike) -> NDArray[np.float64]:
         slowness = fluid.sound_speed(pressure) ** -2.0
         if self.wall_modulus is not None and self.wall_thickness is not None:
             stretch = self.diameter / (self.wall_modulus * self.wall_thickness)
             slowness = slowness + fluid.density(pressure) * stretch
         return np.asarray(1.0 / np.sqrt(slowness))
 
-    def echo_time(self, fluid: "Fluid", pressure: float | None = None) -> float:
+    def echo_time(self, fluid: NetworkFluid, pressure: float | None = None) -> float:
         """Return ``2 L / a`` [s], after which an end hears of the other one."""
         return 2.0 * self.length / self.wave_speed(fluid, pressure)
 
@@ -170,7 +168,7 @@ class Line(Component):
         )
         rows.limits += self._limits(rows, fluid, pressure)
 
-    def _limits(self, rows: Rows, fluid: "Fluid", pressure: float) -> list[LimitRow]:
+    def _limits(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> list[LimitRow]:
         """Pressures at the ends about which its one wave speed and its one impedance hold."""
 
         def error(p: ArrayLike) -> NDArray[np.float64]:
@@ -189,7 +187,7 @@ class Line(Component):
                 "at such times."
             )
 
-        boiling = fluid.vapour.kinks[1]  # below it the line opens a cavity of its own
+        boiling = fluid.all_liquid_from  # below it the line opens a cavity of its own
         below = np.geomspace(min(boiling, pressure), pressure, _LOOKED_AT)
         above = np.geomspace(pressure, max(HIGHEST_PRESSURE, 2.0 * pressure), _LOOKED_AT)
         fits_below, fits_above = error(below) <= _FOLLOWED, error(above) <= _FOLLOWED

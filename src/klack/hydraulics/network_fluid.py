@@ -1,17 +1,13 @@
 """The fluid of a network, as restrictions need it at set-up."""
 
-from typing import TYPE_CHECKING
-
 from klack.errors import InputError
+from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows
-
-if TYPE_CHECKING:
-    from klack.hydraulics.fluid import Fluid
 
 __all__ = ["ambient_viscosity", "network_fluid"]
 
 
-def network_fluid(rows: Rows) -> "Fluid":
+def network_fluid(rows: Rows) -> NetworkFluid:
     """Return the fluid; raise :class:`InputError` if the network has none."""
     if rows.fluid is None:
         raise InputError(
@@ -23,7 +19,7 @@ def network_fluid(rows: Rows) -> "Fluid":
     return rows.fluid
 
 
-def ambient_viscosity(rows: Rows) -> tuple["Fluid", float]:
+def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
     """Fluid and its dynamic viscosity [Pa s] at the ambient pressure.
 
     Restrictions keep this one: the rise with pressure is 0.1 to 0.2 % per bar in oils and less in

@@ -80,14 +80,6 @@ def _cubic_integral(par: Any, row: int, s: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def iron_energy(par: Any, table: int, hint: int, flux: float) -> float:
-    """Stored energy [J]; even in the flux."""
-    a = abs(flux)
-    row = table + 1 + 6 * interval(par, table, hint, a)
-    return par[row + 5] + _cubic_integral(par, row, a - par[row])
-
-
-@njit(cache=True, error_model="numpy")
 def iron_mmf(par: Any, table: int, hint: int, flux: float) -> float:
     """Magnetomotive force [A]; odd in the flux."""
     a = abs(flux)

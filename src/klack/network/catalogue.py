@@ -1,14 +1,16 @@
-"""Every component type that a case file may name."""
+"""Every component type that a case file may name, and the section of the fluid."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from types import MappingProxyType
+from typing import Any
 
 from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Section
 from klack.network.component import Component
 
-__all__ = ["COMPONENTS", "component_class", "component_classes", "type_words"]
+__all__ = ["COMPONENTS", "component_class", "component_classes", "fluid_section", "type_words"]
 
 # Registering a component type is one line here: type word and where its class is.  The word must be
 # the class's own ``type``; words are joined by hyphens, like all words that a case may choose from.
@@ -47,6 +49,8 @@ COMPONENTS = (
 )
 """Type word and dotted path of the class, for each component type."""
 
+_FLUID = "klack.hydraulics.fluid_choice.FluidChoice"
+
 
 def type_words() -> tuple[str, ...]:
     """Words that can stand after ``type:``."""
@@ -74,7 +78,8 @@ def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> ty
         return own[word]
     known = dict(COMPONENTS)
     if word in known:
-        return _registered(known[word])
+        found: type[Component] = _registered(known[word])
+        return found
     if ":" in word:
         raise CaseProblem(
             ("type",),
@@ -96,8 +101,13 @@ def component_classes() -> Iterator[type[Component]]:
     return (component_class(word) for word in type_words())
 
 
-@cache
-def _registered(path: str) -> type[Component]:
-    module, name = path.rsplit(".", 1)
-    found: type[Component] = getattr(import_module(module), name)
+def fluid_section() -> type[Section]:
+    """Class of the section ``fluid``; imports it."""
+    found: type[Section] = _registered(_FLUID)
     return found
+
+
+@cache
+def _registered(path: str) -> Any:
+    module, name = path.rsplit(".", 1)
+    return getattr(import_module(module), name)

@@ -1,7 +1,6 @@
 """The section ``network`` of a case file: fluid, components by type, connections."""
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -16,7 +15,12 @@ from pydantic_core import CoreSchema
 
 from klack.input.problem import CaseProblem, one_of
 from klack.input.section import Name, Section, Text
-from klack.network.catalogue import component_class, component_classes, type_words
+from klack.network.catalogue import (
+    component_class,
+    component_classes,
+    fluid_section,
+    type_words,
+)
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Ambient
@@ -81,16 +85,9 @@ def _read_component(value: Any, info: ValidationInfo) -> Component:
 AnyComponent = Annotated[Component, BeforeValidator(_read_component), _ComponentSchema()]
 """Field that takes any registered component, ``{type: ..., ...}``."""
 
-_FLUID = ("klack.hydraulics.fluid_choice", "FluidChoice")
-
-
-def _fluid_section() -> Any:
-    """Class of the section ``fluid``; hydraulics is above this package and so imported late."""
-    return getattr(import_module(_FLUID[0]), _FLUID[1])
-
 
 def _read_fluid(value: Any, info: ValidationInfo) -> Any:
-    found = _fluid_section()
+    found = fluid_section()
     if value is None or isinstance(value, found):
         return value
     return found.model_validate(value, context=info.context)
@@ -101,13 +98,12 @@ class LateSection:
 
     def section(self) -> type[Section]:
         """Class of the section."""
-        found: type[Section] = _fluid_section()
-        return found
+        return fluid_section()
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        section = handler(_fluid_section().__pydantic_core_schema__)
+        section = handler(fluid_section().__pydantic_core_schema__)
         return {"anyOf": [{"type": "string", "examples": ["n-heptane"]}, section]}
 
 

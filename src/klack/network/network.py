@@ -8,17 +8,15 @@ move, ``ambient`` has the pressure of the surroundings.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from klack.input.problem import CaseProblem
 from klack.network.checks import check_nodes, check_rows
 from klack.network.component import Component
 from klack.network.nodes import RESERVED, Node, join
 from klack.network.port import Role
+from klack.network.protocols import NetworkFluid
 from klack.network.rows import AMBIENT, GROUND, Ambient, Rows
-
-if TYPE_CHECKING:
-    from klack.hydraulics.fluid import Fluid
 
 __all__ = ["Network"]
 
@@ -37,7 +35,7 @@ class Network:
         Each lists the ports, ``"component.port"``, that meet in one node; or ``"ground"``,
         ``"ambient"``.
     ambient : Ambient
-    fluid : Fluid or None
+    fluid : NetworkFluid or None
         At its temperature; needed as soon as anything is hydraulic.
 
     Raises
@@ -58,7 +56,7 @@ class Network:
     components: Mapping[str, Component]
     connections: Sequence[Sequence[str]]
     ambient: Ambient = field(default_factory=Ambient)
-    fluid: "Fluid | None" = None
+    fluid: NetworkFluid | None = None
     nodes: tuple[Node, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -195,7 +193,7 @@ class Network:
         return self._changed(parts, "ground", self.fluid)
 
     def _changed(
-        self, parts: Mapping[str, Component | None], instead: str, fluid: "Fluid | None"
+        self, parts: Mapping[str, Component | None], instead: str, fluid: NetworkFluid | None
     ) -> Self:
         """Exchange components; what became None is left out, its ports become the word given."""
         kept = {name: part for name, part in parts.items() if part is not None}

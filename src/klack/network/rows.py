@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
+from klack.network.protocols import InterfaceLaw, NetworkFluid
 from klack.network.step_function import StepFunction
 
 if TYPE_CHECKING:
-    from klack.contact.laws import ContactLaw
-    from klack.hydraulics.fluid import Fluid
-    from klack.network.component import Component
     from klack.reduction.reduced_body import ReducedBody
 
 __all__ = [
@@ -207,7 +205,7 @@ class InterfaceRow:
     upper: int
     lower: int
     gap: float
-    law: "ContactLaw | None"
+    law: InterfaceLaw | None
     series_compliance: float
     film: FilmRow | None
 
@@ -311,10 +309,10 @@ class Rows:
     """
 
     ambient: Ambient
-    fluid: "Fluid | None" = None
+    fluid: NetworkFluid | None = None
     component: str = ""
     handles: Mapping[str, int] = field(default_factory=dict)
-    partners: Mapping[str, tuple["Component", ...]] = field(default_factory=dict)
+    partners: Mapping[str, tuple[object, ...]] = field(default_factory=dict)
     bodies: list[BodyRow] = field(default_factory=list)
     elements: list[ElementRow] = field(default_factory=list)
     branches: list[BranchRow] = field(default_factory=list)
@@ -332,7 +330,7 @@ class Rows:
         """
         return self.handles[name]
 
-    def partner(self, name: str) -> tuple["Component", ...]:
+    def partner(self, name: str) -> tuple[object, ...]:
         """Return the other components at the node of the port ``name``."""
         return self.partners.get(name, ())
 
@@ -460,7 +458,7 @@ class Rows:
         upper: int,
         lower: int,
         gap: float,
-        law: "ContactLaw | None",
+        law: InterfaceLaw | None,
         series_compliance: float = 0.0,
         film: FilmRow | None = None,
     ) -> None:

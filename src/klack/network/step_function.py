@@ -50,6 +50,7 @@ __all__ = [
     "evaluate",
     "first",
     "pointer",
+    "pointers",
     "python_step",
     "shift",
     "step_function",
@@ -95,6 +96,24 @@ def first(typingctx: Any, array: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return context.make_array(sig.args[0])(context, builder, args[0]).data
+
+    return signature, codegen
+
+
+@intrinsic
+def pointers(typingctx: Any, bundle: Any) -> Any:
+    """Return a named tuple with :func:`first` of every array in it, in compiled code."""
+    members = [types.CPointer(t.dtype) if isinstance(t, types.Array) else t for t in bundle]
+    signature = types.BaseTuple.from_types(members, bundle.instance_class)(bundle)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        values = []
+        for place, member in enumerate(sig.args[0]):
+            value = builder.extract_value(args[0], place)
+            if isinstance(member, types.Array):
+                value = context.make_array(member)(context, builder, value).data
+            values.append(value)
+        return context.make_tuple(builder, sig.return_type, values)
 
     return signature, codegen
 

@@ -13,9 +13,8 @@ from typing import Any
 import matplotlib
 import typst
 
-from klack.report.chart import BarChart, Chart
 from klack.report.page import Content, Section
-from klack.report.printed import svg_bars, svg_chart
+from klack.report.printed import svg_chart
 from klack.whole_file import whole_file
 
 __all__ = ["render_pdf", "write_pdf"]
@@ -72,14 +71,10 @@ def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
         (work / figures[-1]["image"]).write_bytes(section.picture.image)
     for i, chart in enumerate(section.charts):
         figures.append({"title": chart.title, "note": chart.note, "image": f"{name}-{i}.svg"})
-        (work / figures[-1]["image"]).write_bytes(_drawn(chart))
+        (work / figures[-1]["image"]).write_bytes(svg_chart(chart))
     return {
         "title": section.title,
         "paragraphs": [*section.paragraphs, *(f"{s.title}. {s.note}" for s in section.sounds)],
         "figures": figures,
         "tables": [asdict(table) for table in section.tables],
     }
-
-
-def _drawn(chart: Chart | BarChart) -> bytes:
-    return svg_bars(chart) if isinstance(chart, BarChart) else svg_chart(chart)

@@ -1,9 +1,13 @@
-"""Charts for paper: matplotlib without its state machine, as SVG with letters as outlines."""
+"""Charts for paper and notebooks: matplotlib without its state machine.
+
+SVG has letters as outlines.
+"""
 
 from io import BytesIO
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -20,7 +24,7 @@ from klack.report.chart import (
     Panel,
 )
 
-__all__ = ["STYLE", "plain", "svg", "svg_bars", "svg_chart"]
+__all__ = ["STYLE", "plain", "png_chart", "svg", "svg_chart"]
 
 _WIDTH = 6.7
 """Width of the text of an A4 page [in]."""
@@ -57,23 +61,41 @@ def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
     return stream.getvalue()
 
 
-def svg_chart(chart: Chart, *, width: float = _WIDTH) -> bytes:
+def svg_chart(chart: Chart | BarChart, *, width: float = _WIDTH) -> bytes:
     """Draw a chart with its legend above it; ``width`` in inches, letters keep their size."""
-    shares = [panel.share for panel in chart.panels]
     with rc_context(STYLE):
-        figure = Figure(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
-        grid = figure.subplots(
-            len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
-        )[:, 0]
-        for panel, axes in zip(chart.panels, grid, strict=True):
-            _draw_panel(axes, panel, chart.x)
-        _scale(grid[-1], chart.x, "x")
-        _legend(figure, grid)
-        return svg(figure)
+        return svg(_drawn(chart, width))
 
 
-def svg_bars(chart: BarChart) -> bytes:
-    """Draw lying stacked bars; shares that are wide enough carry their number."""
+def png_chart(chart: Chart | BarChart) -> bytes:
+    """Draw a chart as pixels, for notebooks: curves of many points stay small."""
+    with rc_context(STYLE):
+        figure = _drawn(chart, _WIDTH)
+        FigureCanvasAgg(figure)
+        stream = BytesIO()
+        figure.savefig(stream, format="png", dpi=100.0, metadata={"Software": "klack"})
+        return stream.getvalue()
+
+
+def _drawn(chart: Chart | BarChart, width: float) -> Figure:
+    return _bars(chart) if isinstance(chart, BarChart) else _curves(chart, width)
+
+
+def _curves(chart: Chart, width: float) -> Figure:
+    shares = [panel.share for panel in chart.panels]
+    figure = Figure(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
+    grid = figure.subplots(
+        len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
+    )[:, 0]
+    for panel, axes in zip(chart.panels, grid, strict=True):
+        _draw_panel(axes, panel, chart.x)
+    _scale(grid[-1], chart.x, "x")
+    _legend(figure, grid)
+    return figure
+
+
+def _bars(chart: BarChart) -> Figure:
+    """Lying stacked bars; shares that are wide enough carry their number."""
     with rc_context(STYLE | {"axes.grid.axis": "x"}):
         figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
         axes = figure.subplots()
@@ -107,7 +129,7 @@ def svg_bars(chart: BarChart) -> bytes:
         axes.set_xlim(0.0, 1.03 * whole or 1.0)  # nothing moved: an empty axis
         _scale(axes, chart.x, "x")
         _legend(figure, [axes])
-        return svg(figure)
+        return figure
 
 
 def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:

@@ -14,9 +14,11 @@ __all__ = [
     "share",
     "signed",
     "signed_share",
+    "typeset",
 ]
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_WITHOUT_PREFIX = ("", "dB", "dBA", "sone", "phon", "acum")
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
 _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
@@ -24,13 +26,19 @@ _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """Value with a prefix that keeps the number between 1 and 1000; no line breaks within.
 
+    Pure numbers, levels and what is heard have no prefixes.
+
     >>> quantity(1.4823e-5, "s").split(), quantity(0.99996e3, "N").split()
     (['14.82', 'µs'], ['1.000', 'kN'])
+    >>> quantity(0.0123, "sone", 2).split(), quantity(-0.0123, "", 2)
+    (['0.012', 'sone'], '−0.012')
     """
     if not isfinite(value):
         return _NONE if value != value else "∞"
     if value == 0.0:
         return f"0{_space(unit)}"
+    if unit in _WITHOUT_PREFIX:
+        return f"{value:.{digits}g}".replace("-", _MINUS) + _space(unit)
     rounded = float(f"{value:.{digits - 1}e}")
     power = min(max(3 * floor(log10(abs(rounded)) / 3 + 1e-12), -15), 9)
     scaled = rounded / 10.0**power
@@ -119,7 +127,7 @@ def fixed(value: float, decimals: int, unit: str = "") -> str:
     """
     if not isfinite(value):
         return _NONE
-    return f"{value:.{decimals}f}".replace("-", _MINUS) + _space(unit)
+    return _signless_zero(f"{value:.{decimals}f}").replace("-", _MINUS) + _space(unit)
 
 
 def power(value: float) -> str:
@@ -129,3 +137,15 @@ def power(value: float) -> str:
     '3.2e−13'
     """
     return f"{value:.1e}".replace("-", _MINUS)
+
+
+def typeset(text: str) -> str:
+    r"""What a terminal shows, with the signs of a page.
+
+    >>> typeset("-3.0 dB").split(), typeset("x 1.2"), typeset("height [um]")
+    (['−3.0', 'dB'], '×\xa01.2', 'height [µm]')
+    """
+    text = text.replace("[us]", "[µs]").replace("[um]", "[µm]")
+    if text[:1] in ("-", "+", "x") and text[1:2] in " 0123456789":
+        text = text.replace(" ", _FIXED).replace("x", "\N{MULTIPLICATION SIGN}", 1)
+    return text.replace("-", _MINUS) if text[:1] == "-" else text

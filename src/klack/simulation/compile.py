@@ -18,6 +18,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact_arrays import Contacts, Losses, StepMatrices, Watched
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -183,16 +184,16 @@ def propose_step(system: ReducedSystem, *, speed: float) -> float:
     return float(max(m for m in (1.0, 2.0, 5.0) if m * decade <= limit * (1 + 1e-12)) * decade)
 
 
-def _stiffest(law: object, speed: float, yielding: float) -> float:
+def _stiffest(law: InterfaceLaw, speed: float, yielding: float) -> float:
     """Tangent stiffness at the depth that would store all energy of approach."""
     energy = 0.5 * speed**2 / yielding if yielding else 0.5e-3 * speed**2
     depth = 1e-9
-    while law.potential(depth) > energy > 0.0:  # type: ignore[attr-defined]
+    while law.potential(depth) > energy > 0.0:
         depth /= 1.25
-    while law.potential(depth) < energy:  # type: ignore[attr-defined]
+    while law.potential(depth) < energy:
         depth *= 1.25
     depths = depth * np.linspace(1e-3, 1.0, 50)
-    return float(np.max(law.tangent_stiffness(depths)))  # type: ignore[attr-defined]
+    return float(np.max(law.tangent_stiffness(depths)))
 
 
 def _block(

@@ -39,6 +39,7 @@ from klack.units import format_si
 
 __all__ = [
     "LINE_LOSSES",
+    "LINE_MEMORY",
     "LineState",
     "Lines",
     "compile_lines",
@@ -56,6 +57,9 @@ Integers = NDArray[np.int64]
 
 LINE_LOSSES = ("friction", "interpolation", "cavity collapse")
 """Columns of the books of :func:`lines_commit`."""
+
+LINE_MEMORY = ("samples", "head", "memory", "cavity")
+"""Arrays of :class:`LineState` that one step hands on to the next."""
 
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over friction terms use registers
 _A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as whole

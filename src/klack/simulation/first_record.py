@@ -46,18 +46,18 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
     ]
     flows = branches.outputs[branches.output0[:-1]]
     pressing = _interfaces(network, speeds, h)
-    states = [*_states(elements, rows.elements, 0), *_states(branches, rows.branches, 3)]
+    states = [*_states(elements, rows.elements), *_states(branches, rows.branches)]
     return (
         np.concatenate([*forces, flows, pressing.ravel(), pressing.sum(axis=1)]),
         np.array(states, dtype=float),
     )
 
 
-def _states(data: StepRows, rows: Sequence[ElementRow | BranchRow], head: int) -> list[float]:
+def _states(data: StepRows, rows: Sequence[ElementRow | BranchRow]) -> list[float]:
     """Recorded states as they are, derived ones as the step functions gave them."""
     found = []
     for k, row in enumerate(rows):
-        after = data.outputs[data.output0[k] + head + len(row.ports) :]
+        after = data.outputs[data.output0[k] + data.head + len(row.ports) :]
         now = data.state[data.state0[k] :]
         found += [(after if c.derived else now)[c.index] for c in row.channels]
     return found
@@ -65,10 +65,10 @@ def _states(data: StepRows, rows: Sequence[ElementRow | BranchRow], head: int) -
 
 def _interfaces(network: CompiledNetwork, speeds: Vector, h: float) -> Vector:
     """Contact and film force [N] of every interface, shape (n, 2)."""
-    at = network.interfaces
+    at, state = network.interfaces, network.interface_state
     found = np.zeros((len(network.rows.interfaces), 2))
     for c in range(len(found)):
-        gap = float(at.gap[c] + at.e[c])  # between the surfaces
+        gap = float(state.gap[c] + state.e[c])  # between the surfaces
         opening = float(speeds[at.upper[c]] - speeds[at.lower[c]])
         if at.kind[c] != NO_LAW and gap < 0.0:
             found[c, 0], _, _ = mean_force(int(at.kind[c]), at.law, int(at.law0[c]), -gap, -gap, 0)

@@ -29,7 +29,7 @@ class Limits:
     network : CompiledNetwork
     columns : sequence of str
         Names of the recorded columns, displacements of all ports first: see
-        :func:`klack.simulation.network_kernel.record_points`.
+        :func:`klack.simulation.network_record.record_points`.
     """
 
     def __init__(self, network: CompiledNetwork, columns: list[str]) -> None:

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.simulation.delay_line import Lines, LineState
+
 __all__ = [
     "BEFORE",
     "ELEMENTS",
@@ -23,11 +25,21 @@ __all__ = [
     "WORK",
     "Y0",
     "Y1",
+    "Accounts",
     "Bodies",
+    "Contacts",
+    "FlowTrial",
+    "Fluid",
+    "InterfaceState",
+    "InterfaceTrial",
     "Interfaces",
+    "NetworkArrays",
+    "NodeState",
+    "NodeTrial",
     "Nodes",
     "Recording",
     "Scratch",
+    "Step",
     "StepRows",
     "scratch_memory",
 ]
@@ -61,6 +73,8 @@ ROWS_AT = 12
 class Bodies(NamedTuple):
     """Modes in blocks and ports in body order; port number ``ports`` is the immovable ground."""
 
+    ports: int
+    blocks: int
     fine: Vector  # blocks at the fine step
     coarse: Vector  # the same at the coarse step
     start: Index  # (blocks + 1,) first number of each block
@@ -76,6 +90,8 @@ class Bodies(NamedTuple):
 class StepRows(NamedTuple):
     """Elements or branches: where the numbers of each row lie."""
 
+    rows: int
+    head: int  # numbers of each output before its forces: 0 of elements, 3 of branches
     function: Index  # addresses
     parameters: Vector
     parameter0: Index
@@ -88,31 +104,26 @@ class StepRows(NamedTuple):
     output0: Index
     ports: Index  # flat list
     port0: Index  # (rows + 1,) into ``ports``
-    book0: Index
-    books: Index
+    account0: Index  # first account of each row
+    accounts: Index  # of each row
     a: Index  # nodes of branches
     b: Index
-    supply: Index  # book that takes all power of a source, or -1
-    loss: Index  # book that takes the loss of a branch, or -1
+    supply: Index  # account that takes all power of a source, or -1
+    loss: Index  # account that takes the loss of a branch, or -1
 
 
 class Nodes(NamedTuple):
     """Pressures: volumes first, then prescribed ones."""
 
+    nodes: int
     volumes: int
-    fluid: Vector
+    walls: int
+    ends: int
+    fluid: Vector  # table
     ambient: float
     density: float  # at ambient pressure
-    hint: Index
     volume: Vector  # at zero displacements
-    mass: Vector
-    held: Vector  # volume at the end of the last step
-    p: Vector
-    before: Vector
-    g: Vector
-    gamma: Matrix  # (2, volumes) own compliance of the walls, A G A
-    numeric: Vector  # out: loss of the implicit step
-    supply: Vector  # out: energy from prescribed pressures
+    gamma: Vector  # (2, volumes) own compliance of the walls, A G A
     time: Vector  # tables of the prescribed pressures
     pressure: Vector
     table0: Index
@@ -122,9 +133,21 @@ class Nodes(NamedTuple):
     end_node: Index  # of line ends
 
 
+class NodeState(NamedTuple):
+    """Pressures at the end of a step, and what volumes hold."""
+
+    mass: Vector
+    held: Vector  # volume at the end of the last step
+    p: Vector
+    before: Vector
+    g: Vector
+    hint: Index
+
+
 class Interfaces(NamedTuple):
     """Contacts and films."""
 
+    interfaces: int
     upper: Index
     lower: Index
     G: Vector  # (2 n,) opening of the gap per unit force during a step, fine and coarse
@@ -142,6 +165,11 @@ class Interfaces(NamedTuple):
     film_small: Vector  # film force that a coarse step may begin with; it may end with twice of it
     film_felt: Vector  # film force from which on fine steps are recorded
     rest: Vector  # closed for so long: at rest [s]
+
+
+class InterfaceState(NamedTuple):
+    """Contacts and films at the end of a step."""
+
     hint: Index
     e: Vector
     gap: Vector
@@ -151,6 +179,73 @@ class Interfaces(NamedTuple):
     deepest: Vector  # indentation since a damped contact was touched
     since: Vector  # closed since; infinity while open
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
+
+
+class Accounts(NamedTuple):
+    """Energies [J] since the start of a run."""
+
+    rows: Vector  # of elements and branches: what they store, supply and lose
+    lines: Matrix  # (lines, 3) losses
+    implicit: Vector  # (volumes,) loss of the implicit step
+    supply: Vector  # (prescribed nodes,)
+    contact: Vector  # (interfaces,) losses
+    film: Vector
+
+
+class NetworkArrays(NamedTuple):
+    """A whole network."""
+
+    bodies: Bodies
+    elements: StepRows
+    branches: StepRows
+    nodes: Nodes
+    node_state: NodeState
+    lines: Lines
+    line_state: LineState
+    interfaces: Interfaces
+    interface_state: InterfaceState
+    accounts: Accounts
+    account_kind: Index
+
+
+class NodeTrial(NamedTuple):
+    """Nodes in the step that is tried."""
+
+    rho: Vector
+    slope: Vector  # of the density over the pressure
+    g: Vector
+    p: Vector
+    p_used: Vector  # pressure and volume that the compliance of the walls counts from
+    V: Vector
+    V_used: Vector
+    r: Vector  # mass that is missing; the last Newton step of the pressure
+    inflow: Vector
+    known: Vector  # pressure that the density was looked up for
+    lower: Vector  # interval that holds the density
+    upper: Vector
+    own: Vector
+    matrix: Vector
+
+
+class FlowTrial(NamedTuple):
+    """Branches and line ends in the step that is tried."""
+
+    mdot: Vector
+    slope_a: Vector
+    slope_b: Vector
+    c: Vector
+    Z: Vector
+    q: Vector
+
+
+class InterfaceTrial(NamedTuple):
+    """Interfaces in the step that is tried."""
+
+    contact: Vector
+    film: Vector
+    force: Vector  # both together
+    e: Vector
+    gap: Vector  # that film and dashpot saw
     contact_loss: Vector
     film_loss: Vector
 
@@ -158,24 +253,52 @@ class Interfaces(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of the time loop: it cannot ask for any itself."""
 
-    interfaces: Matrix
-    nodes: Matrix
-    branches: Matrix
-    ends: Matrix
-    matrix: Matrix
-    sums: Vector
+    nodes: NodeTrial
+    flows: FlowTrial
+    interfaces: InterfaceTrial
+    sums: Vector  # of a record: what its means are made of
+    peaks: Vector
 
 
 def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
     """Memory for a network of these sizes."""
+    vectors = np.zeros((len(NodeTrial._fields) - 1, nodes))
     return Scratch(
-        interfaces=np.zeros((8, interfaces)),
-        nodes=np.zeros((13, nodes)),
-        branches=np.zeros((3, branches)),
-        ends=np.zeros((3, ends)),
-        matrix=np.zeros((nodes, nodes)),
+        nodes=NodeTrial(*[*vectors, np.zeros(nodes * nodes)]),
+        flows=FlowTrial(*np.zeros((3, branches)), *np.zeros((3, ends))),
+        interfaces=InterfaceTrial(*np.zeros((len(InterfaceTrial._fields), interfaces))),
         sums=np.zeros(sums),
+        peaks=np.zeros(interfaces),
     )
+
+
+class Step(NamedTuple):
+    """One step that is tried."""
+
+    level: int  # 0 of a fine step, 1 of a coarse one
+    steps: int  # fine steps in it
+    t: float  # start [s]
+    H: float  # length [s]
+    rate: float  # one over the length [1/s]
+
+
+class Fluid(NamedTuple):
+    """Pressures and flows as pointers, for the phases of a step."""
+
+    nodes: Nodes
+    state: NodeState
+    trial: NodeTrial
+    branches: StepRows
+    flows: FlowTrial
+
+
+class Contacts(NamedTuple):
+    """Interfaces as pointers, for the phases of a step."""
+
+    laws: Vector
+    rows: Interfaces
+    state: InterfaceState
+    trial: InterfaceTrial
 
 
 class Recording(NamedTuple):

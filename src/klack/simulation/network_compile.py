@@ -29,9 +29,13 @@ from klack.simulation.network_arrays import (
     ROWS_AT,
     STORE,
     SUPPLY,
+    Accounts,
     Bodies,
     Interfaces,
+    InterfaceState,
+    NetworkArrays,
     Nodes,
+    NodeState,
     StepRows,
 )
 from klack.simulation.propagator import modal_propagator
@@ -71,12 +75,14 @@ class CompiledNetwork:
 
     Parameters
     ----------
-    bodies, elements, branches, nodes, lines, line_state, interfaces
-        See :mod:`klack.simulation.network_kernel`.
-    books : array [J]
-    book_kind : array of int
-    book_names : tuple of str
-    line_books : array, shape (lines, 3) [J]
+    bodies, elements, branches, nodes, lines, interfaces
+        What stays, with the states of bodies, elements and branches.
+    node_state, line_state, interface_state
+        What changes from step to step.
+    accounts : Accounts
+    account_kind : array of int
+        ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.rows``.
+    account_names : tuple of str
     ports : tuple of PortName
     node_order : tuple of int
         Handle of every node of the loop.
@@ -89,17 +95,23 @@ class CompiledNetwork:
     elements: StepRows
     branches: StepRows
     nodes: Nodes
+    node_state: NodeState
     lines: Lines
     line_state: LineState
-    line_books: NDArray[np.float64]
     interfaces: Interfaces
-    books: Vector
-    book_kind: Index
-    book_names: tuple[str, ...]
+    interface_state: InterfaceState
+    accounts: Accounts
+    account_kind: Index
+    account_names: tuple[str, ...]
     ports: tuple[PortName, ...]
     port_of: Mapping[int, int]
     node_order: tuple[int, ...]
     body_blocks: Index
+
+    @property
+    def arrays(self) -> NetworkArrays:
+        """What the time loop works on."""
+        return NetworkArrays(*(getattr(self, name) for name in NetworkArrays._fields))
 
 
 def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
@@ -113,31 +125,39 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
         )
     port_of, names = _number_ports(rows.bodies)
     bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
-    books = _Books()
-    elements = _step_rows(rows.elements, books, port_of, {})
+    accounts = _Accounts()
+    elements = _step_rows(rows.elements, 0, accounts, port_of, {})
     node_order = _order_nodes(rows)
     node_of = {handle: i for i, handle in enumerate(node_order)}
-    branches = _step_rows(rows.branches, books, port_of, node_of)
+    branches = _step_rows(rows.branches, 3, accounts, port_of, node_of)
     lines, line_state = compile_lines(
         rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
     )
-    nodes = _nodes(rows, node_order, port_of, bodies, lines)
-    ends = nodes.end_node
-    if len(ends):
-        start_lines(lines, line_state, nodes.density * nodes.g[ends])
+    nodes, node_state = _nodes(rows, node_order, port_of, bodies, lines)
+    if nodes.ends:
+        start_lines(lines, line_state, nodes.density * node_state.g[nodes.end_node])
+    interfaces, interface_state = _interfaces(rows, port_of, bodies)
     return CompiledNetwork(
         rows=rows,
         bodies=bodies,
         elements=elements,
         branches=branches,
         nodes=nodes,
+        node_state=node_state,
         lines=lines,
         line_state=line_state,
-        line_books=np.zeros((max(len(rows.lines), 1), 3)),
-        interfaces=_interfaces(rows, port_of, bodies),
-        books=np.zeros(len(books.kinds)),
-        book_kind=np.array(books.kinds, dtype=np.int64),
-        book_names=tuple(books.names),
+        interfaces=interfaces,
+        interface_state=interface_state,
+        accounts=Accounts(
+            rows=np.zeros(len(accounts.kinds)),
+            lines=np.zeros((max(len(rows.lines), 1), 3)),
+            implicit=np.zeros(nodes.volumes),
+            supply=np.zeros(nodes.nodes - nodes.volumes),
+            contact=np.zeros(interfaces.interfaces),
+            film=np.zeros(interfaces.interfaces),
+        ),
+        account_kind=np.array(accounts.kinds, dtype=np.int64),
+        account_names=tuple(accounts.names),
         ports=names,
         port_of=port_of,
         node_order=node_order,
@@ -145,8 +165,8 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
     )
 
 
-class _Books:
-    """Collects the entries of the ledger."""
+class _Accounts:
+    """Collects the entries of the energy balance."""
 
     def __init__(self) -> None:
         self.kinds: list[int] = []
@@ -220,6 +240,8 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         blocks.append(len(count))
         first_port += own
     bodies = Bodies(
+        ports=ports,
+        blocks=len(count),
         fine=np.concatenate(fine),
         coarse=np.concatenate(coarse),
         start=np.array(start, dtype=np.int64),
@@ -236,29 +258,28 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
 
 def _step_rows(
     rows: Sequence[ElementRow | BranchRow],
-    books: _Books,
+    head: int,
+    accounts: _Accounts,
     port_of: Mapping[int, int],
     node_of: Mapping[int, int],
 ) -> StepRows:
     count = len(rows)
     numbers = {
         key: np.zeros(count, np.int64)
-        for key in ("function", "states", "books", "a", "b", "supply", "loss")
+        for key in ("function", "states", "accounts", "a", "b", "supply", "loss")
     }
     offsets = {
         key: np.zeros(count + 1, np.int64)
-        for key in ("parameter0", "state0", "input0", "output0", "port0", "book0")
+        for key in ("parameter0", "state0", "input0", "output0", "port0", "account0")
     }
     numbers["supply"][:] = numbers["loss"][:] = -1
     parameters, state, ports = [np.zeros(0)], [np.zeros(0)], list[int]()
     for k, row in enumerate(rows):
-        head = 0
         if isinstance(row, BranchRow):
-            head = 3
             numbers["a"][k], numbers["b"][k] = node_of[row.a], node_of[row.b]
         numbers["function"][k] = address_of(row.step)
         numbers["states"][k] = len(row.state)
-        numbers["books"][k] = len(row.books)
+        numbers["accounts"][k] = len(row.books)
         parameters.append(row.parameters)
         state.append(row.state)
         ports += [port_of[port] for port in row.ports]
@@ -268,20 +289,22 @@ def _step_rows(
             "input0": (6 if head else 2) + 2 * len(row.ports),
             "output0": head + len(row.ports) + len(row.state) + len(row.books),
             "port0": len(row.ports),
-            "book0": len(row.books),
+            "account0": len(row.books),
         }
         for key, size in sizes.items():
             offsets[key][k + 1] = offsets[key][k] + size
-        offsets["book0"][k] = len(books.kinds)
+        offsets["account0"][k] = len(accounts.kinds)
         label = " ".join(filter(None, (row.component, row.label)))
         for book in row.books:
-            place = books.add(f"{label} {book.label}", _KINDS[book.kind])
+            place = accounts.add(f"{label} {book.label}", _KINDS[book.kind])
             if head and book.kind == "supply":
                 numbers["supply"][k] = place
-        offsets["book0"][k + 1] = len(books.kinds)
+        offsets["account0"][k + 1] = len(accounts.kinds)
         if head and numbers["supply"][k] < 0:
-            numbers["loss"][k] = books.add(f"{label} flow", LOSS)
+            numbers["loss"][k] = accounts.add(f"{label} flow", LOSS)
     return StepRows(
+        rows=count,
+        head=head,
         function=numbers["function"],
         parameters=np.append(np.concatenate(parameters), 0.0),
         parameter0=offsets["parameter0"],
@@ -294,8 +317,8 @@ def _step_rows(
         output0=offsets["output0"],
         ports=np.array(ports, dtype=np.int64),
         port0=offsets["port0"],
-        book0=offsets["book0"],
-        books=numbers["books"],
+        account0=offsets["account0"],
+        accounts=numbers["accounts"],
         a=numbers["a"],
         b=numbers["b"],
         supply=numbers["supply"],
@@ -311,7 +334,7 @@ def _order_nodes(rows: Rows) -> tuple[int, ...]:
 
 def _nodes(
     rows: Rows, order: Sequence[int], port_of: Mapping[int, int], bodies: Bodies, lines: Lines
-) -> Nodes:
+) -> tuple[Nodes, NodeState]:
     node_of = {handle: i for i, handle in enumerate(order)}
     given = [rows.nodes[handle] for handle in order]
     volumes = sum(node.volume > 0.0 for node in given)
@@ -336,21 +359,16 @@ def _nodes(
         for j, b, area_b in walls:
             if i == j and i < volumes:
                 gamma[:, i] += area_a * G[:, a, b] * area_b
-    return Nodes(
+    nodes = Nodes(
+        nodes=count,
         volumes=volumes,
+        walls=len(walls),
+        ends=len(lines.node),
         fluid=fluid,
         ambient=ambient,
         density=density,
-        hint=hint,
         volume=volume,
-        mass=volume * rho[:volumes],
-        held=volume.copy(),
-        p=p,
-        before=p.copy(),
-        g=g,
-        gamma=gamma,
-        numeric=np.zeros(volumes),
-        supply=np.zeros(count - volumes),
+        gamma=gamma.ravel(),
         time=np.concatenate([np.zeros(0), *(node.time for node in tables)]),
         pressure=np.concatenate([np.zeros(0), *(node.pressure for node in tables)]),
         table0=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
@@ -359,9 +377,14 @@ def _nodes(
         wall_area=np.array([w[2] for w in walls], dtype=float),
         end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
     )
+    mass = volume * rho[:volumes]
+    state = NodeState(mass=mass, held=volume.copy(), p=p, before=p.copy(), g=g, hint=hint)
+    return nodes, state
 
 
-def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Interfaces:
+def _interfaces(
+    rows: Rows, port_of: Mapping[int, int], bodies: Bodies
+) -> tuple[Interfaces, InterfaceState]:
     count = len(rows.interfaces)
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     kind = np.full(count, NO_LAW, np.int64)
@@ -384,7 +407,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
     moved, _ = compile_bodies(rows.bodies, (film_time, film_time))
     force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
     rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
-    return Interfaces(
+    interfaces = Interfaces(
+        interfaces=count,
         upper=upper,
         lower=lower,
         G=interface_compliance(bodies, upper, lower),
@@ -402,6 +426,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
         film_small=_FILM_SMALL * force,
         film_felt=_FILM_FELT * force,
         rest=np.array(rest, dtype=float),
+    )
+    state = InterfaceState(
         hint=np.zeros(count, np.int64),
         e=np.zeros(count),
         gap=gap.copy(),
@@ -411,9 +437,8 @@ def _interfaces(rows: Rows, port_of: Mapping[int, int], bodies: Bodies) -> Inter
         deepest=np.zeros(count),
         since=np.full(count, np.inf),
         film_before=np.zeros(count),
-        contact_loss=np.zeros(count),
-        film_loss=np.zeros(count),
     )
+    return interfaces, state
 
 
 def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:

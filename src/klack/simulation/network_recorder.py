@@ -17,7 +17,7 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
 from klack.simulation.network_compile import CompiledNetwork
-from klack.simulation.network_kernel import record_points
+from klack.simulation.network_record import record_points
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder"]
@@ -132,14 +132,11 @@ class Recorder:
         record_points(
             self.recording,
             0,
-            network.bodies.fine,
-            network.bodies.start,
-            network.bodies.modes,
-            network.bodies.at,
-            network.nodes.p,
+            network.bodies,
+            network.node_state.p,
             network.elements.state,
             network.branches.state,
-            network.interfaces.gap,
+            network.interface_state.gap,
         )
         self._points[:, 0] = self.recording.points[0]
         if fresh:  # a run that goes on knows this moment

@@ -12,6 +12,7 @@ from klack import energy_balance
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
@@ -30,25 +31,26 @@ from klack.simulation.network_compile import (
     compile_network,
     modal_state,
 )
-from klack.simulation.network_kernel import (
-    STATUS_BRANCH,
-    STATUS_DONE,
-    STATUS_ELEMENT,
-    STATUS_PRESSURES,
-    run_network,
-)
-from klack.simulation.network_ledger import energy_books, energy_stores, reset_books
+from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
+from klack.simulation.network_kernel import run_network
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
+from klack.simulation.step_status import (
+    STATUS_BRANCH,
+    STATUS_DONE,
+    STATUS_ELEMENT,
+    STATUS_PRESSURES,
+)
 from klack.units import format_si
 
 __all__ = ["simulate_network"]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
-Kept = Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]]
+Changing = NDArray[np.generic]
+Kept = Sequence[tuple[Changing, Changing]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
@@ -89,7 +91,7 @@ def simulate_network(
         ``"free"``: undeformed, with the speeds of their rows.
     state : mapping of str to array, optional
         :attr:`NetworkResult.state` of a former run of the same network and steps, to go on from;
-        ``start`` then has no meaning, time goes on, and the books count from there.
+        ``start`` then has no meaning, time goes on, and the energy balance counts from there.
     progress : callable
         Told the fraction done.
 
@@ -140,7 +142,7 @@ def simulate_network(
     fresh = state is None or _IMPACTS not in state  # of an earlier version
     if state is not None and not fresh:
         finder.state = np.asarray(state[_IMPACTS], dtype=float)
-    reset_books(network)
+    reset_accounts(network)
     _read_stores(network)
     before = energy_stores(network)
     recorder.start(step * first_step, finder, fresh=fresh)
@@ -163,7 +165,7 @@ def simulate_network(
     if failure is not None and not records:
         raise failure
     time = step * (first_step + np.arange(records + 1) * (grid.looks * grid.look_steps))
-    books = energy_books(network, before)
+    books = balance_since(network, before)
     events = finder.events()
     finder.told()
     result = NetworkResult(
@@ -369,18 +371,9 @@ def _advance(
         block,
         step,
         allow_coarse,
-        network.bodies,
-        network.elements,
-        network.branches,
-        network.nodes,
-        network.lines,
-        network.line_state,
-        network.line_books,
-        network.interfaces,
+        network.arrays,
         recording,
         _scratch(network, recording),
-        network.books,
-        network.book_kind,
         report,
     )
     if status != STATUS_DONE:
@@ -389,10 +382,10 @@ def _advance(
 
 def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
     return scratch_memory(
-        interfaces=len(network.rows.interfaces),
-        nodes=len(network.nodes.p),
-        branches=len(network.rows.branches),
-        ends=len(network.nodes.end_node),
+        interfaces=network.interfaces.interfaces,
+        nodes=network.nodes.nodes,
+        branches=network.branches.rows,
+        ends=network.nodes.ends,
         sums=recording.means.shape[1],
     )
 
@@ -423,13 +416,13 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
         name = network.rows.nodes[handle].component
         return ConvergenceError(
             f"{name}: the pressures did not settle {when}.\n"
-            f"State: {_numbers(network.nodes.p)} Pa.\n"
+            f"State: {_numbers(network.node_state.p)} Pa.\n"
             "Try: a smaller step; a volume that no wall can close (V_0 + A y above 0); some "
             "entrained gas."
         )
     return ConvergenceError(
         f"the forces at the ports did not settle {when} (ports still move by {report[0]:.2g} m).\n"
-        f"State: interface gaps {_numbers(network.interfaces.gap)} m.\n"
+        f"State: interface gaps {_numbers(network.interface_state.gap)} m.\n"
         "Try: a smaller step; look for a stiffness far above 1e10 N/m."
     )
 
@@ -450,10 +443,10 @@ def _not_finite_part(network: CompiledNetwork) -> str:
             if not np.all(np.isfinite(data.outputs[data.output0[k] : data.output0[k + 1]])):
                 return name
     for i, handle in enumerate(network.node_order):
-        if not np.isfinite(network.nodes.p[i]):
+        if not np.isfinite(network.node_state.p[i]):
             return f"{network.rows.nodes[handle].component} pressure"
     for c, contact in enumerate(network.rows.interfaces):
-        if not np.isfinite(network.interfaces.force[c]):
+        if not np.isfinite(network.interface_state.force[c]):
             return f"{contact.component} force"
     for i, port in enumerate(network.ports):
         if not np.isfinite(network.bodies.at[Y1 + i]):
@@ -463,7 +456,7 @@ def _not_finite_part(network: CompiledNetwork) -> str:
 
 def _not_finite_account(network: CompiledNetwork) -> str:
     """Component in whose state or energy a number is none; empty if all are."""
-    for name, value in zip(network.book_names, network.books, strict=True):
+    for name, value in zip(network.account_names, network.accounts.rows, strict=True):
         if not np.isfinite(value):
             return name
     part = _not_finite_part(network)
@@ -474,11 +467,11 @@ def _not_finite_account(network: CompiledNetwork) -> str:
             return row.component
     for values, what in (
         (network.line_state.samples, "waves in a line"),
-        (network.line_books, "energy of a line"),
-        (network.nodes.mass, "mass in a chamber"),
-        (network.nodes.numeric, "energy of a chamber"),
-        (network.interfaces.contact_loss, "energy of a contact"),
-        (network.interfaces.film_loss, "energy of a film"),
+        (network.accounts.lines, "energy of a line"),
+        (network.node_state.mass, "mass in a chamber"),
+        (network.accounts.implicit, "energy of a chamber"),
+        (network.accounts.contact, "energy of a contact"),
+        (network.accounts.film, "energy of a film"),
     ):
         if not np.all(np.isfinite(values)):
             return what
@@ -491,53 +484,54 @@ def _numbers(values: Vector) -> str:
 
 def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector) -> None:
     """Ask all rows for a step that ends in the present state: see :func:`call_rows`."""
-    nodes = network.nodes
-    rho = np.array([fluid_at(nodes.fluid, p, 0)[0] for p in nodes.p])
+    table, p = network.nodes.fluid, network.node_state.p
+    rho = np.array([fluid_at(table, pressure, 0)[0] for pressure in p])
     at = network.bodies.at[Y0 : Y0 + len(speeds)]
-    for rows, head in ((network.elements, 0), (network.branches, 3)):
-        failed, code = call_rows(rows, head, t, h, at, speeds, nodes.p, rho)
+    for rows, status in (
+        (network.elements, STATUS_ELEMENT),
+        (network.branches, STATUS_BRANCH),
+    ):
+        failed, code = call_rows(rows, t, h, at, speeds, p, rho)
         if failed >= 0:
-            status = STATUS_BRANCH if head else STATUS_ELEMENT
             raise _failure(network, status, np.array([float(failed), float(code), 0.0]))
 
 
 def _read_stores(network: CompiledNetwork) -> None:
     _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1))
-    for rows, head in ((network.elements, 0), (network.branches, 3)):
-        for k in range(rows.function.size):
-            first = rows.output0[k] + head + rows.port0[k + 1] - rows.port0[k] + rows.states[k]
-            for j in range(rows.books[k]):
-                book = rows.book0[k] + j
-                if network.book_kind[book] == STORE:
-                    network.books[book] = rows.outputs[first + j]
+    for rows in (network.elements, network.branches):
+        for k in range(rows.rows):
+            ports = rows.port0[k + 1] - rows.port0[k]
+            first = rows.output0[k] + rows.head + ports + rows.states[k]
+            for j in range(rows.accounts[k]):
+                account = rows.account0[k] + j
+                if network.account_kind[account] == STORE:
+                    network.accounts.rows[account] = rows.outputs[first + j]
 
 
 _IMPACTS = "impacts.unfinished"
 _LAST = "record.last"
-_SAVED = {
-    "bodies": ("fine", "at"),
-    "elements": ("state",),
-    "branches": ("state",),
-    "nodes": ("mass", "held", "p", "before", "g", "hint"),
-    "line_state": ("samples", "head", "memory", "cavity"),
-    "interfaces": ("hint", "e", "gap", "rate", "force", "chi", "deepest", "since", "film_before"),
-}
 
 
-_LEDGER = {
-    "": ("books", "line_books"),
-    "nodes": ("numeric", "supply"),
-    "interfaces": ("contact_loss", "film_loss"),
-}
+def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+    """All arrays that a step changes and the next one begins with, as a stored state calls them."""
+    line = network.line_state
+    groups = {
+        "bodies": {"fine": network.bodies.fine, "at": network.bodies.at},
+        "elements": {"state": network.elements.state},
+        "branches": {"state": network.branches.state},
+        "nodes": network.node_state._asdict(),
+        "line_state": {name: getattr(line, name) for name in LINE_MEMORY},
+        "interfaces": network.interface_state._asdict(),
+    }
+    arrays = {
+        f"{owner}.{name}": array for owner, group in groups.items() for name, array in group.items()
+    }
+    return {"clock": clock} | arrays
 
 
 def _everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
     """All arrays that a step changes, and what they hold now."""
-    arrays: list[NDArray[np.generic]] = [clock]
-    for group in (_SAVED, _LEDGER):
-        for owner, names in group.items():
-            holder = getattr(network, owner) if owner else network
-            arrays += [getattr(holder, name) for name in names]
+    arrays = [*_changing(network, clock).values(), *network.accounts]
     return [(array, array.copy()) for array in arrays]
 
 
@@ -546,21 +540,14 @@ def _put_back(kept: Kept) -> None:
         array[...] = values
 
 
-def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, NDArray[np.generic]]:
-    saved: dict[str, NDArray[np.generic]] = {"clock": clock.copy()}
-    for owner, names in _SAVED.items():
-        for name in names:
-            saved[f"{owner}.{name}"] = getattr(getattr(network, owner), name).copy()
+def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+    saved = {name: array.copy() for name, array in _changing(network, clock).items()}
     saved["bodies.at"][WORK : WORK + PORTS] = 0.0  # counts from the start of each run
     return saved
 
 
 def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
-    targets: dict[str, NDArray[np.generic]] = {"clock": clock}
-    for owner, names in _SAVED.items():
-        for name in names:
-            targets[f"{owner}.{name}"] = getattr(getattr(network, owner), name)
-    for key, target in targets.items():
+    for key, target in _changing(network, clock).items():
         if key not in state or state[key].shape != target.shape:
             came = f"shape {state[key].shape}" if key in state else "nothing"
             raise InputError(

@@ -17,7 +17,9 @@ phase = njit(
 """Compile a function into the compiled ones that call it; it makes no array.
 
 Without the runtime of numba: counting the references of all arrays of a bundle costs more than most
-phases.  Not to be called from Python.
+phases.  Not to be called from Python.  In the loop of networks bundles of arrays come as
+:func:`klack.network.step_function.pointers`: an access to an array also checks for a negative index
+and loads a stride.
 """
 
 compiled = partial(njit, cache=True, _nrt=True, error_model="python", forceinline=False)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from klack.contact.laws import ContactLaw
+from klack.network.protocols import InterfaceLaw
 from klack.network.rows import BodyRow, InterfaceRow
 
 __all__ = ["effective_mass", "longest_period", "rest_time", "resting_dissipation"]
@@ -92,7 +92,7 @@ def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
     return 1.0 / inverse if inverse > 0.0 else np.inf
 
 
-def _depth(law: ContactLaw, energy: float) -> float:
+def _depth(law: InterfaceLaw, energy: float) -> float:
     """Indentation that stores this energy [m], to some per cent."""
     stored = law.potential(_DEPTHS)
     held = stored > 0.0

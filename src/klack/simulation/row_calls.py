@@ -1,13 +1,25 @@
-"""Ask every row of a network for its forces and flows at one moment, outside of the time loop."""
+"""Ask the rows of a network for their forces and flows, in the time loop and outside of it."""
+
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from klack.network.step_function import call, pointer
+from klack.network.step_function import call, first, pointers, shift
 from klack.simulation.network_arrays import StepRows
+from klack.simulation.phase import phase
 
-__all__ = ["SHARE_OF_STEP", "call_rows"]
+__all__ = [
+    "SHARE_OF_STEP",
+    "ask_again",
+    "ask_branch",
+    "ask_element",
+    "call_rows",
+    "push_ports",
+    "push_walls",
+    "take_states",
+]
 
 Vector = NDArray[np.float64]
 
@@ -15,16 +27,86 @@ SHARE_OF_STEP = 1e-6
 """Of a fine step: over so short a time sources and states are asked for their value at its end."""
 
 
+@phase
+def ask_again(rows: Any, k: int) -> int:
+    """Call row ``k`` with the inputs that lie there; returns its status."""
+    return call(
+        rows.function[k],
+        shift(rows.parameters, rows.parameter0[k]),
+        shift(rows.state, rows.state0[k]),
+        shift(rows.inputs, rows.input0[k]),
+        shift(rows.outputs, rows.output0[k]),
+    )
+
+
+@phase
+def _tell_ports(rows: Any, k: int, place: int, y0: Any, y1: Any) -> None:
+    """Write displacements at both ends of the step into the inputs of row ``k``."""
+    for j in range(rows.port0[k], rows.port0[k + 1]):
+        rows.inputs[place] = y0[rows.ports[j]]
+        rows.inputs[place + 1] = y1[rows.ports[j]]
+        place += 2
+
+
+@phase
+def ask_element(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any) -> int:
+    """Call element ``k`` for a step between two displacements of every port."""
+    i0 = rows.input0[k]
+    rows.inputs[i0] = t
+    rows.inputs[i0 + 1] = h
+    _tell_ports(rows, k, i0 + 2, y0, y1)
+    return ask_again(rows, k)
+
+
+@phase
+def ask_branch(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any, p: Any, rho: Any) -> int:
+    """Call branch ``k`` for a step that ends with these pressures and densities of all nodes."""
+    i0 = rows.input0[k]
+    a, b = rows.a[k], rows.b[k]
+    rows.inputs[i0] = t
+    rows.inputs[i0 + 1] = h
+    rows.inputs[i0 + 2] = p[a]
+    rows.inputs[i0 + 3] = p[b]
+    rows.inputs[i0 + 4] = rho[a]
+    rows.inputs[i0 + 5] = rho[b]
+    _tell_ports(rows, k, i0 + 6, y0, y1)
+    return ask_again(rows, k)
+
+
+@phase
+def push_ports(rows: Any, k: int, force: Any) -> None:
+    """Add the forces that row ``k`` gave out to those of its ports [N]."""
+    o0, q0 = rows.output0[k] + rows.head, rows.port0[k]
+    for j in range(q0, rows.port0[k + 1]):
+        force[rows.ports[j]] += rows.outputs[o0 + j - q0]
+
+
+@phase
+def push_walls(nodes: Any, p: Any, force: Any) -> None:
+    """Add the forces of the pressures on all walls to those of their ports [N]."""
+    for w in range(nodes.walls):
+        force[nodes.wall_port[w]] += nodes.wall_area[w] * (p[nodes.wall_node[w]] - nodes.ambient)
+
+
+@phase
+def take_states(rows: Any, k: int) -> int:
+    """Take over the next states of row ``k``; returns where its accounts lie in the outputs."""
+    o0 = rows.output0[k] + rows.head + rows.port0[k + 1] - rows.port0[k]
+    for j in range(rows.states[k]):
+        rows.state[rows.state0[k] + j] = rows.outputs[o0 + j]
+    return o0 + rows.states[k]
+
+
 @njit(cache=True)
 def call_rows(
-    rows: StepRows, head: int, t: float, h: float, y: Vector, v: Vector, p: Vector, rho: Vector
+    rows: StepRows, t: float, h: float, y: Vector, v: Vector, p: Vector, rho: Vector
 ) -> tuple[int, int]:
     """Call every row over a step whose end has these displacements and speeds.
 
     Parameters
     ----------
     rows : StepRows
-        Elements (``head`` 0) or branches (3).
+        Elements or branches.
     t, h : float [s]
         Start and length of the step.
     y, v : array [m], [m/s]
@@ -37,26 +119,13 @@ def call_rows(
     (int, int)
         The row that failed and its status; -1 and 0 if none did.
     """
-    for k in range(rows.function.size):
-        i0 = rows.input0[k]
-        rows.inputs[i0], rows.inputs[i0 + 1] = t, h
-        at = i0 + 2
-        if head > 0:
-            a, b = rows.a[k], rows.b[k]
-            rows.inputs[i0 + 2], rows.inputs[i0 + 3] = p[a], p[b]
-            rows.inputs[i0 + 4], rows.inputs[i0 + 5] = rho[a], rho[b]
-            at = i0 + 6
-        for j in range(rows.port0[k], rows.port0[k + 1]):
-            port = rows.ports[j]
-            rows.inputs[at], rows.inputs[at + 1] = y[port] - h * v[port], y[port]
-            at += 2
-        status = call(
-            rows.function[k],
-            pointer(rows.parameters, rows.parameter0[k]),
-            pointer(rows.state, rows.state0[k]),
-            pointer(rows.inputs, i0),
-            pointer(rows.outputs, rows.output0[k]),
-        )
+    before = y - h * v
+    at, y0, y1 = pointers(rows), first(before), first(y)
+    for k in range(rows.rows):
+        if rows.head > 0:
+            status = ask_branch(at, k, t, h, y0, y1, first(p), first(rho))
+        else:
+            status = ask_element(at, k, t, h, y0, y1)
         if status != 0:
             return k, status
     return -1, 0

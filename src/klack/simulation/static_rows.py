@@ -7,8 +7,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.hydraulics.fluid_table import fluid_at
+from klack.network.step_function import first, pointers
 from klack.simulation.network_arrays import Nodes, StepRows
-from klack.simulation.row_calls import call_rows
+from klack.simulation.row_calls import call_rows, push_ports, push_walls
 
 __all__ = ["at_rest", "slopes_at_rest"]
 
@@ -24,6 +25,7 @@ def at_rest(
     elements: StepRows,
     branches: StepRows,
     nodes: Nodes,
+    hint: Index,
     column: Index,
     h: float,
     y: Vector,
@@ -37,6 +39,8 @@ def at_rest(
 
     Parameters
     ----------
+    hint : array of int
+        Where the densities were found last.
     column : array of int, shape (branches,)
         1 for a branch whose flow is a state: an unknown of its own, which is left out here.
     h : float [s]
@@ -61,42 +65,40 @@ def at_rest(
     """
     rho = np.ones(p.size)
     for i in range(p.size):
-        rho[i] = fluid_at(nodes.fluid, p[i], nodes.hint[i])[0]
+        rho[i] = fluid_at(nodes.fluid, p[i], hint[i])[0]
     force[:] = 0.0
     inflow[:] = 0.0
     size[:] = 0.0
     ports = force.size
     still = np.zeros(y.size)
-    report[0], (report[1], report[2]) = 0, call_rows(elements, 0, -h, h, y, still, p, rho)
-    if report[1] >= 0:
-        return False
-    for k in range(elements.function.size):
-        q0 = elements.port0[k]
-        for j in range(q0, elements.port0[k + 1]):
-            push = elements.outputs[elements.output0[k] + j - q0]
-            force[elements.ports[j]] += push
-            size[elements.ports[j]] += abs(push)
-    report[0], (report[1], report[2]) = 3, call_rows(branches, 3, -h, h, y, still, p, rho)
-    if report[1] >= 0:
-        return False
-    for k in range(branches.function.size):
-        o0, q0 = branches.output0[k], branches.port0[k]
-        for j in range(q0, branches.port0[k + 1]):
-            push = branches.outputs[o0 + 3 + j - q0]
-            force[branches.ports[j]] += push
-            size[branches.ports[j]] += abs(push)
+    for rows in (elements, branches):
+        report[0], (report[1], report[2]) = rows.head, call_rows(rows, -h, h, y, still, p, rho)
+        if report[1] >= 0:
+            return False
+        _gather(rows, force, size)
+    for k in range(branches.rows):
         if column[k] == 0:
-            a, b, flow = branches.a[k], branches.b[k], branches.outputs[o0]
+            a, b, flow = branches.a[k], branches.b[k], branches.outputs[branches.output0[k]]
             inflow[a] -= flow
             inflow[b] += flow
             size[ports + a] += abs(flow)
             size[ports + b] += abs(flow)
-    for w in range(nodes.wall_node.size):
-        pressure = p[nodes.wall_node[w]]
-        force[nodes.wall_port[w]] += nodes.wall_area[w] * (pressure - nodes.ambient)
-        size[nodes.wall_port[w]] += abs(nodes.wall_area[w]) * (pressure + nodes.ambient)
+    push_walls(pointers(nodes), first(p), first(force))
+    for w in range(nodes.walls):
+        known = p[nodes.wall_node[w]] + nodes.ambient
+        size[nodes.wall_port[w]] += abs(nodes.wall_area[w]) * known
     force[ports - 1] = 0.0  # of the ground
     return True
+
+
+@njit(cache=True)
+def _gather(rows: StepRows, force: Vector, size: Vector) -> None:
+    """Add the forces of all rows to those of their ports, and what their round-off belongs to."""
+    for k in range(rows.rows):
+        push_ports(pointers(rows), k, first(force))
+        o0, q0 = rows.output0[k] + rows.head, rows.port0[k]
+        for j in range(q0, rows.port0[k + 1]):
+            size[rows.ports[j]] += abs(rows.outputs[o0 + j - q0])
 
 
 @njit(cache=True)
@@ -104,6 +106,7 @@ def slopes_at_rest(
     elements: StepRows,
     branches: StepRows,
     nodes: Nodes,
+    hint: Index,
     column: Index,
     h: float,
     move: float,
@@ -122,7 +125,7 @@ def slopes_at_rest(
     Ports are moved by ``move`` [m].  ``by_port[:, j]`` holds forces, then inflows, per metre of
     port ``j``; ``by_pressure`` the same per pascal, one column for each free node.
     """
-    if not at_rest(elements, branches, nodes, column, h, y, p, force, inflow, size, report):
+    if not at_rest(elements, branches, nodes, hint, column, h, y, p, force, inflow, size, report):
         return False
     ports = force.size
     force1, inflow1, size1 = np.zeros(ports), np.zeros(inflow.size), np.zeros(size.size)
@@ -130,7 +133,9 @@ def slopes_at_rest(
         keep = y[j]
         y[j] = keep + move
         moved = y[j] - keep
-        found = at_rest(elements, branches, nodes, column, h, y, p, force1, inflow1, size1, report)
+        found = at_rest(
+            elements, branches, nodes, hint, column, h, y, p, force1, inflow1, size1, report
+        )
         y[j] = keep
         if not found:
             return False
@@ -140,11 +145,13 @@ def slopes_at_rest(
         keep = p[free[j]]
         p[free[j]] = keep * (1.0 + _PRESS)
         pressed = p[free[j]] - keep
-        found = at_rest(elements, branches, nodes, column, h, y, p, force1, inflow1, size1, report)
+        found = at_rest(
+            elements, branches, nodes, hint, column, h, y, p, force1, inflow1, size1, report
+        )
         p[free[j]] = keep
         if not found:
             return False
         by_pressure[:ports, j] = (force1 - force) / pressed
         by_pressure[ports:, j] = (inflow1 - inflow) / pressed
     # what the rows gave out last belongs to the state itself
-    return at_rest(elements, branches, nodes, column, h, y, p, force, inflow, size, report)
+    return at_rest(elements, branches, nodes, hint, column, h, y, p, force, inflow, size, report)

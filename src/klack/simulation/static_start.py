@@ -207,10 +207,16 @@ class _Balance:
         self.kept = [
             (k, row.at_rest) for k, row in enumerate(rows.elements) if row.at_rest is not None
         ]
-        self._rows = (network.elements, network.branches, nodes, self.column_rows)
-        self.force, self.inflow = np.zeros(count + 1), np.zeros(nodes.p.size)
+        self._rows = (
+            network.elements,
+            network.branches,
+            nodes,
+            network.node_state.hint,
+            self.column_rows,
+        )
+        self.force, self.inflow = np.zeros(count + 1), np.zeros(nodes.nodes)
         self.elements = self.force
-        self.size = np.zeros(count + 1 + nodes.p.size)
+        self.size = np.zeros(count + 1 + nodes.nodes)
         self.by_port = np.zeros((self.size.size, count))
         self.by_pressure = np.zeros((self.size.size, self.free.size))
         self.contact_force = np.zeros(len(rows.interfaces))
@@ -264,9 +270,8 @@ class _Balance:
 
     def first(self) -> _State:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
-        nodes = self.network.nodes
         z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
-        return _State(z, y, nodes.p.copy(), np.zeros(len(self.ends)))
+        return _State(z, y, self.network.node_state.p.copy(), np.zeros(len(self.ends)))
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
         """Rigid modes that are free to creep; None if all is in equilibrium.
@@ -485,7 +490,7 @@ class _Balance:
     def volumes(self, y: Vector) -> Vector:
         """Volume of every node [m^3] with the walls at these displacements."""
         nodes = self.network.nodes
-        volume = np.zeros(nodes.p.size)
+        volume = np.zeros(nodes.nodes)
         volume[: nodes.volumes] = nodes.volume
         np.add.at(volume, nodes.wall_node, nodes.wall_area * y[nodes.wall_port])
         return volume
@@ -633,18 +638,18 @@ class _Balance:
 
     def _put_fluid(self, state: _State) -> None:
         network = self.network
-        nodes, branches = network.nodes, network.branches
+        nodes, now, branches = network.nodes, network.node_state, network.branches
         for i, p in enumerate(state.p):
-            nodes.p[i] = nodes.before[i] = p
-            rho, _, nodes.g[i], nodes.hint[i] = fluid_at(nodes.fluid, p, 0)
+            now.p[i] = now.before[i] = p
+            rho, _, now.g[i], now.hint[i] = fluid_at(nodes.fluid, p, 0)
             if i < nodes.volumes:
-                held = nodes.held[i] = self.volumes(state.y)[i]
+                held = now.held[i] = self.volumes(state.y)[i]
                 if held <= 0.0:
                     raise _emptied(network, i, float(held))
-                nodes.mass[i] = rho * held
-        for k in range(branches.function.size):
+                now.mass[i] = rho * held
+        for k in range(branches.rows):
             count = branches.states[k]
-            after = branches.output0[k] + 3 + branches.port0[k + 1] - branches.port0[k]
+            after = branches.output0[k] + branches.head + branches.port0[k + 1] - branches.port0[k]
             if self.column_rows[k] == 0:
                 begin = branches.state0[k]
                 branches.state[begin : begin + count] = branches.outputs[after : after + count]
@@ -656,25 +661,25 @@ class _Balance:
                 line = self.column_line[place - len(self.column_branch)]
                 lines[line] = m / nodes.density
         if lines.size:
-            pressure = nodes.density * nodes.g[nodes.end_node]
+            pressure = nodes.density * now.g[nodes.end_node]
             start_lines(network.lines, network.line_state, pressure, lines)
 
     def _put_interfaces(self, state: _State) -> None:
         network = self.network
-        interfaces, rows = network.interfaces, network.rows
-        interfaces.force[:] = self.contact_force
-        interfaces.gap[:] = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
-        interfaces.rate[:] = 0.0
-        interfaces.e[:] = interfaces.series * interfaces.force  # in equilibrium with the contacts
-        closed = interfaces.gap + interfaces.e < 0.0
-        interfaces.since[closed] = -np.inf
+        interfaces, now, rows = network.interfaces, network.interface_state, network.rows
+        now.force[:] = self.contact_force
+        now.gap[:] = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
+        now.rate[:] = 0.0
+        now.e[:] = interfaces.series * now.force  # in equilibrium with the contacts
+        closed = now.gap + now.e < 0.0
+        now.since[closed] = -np.inf
         owner = {handle: row for row in rows.bodies for handle in row.ports}
         for c, touching in enumerate(rows.interfaces):
             pair = (owner.get(touching.upper), owner.get(touching.lower))
-            chi = resting_dissipation(touching, pair, -float(interfaces.gap[c] + interfaces.e[c]))
+            chi = resting_dissipation(touching, pair, -float(now.gap[c] + now.e[c]))
             damped = bool(closed[c]) and interfaces.alpha[c] > 0.0
             # 0 would be for "not touched yet"
-            interfaces.chi[c] = chi or (_UNDAMPED if damped else 0.0)
+            now.chi[c] = chi or (_UNDAMPED if damped else 0.0)
 
     def _told(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
         network = self.network

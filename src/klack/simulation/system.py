@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.laws import ContactLaw
 from klack.errors import InputError, require_nonnegative
+from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["AxialForce", "ContactPair", "ReducedSystem", "ReturnSpring"]
@@ -37,7 +37,7 @@ class ContactPair:
     port_a: str
     body_b: str
     port_b: str
-    law: ContactLaw
+    law: InterfaceLaw
     gap: float
     series_compliance: float = 0.0
 

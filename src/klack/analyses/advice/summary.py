@@ -1,19 +1,32 @@
 """An advice in words and numbers: rows of the table, lines below it, plain JSON."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from klack.analyses.advice.advice import Advice, Counsel
 from klack.analyses.advice.ladder import REACH, Measure, score
 from klack.analyses.advice.settings import SettingValue
-from klack.analyses.json_results import AdviceJson, AdvisedSettingJson
+from klack.analyses.json_parts import Real
 from klack.input.problem import Key
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
-__all__ = ["ADVICE_COLUMNS", "advice_lines", "advice_rows", "advice_to_json"]
+__all__ = [
+    "ADVICE_COLUMNS",
+    "AdviceJson",
+    "AdvisedCase",
+    "advice_lines",
+    "advice_rows",
+    "advice_to_json",
+    "advice_told",
+]
 
 ADVICE_COLUMNS = (
     "setting",
@@ -24,6 +37,82 @@ ADVICE_COLUMNS = (
     "with the advice",
     "from runs",
 )
+
+
+class AdvisedSettingJson(TypedDict):
+    """One setting with its measured convergence."""
+
+    name: str
+    kind: str
+    values: Annotated[dict[str, dict[str, Real]], Field(description="By key: now, advised.")]
+    order: float
+    order_measured: bool
+    factors_run: list[float]
+    factor: float
+    reached: bool
+    error: dict[str, dict[str, Real]]
+    runs: str
+
+
+class FixedErrorJson(TypedDict):
+    """An error that no setting changes."""
+
+    name: str
+    error: dict[str, Real]
+
+
+class AdviceJson(TypedDict):
+    """``klack advise``: errors relative, or in dB where the name says so."""
+
+    schema: Literal["klack-advise/1"]
+    case: str
+    level: str
+    judged_up_to_Hz: Real
+    target: dict[str, float]
+    meets_target: dict[Literal["now", "advised"], bool | None]
+    meshes_given: list[str]
+    settings: list[AdvisedSettingJson]
+    fixed: list[FixedErrorJson]
+    expected_error: dict[Literal["now", "advised"], dict[str, Real]]
+    run_again: dict[Literal["now", "advised"], dict[str, Real]] | None
+    degrees_of_freedom: dict[Literal["now", "advised"], int] | None
+    changes: Annotated[dict[str, str], Field(description="By key: what the advice writes.")]
+    notes: list[str]
+    runs: int
+    wall_time_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AdvisedCase:
+    """An advice for a case file, and what it writes there.
+
+    Parameters
+    ----------
+    advice : Advice
+    changes : mapping of key to str
+    yaml : str
+        Sections of the case with the advice in them; empty if nothing changes.
+    written : Path or None
+        Where the whole case with the advice stands.
+    """
+
+    advice: Advice
+    changes: Mapping[Key, str]
+    yaml: str
+    written: Path | None
+
+
+def advice_told(advised: AdvisedCase) -> Iterator[TextTable | str]:
+    """What a terminal shows: the settings, the verdict, and what to write into the case."""
+    advice = advised.advice
+    title = f"{advice.title}: advice for the {advice.level} level"
+    yield TextTable(title=title, columns=ADVICE_COLUMNS, rows=advice_rows(advice))
+    yield from advice_lines(advice)
+    if advised.yaml:
+        yield "\nIn place of the same keys of the case:\n"
+        yield advised.yaml
+    if advised.written is not None:
+        yield f"The case with the advice: {advised.written}"
 
 
 def advice_rows(advice: Advice) -> tuple[tuple[str, ...], ...]:
@@ -208,15 +297,9 @@ def _reaches(advice: Advice) -> list[str]:
     return lines
 
 
-def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> AdviceJson:
-    """Plain numbers: errors relative (-) or in dB, settings in SI.
-
-    Parameters
-    ----------
-    advice : Advice
-    values : mapping of key to str
-        What the advice writes into the case.
-    """
+def advice_to_json(advised: AdvisedCase) -> AdviceJson:
+    """Plain numbers: errors relative (-) or in dB, settings in SI."""
+    advice = advised.advice
     names = [_json_name(measure) for measure in advice.measures]
 
     def errors(found: NDArray[np.float64]) -> dict[str, float | None]:
@@ -243,7 +326,7 @@ def advice_to_json(advice: Advice, values: Mapping[Key, str]) -> AdviceJson:
         "degrees_of_freedom": None
         if advice.dofs is None
         else {"now": advice.dofs[0], "advised": advice.dofs[1]},
-        "changes": {".".join(map(str, key)): text for key, text in values.items()},
+        "changes": {".".join(map(str, key)): text for key, text in advised.changes.items()},
         "notes": list(advice.notes),
         "runs": advice.runs,
         "wall_time_s": advice.wall_time,

@@ -1,21 +1,24 @@
 """A calibration on disk; see :mod:`klack.analyses.store`."""
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
+from klack.analyses.calibration.measures import (
+    CALIBRATION_MEASURES,
+    FITTED_MEASURES,
+    PARAMETER_MEASURES,
+)
 from klack.analyses.calibration.record import CalibrationStudy
-from klack.analyses.calibration.summary import calibration_to_json, calibration_told
+from klack.analyses.calibration.summary import (
+    CalibrationJson,
+    calibration_measured,
+    calibration_to_json,
+    calibration_told,
+)
 from klack.analyses.store import RecordFormat
-from klack.report.page import Content
 
 __all__ = ["CALIBRATION"]
 
 
-def _calibration_content(study: CalibrationStudy) -> Content:
-    from klack.analyses.calibration.content import calibration_content
-
-    return calibration_content(study)
-
-
-CALIBRATION = Analysis(
+CALIBRATION = StoredAnalysis(
     form=RecordFormat(
         name="klack calibration",
         version=1,
@@ -29,7 +32,14 @@ CALIBRATION = Analysis(
             "excess": "1",
         },
     ),
-    content=_calibration_content,
+    page="calibration.content:calibration_content",
+    json=CalibrationJson,
     to_json=calibration_to_json,
     told=calibration_told,
+    measures={
+        "calibration": CALIBRATION_MEASURES,
+        "calibrated parameter": PARAMETER_MEASURES,
+        "first impact of a calibration": FITTED_MEASURES,
+    },
+    measured=calibration_measured,
 )

@@ -1,17 +1,29 @@
 """What a calibration report says, before it is laid out: the same words for screen and paper."""
 
+from collections.abc import Iterable
 from math import isfinite
 
 from klack.analyses.calibration.correlation_figure import correlation_figure
 from klack.analyses.calibration.figures import profile_chart, stroke_chart, window_chart
+from klack.analyses.calibration.measures import (
+    BOUNDS,
+    CALIBRATION_MEASURES,
+    FITTED_MEASURES,
+    INTERVAL,
+    SCATTER,
+    STANDARD_ERROR,
+    START,
+    VALUE,
+)
 from klack.analyses.calibration.record import (
     CalibratedParameter,
     CalibrationStudy,
-    FittedImpact,
+    ProfileCurve,
 )
+from klack.analyses.measures import glossary, page_cells, page_heads
 from klack.analyses.page import page_of
 from klack.report.page import Content, Section, Table
-from klack.report.wording import count, listed, quantity
+from klack.report.wording import listed, quantity
 
 __all__ = ["calibration_content"]
 
@@ -67,14 +79,7 @@ def _answer(study: CalibrationStudy) -> str:
 def _found(item: CalibratedParameter) -> str:
     if not isfinite(item.standard_error):
         return f"{item.name} (not determined)"
-    error = _value(item, item.standard_error, 2)
-    return f"{item.name} {_value(item, item.value, item.digits)} ± {error}"
-
-
-def _value(item: CalibratedParameter, value: float, digits: int = 4) -> str:
-    if item.unit or not isfinite(value):
-        return quantity(value, item.unit, digits)
-    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+    return f"{item.name} {VALUE.on_page(item)} ± {STANDARD_ERROR.on_page(item)}"
 
 
 # --------------------------------------------------------------------------- tables
@@ -87,30 +92,35 @@ def _parameter_table(study: CalibrationStudy) -> Table:
         known = isfinite(item.standard_error)
         cells = [
             item.name,
-            _value(item, item.value, item.digits),
-            _value(item, item.standard_error, 2) if known else "–",
-            _range(item, item.lower_95, item.upper_95, item.digits) if known else "not determined",
+            VALUE.on_page(item),
+            STANDARD_ERROR.on_page(item),
+            _span(end.on_page(item) for end in INTERVAL) if known else "not determined",
         ]
         if profiles:
             profile = profiles.get(item.name)
-            cells.append(
-                "–" if profile is None else _range(item, profile.lower, profile.upper, item.digits)
-            )
+            cells.append("–" if profile is None else _profile_span(item, profile))
         cells += [
-            _value(item, item.scatter, 2),
-            _value(item, item.start),
-            _range(item, item.lower, item.upper, 3),
+            SCATTER.on_page(item),
+            START.on_page(item),
+            _span(end.on_page(item) for end in BOUNDS),
         ]
         rows.append(tuple(cells))
-    columns = ["parameter", "value", "standard error", "95 % interval"]
+    columns = ["parameter", VALUE.name, STANDARD_ERROR.name, "95 % interval"]
     columns += ["95 % by profile"] if profiles else []
-    columns += ["scatter of strokes", "start", "bounds"]
+    columns += [SCATTER.name, START.name, "bounds"]
     return Table(columns=tuple(columns), rows=tuple(rows))
 
 
-def _range(item: CalibratedParameter, low: float, high: float, digits: int) -> str:
-    ends = [_value(item, end, digits) if isfinite(end) else "bound" for end in (low, high)]
-    return f"{ends[0]} to {ends[1]}"
+def _profile_span(item: CalibratedParameter, profile: ProfileCurve) -> str:
+    """Ends of an interval that the profile may leave open towards a bound."""
+    ends = (profile.lower, profile.upper)
+    return _span(
+        quantity(end, item.unit, item.digits) if isfinite(end) else "bound" for end in ends
+    )
+
+
+def _span(ends: Iterable[str]) -> str:
+    return " to ".join(ends)
 
 
 def _key_table(study: CalibrationStudy) -> Table:
@@ -119,18 +129,12 @@ def _key_table(study: CalibrationStudy) -> Table:
 
 
 def _impact_table(study: CalibrationStudy) -> Table:
-    def row(impact: FittedImpact) -> tuple[str, ...]:
-        return (
-            _STOPS.get(impact.stop, impact.stop),
-            quantity(impact.measured, "s", 5),
-            quantity(impact.scatter, "s", 2),
-            quantity(impact.before, "s", 5),
-            quantity(impact.after, "s", 5),
-        )
-
     return Table(
-        columns=("first impact on", "measured", "scatter", "before", "calibrated"),
-        rows=tuple(row(impact) for impact in study.impacts),
+        columns=("first impact on", *page_heads(FITTED_MEASURES)),
+        rows=tuple(
+            (_STOPS.get(impact.stop, impact.stop), *page_cells(FITTED_MEASURES, impact))
+            for impact in study.impacts
+        ),
     )
 
 
@@ -140,20 +144,18 @@ def _fact_table(study: CalibrationStudy) -> Table:
     )
     rows = [
         ("measured", study.source),
-        ("strokes", count(len(study.strokes))),
         ("discarded", "; ".join(study.rejected) or "none"),
         ("variant", study.variant),
         ("channels", ", ".join(c.role for c in study.channels if c.weight.any())),
         ("windows", window),
-        ("degrees of freedom of Student's t", count(study.degrees)),
-        ("misfit", f"{study.misfit:.2f}"),
-        ("iterations", f"{study.iterations}" + ("" if study.converged else ", not settled")),
-        (
-            "computed strokes",
-            count(study.evaluations)
-            + (f", {count(study.resumed)} of them from an earlier run" if study.resumed else ""),
+        *(
+            (head, cell)
+            for head, cell in zip(
+                page_heads(CALIBRATION_MEASURES),
+                page_cells(CALIBRATION_MEASURES, study),
+                strict=True,
+            )
         ),
-        ("processes", count(study.workers)),
         (
             "singular values of the sensitivities",
             ", ".join(f"{value:.3g}" for value in study.singular_values),
@@ -194,34 +196,14 @@ def _profiles(study: CalibrationStudy) -> Section:
 
 
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
-    (
-        "value",
-        "Where the weighted sum of squares between the mean measured stroke and the computed one "
-        "is smallest, inside the bounds. The computed stroke went through the same sensor, trigger "
-        "and zero.",
-    ),
-    (
-        "standard error",
-        "Of the mean of all strokes. Every stroke alone asks for its own value (one Gauss-Newton "
-        "step); the standard error is the standard deviation of these over the root of their "
-        "number. Residuals of one stroke move together, so samples are not counted as independent.",
-    ),
+    *glossary((VALUE, STANDARD_ERROR)),
     (
         "95 % interval",
         "Value plus and minus the standard error times Student's quantile for one degree of "
         "freedom less than strokes. 'Profile' is the interval of the profile likelihood, which "
         "does not take the model for linear.",
     ),
-    (
-        "scatter of strokes",
-        "Standard deviation of what the single strokes ask for. It holds the true scatter of the "
-        "valve and the noise of one record.",
-    ),
-    (
-        "misfit",
-        "Weighted root mean square residual of the mean stroke in standard errors of the mean: "
-        "about 1 or less if only scatter is left; far above, something in the model is wrong.",
-    ),
+    *glossary((SCATTER, *(item for item in CALIBRATION_MEASURES if item.key == "misfit"))),
     (
         "first impact",
         "Where the fitted approach meets the level of the stop, read off the mean measured stroke "

@@ -3,15 +3,12 @@
 The same command asks for the same trials again, finds them here and comes to where it was.
 """
 
-import json
 from base64 import b64decode, b64encode
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-import klack
 from klack.analyses.calibration.motion import Motion
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.valve import ValveCase
@@ -26,19 +23,12 @@ TrialLog = UnfinishedLog[TrialKey, Motion]
 """Computed trials by duration and values."""
 
 
-def trial_log(folder: Path | None, mark: str) -> TrialLog:
-    """Open the log of a calibration in a folder; in memory without one."""
-    return UnfinishedLog(TRIAL_LOG, folder, mark)
-
-
 def calibration_mark(case: ValveCase, strokes: StrokeSet) -> str:
-    """Digest of all that decides a trial: case, its files, measured strokes, klack, libraries."""
-    return fingerprint(case.bodies.values(), _deciding(case, strokes))
+    """Digest of all that decides a trial: the case and the measured strokes."""
+    return fingerprint(case, _deciding(case, strokes))
 
 
 def _deciding(case: ValveCase, strokes: StrokeSet) -> Iterator[bytes]:
-    for word in (klack.__version__, np.__version__, case.source):
-        yield word.encode()
     for name, digest in case.own_components.items():
         yield f"{name} {digest}".encode()
     yield strokes.time.tobytes()
@@ -48,9 +38,8 @@ def _deciding(case: ValveCase, strokes: StrokeSet) -> Iterator[bytes]:
             yield np.ascontiguousarray(values).tobytes()
 
 
-def _line(key: TrialKey, motion: Motion) -> str:
-    # the shortest text of a double is read back exactly
-    data = {
+def _data(key: TrialKey, motion: Motion) -> Mapping[str, Any]:
+    return {
         "trial": list(key),
         "step": motion.step,
         "channels": {
@@ -59,30 +48,26 @@ def _line(key: TrialKey, motion: Motion) -> str:
         },
         "impacts": {stop: list(times) for stop, times in motion.impacts.items()},
     }
-    return json.dumps(data)
 
 
-def _trial(line: bytes) -> tuple[TrialKey, Motion] | None:
-    try:
-        data: dict[str, Any] = json.loads(line)
-        motion = Motion(
-            step=float(data["step"]),
-            channels={
-                str(role): np.frombuffer(b64decode(text, validate=True), dtype="<f4")
-                for role, text in data["channels"].items()
-            },
-            impacts={str(stop): tuple(map(float, t)) for stop, t in data["impacts"].items()},
-        )
-        return tuple(map(float, data["trial"])), motion
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None
+def _trial(data: Mapping[str, Any]) -> tuple[TrialKey, Motion]:
+    motion = Motion(
+        step=float(data["step"]),
+        channels={
+            str(role): np.frombuffer(b64decode(text, validate=True), dtype="<f4")
+            for role, text in data["channels"].items()
+        },
+        impacts={str(stop): tuple(map(float, t)) for stop, t in data["impacts"].items()},
+    )
+    return tuple(map(float, data["trial"])), motion
 
 
 TRIAL_LOG = LogForm(
     file="calibration.unfinished.jsonl",
     format="klack calibration 1",
-    parts="computed trials",
-    line=_line,
+    parts="computed strokes",
+    data=_data,
     read=_trial,
 )
 """How computed trials are kept."""
+trial_log = TRIAL_LOG.open

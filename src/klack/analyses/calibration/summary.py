@@ -2,16 +2,77 @@
 
 from collections.abc import Iterator
 from math import isfinite
+from typing import Annotated, Any, Literal, NotRequired, cast
 
-from klack.analyses.analysis import TextTable
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.analysis import Measured
+from klack.analyses.calibration.measures import (
+    BOUNDS,
+    CALIBRATION_MEASURES,
+    FITTED_MEASURES,
+    INTERVAL,
+    PARAMETER_MEASURES,
+    STANDARD_ERROR,
+    START,
+    VALUE,
+)
 from klack.analyses.calibration.record import CalibratedParameter, CalibrationStudy
-from klack.analyses.json_results import CalibratedJson, CalibrationJson
-from klack.analyses.measures import number_or_none
-from klack.units import format_si
+from klack.analyses.json_parts import OwnComponents, Real, Version
+from klack.analyses.measures import Measure, json_of, number_or_none, with_measures
+from klack.terminal.tables import TextTable
 
-__all__ = ["PARAMETER_COLUMNS", "calibration_to_json", "calibration_told", "parameter_rows"]
+__all__ = [
+    "PARAMETER_COLUMNS",
+    "CalibrationJson",
+    "calibration_measured",
+    "calibration_to_json",
+    "calibration_told",
+    "parameter_rows",
+]
 
-PARAMETER_COLUMNS = ("parameter", "value", "standard error", "95 % interval", "start", "bounds")
+PARAMETER_COLUMNS = (
+    "parameter",
+    VALUE.name,
+    STANDARD_ERROR.name,
+    "95 % interval",
+    START.name,
+    "bounds",
+)
+
+
+@with_measures(PARAMETER_MEASURES)
+class CalibratedJson(TypedDict):
+    """One calibrated parameter, in ``unit``."""
+
+    unit: str
+    profile_lower_95: NotRequired[Real]
+    profile_upper_95: NotRequired[Real]
+
+
+@with_measures(FITTED_MEASURES)
+class FittedJson(TypedDict):
+    """First impact on a stop."""
+
+
+@with_measures(CALIBRATION_MEASURES)
+class CalibrationJson(TypedDict):
+    """``klack calibrate``."""
+
+    schema: Literal["klack-calibrate/1"]
+    case: str
+    klack: Version
+    own_components: OwnComponents
+    variant: str
+    parameters: Annotated[dict[str, CalibratedJson], Field(description="By their path.")]
+    impacts: Annotated[
+        dict[str, FittedJson], Field(description="First impacts, by stop, from the trigger.")
+    ]
+    correlation: Annotated[
+        list[list[Real]], Field(description="Of the estimates, in the order of the parameters.")
+    ]
+    warnings: list[str]
 
 
 def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
@@ -26,40 +87,36 @@ def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
         do not exist (infinite, nan) are None.
     """
     profiles = {profile.name: profile for profile in study.profiles}
-    parameters: dict[str, CalibratedJson] = {}
+    parameters: dict[str, Any] = {}
     for item in study.parameters:
-        numbers: CalibratedJson = {
-            "value": item.value,
-            "standard_error": number_or_none(item.standard_error),
-            "unit": item.unit,
-            "lower_95": number_or_none(item.lower_95),
-            "upper_95": number_or_none(item.upper_95),
-            "start": item.start,
-            "scatter": number_or_none(item.scatter),
-        }
+        parameters[item.name] = {**json_of(PARAMETER_MEASURES, item), "unit": item.unit}
         if item.name in profiles:
-            numbers["profile_lower_95"] = number_or_none(profiles[item.name].lower)
-            numbers["profile_upper_95"] = number_or_none(profiles[item.name].upper)
-        parameters[item.name] = numbers
-    return {
+            parameters[item.name] |= {
+                "profile_lower_95": number_or_none(profiles[item.name].lower),
+                "profile_upper_95": number_or_none(profiles[item.name].upper),
+            }
+    found: Any = {
         "schema": "klack-calibrate/1",
         "case": study.case,
         "klack": study.version,
         "own_components": dict(study.own_components),
         "variant": study.variant,
-        "strokes": len(study.strokes),
+        **json_of(CALIBRATION_MEASURES, study),
         "parameters": parameters,
-        "residual_rms_um": 1e6 * study.residual_rms,
-        "residual_rms_before_um": 1e6 * study.residual_rms_before,
-        "misfit": number_or_none(study.misfit),
-        "evaluations": study.evaluations,
-        "resumed": study.resumed,
-        "wall_time_s": study.wall_time,
-        "profile_time_s": study.profile_time,
+        "impacts": {item.stop: json_of(FITTED_MEASURES, item) for item in study.impacts},
         "correlation": [[number_or_none(x) for x in row] for row in study.correlation.tolist()],
-        "converged": study.converged,
         "warnings": list(study.warnings),
     }
+    return cast(CalibrationJson, found)
+
+
+def calibration_measured(study: CalibrationStudy) -> Iterator[Measured]:
+    """The calibration, every parameter and every first impact with its measures."""
+    yield study.variant, study, CALIBRATION_MEASURES
+    for item in study.parameters:
+        yield item.name, item, PARAMETER_MEASURES
+    for impact in study.impacts:
+        yield f"first impact on {impact.stop}", impact, FITTED_MEASURES
 
 
 def calibration_told(study: CalibrationStudy) -> Iterator[TextTable | str]:
@@ -78,15 +135,14 @@ def parameter_rows(study: CalibrationStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def _row(item: CalibratedParameter) -> tuple[str, ...]:
-    def text(value: float, digits: int = item.digits) -> str:
-        return format_si(value, item.unit, digits) if isfinite(value) else "–"
+    def span(ends: tuple[Measure[CalibratedParameter], ...]) -> str:
+        return " to ".join(end.cell(item) for end in ends)
 
-    known = isfinite(item.standard_error)
     return (
         item.name,
-        text(item.value),
-        text(item.standard_error, 2),
-        f"{text(item.lower_95)} to {text(item.upper_95)}" if known else "not determined",
-        text(item.start, 4),
-        f"{text(item.lower, 3)} to {text(item.upper, 3)}",
+        VALUE.cell(item),
+        STANDARD_ERROR.cell(item),
+        span(INTERVAL) if isfinite(item.standard_error) else "not determined",
+        START.cell(item),
+        span(BOUNDS),
     )

@@ -1,25 +1,41 @@
 """Comparisons with measurements on disk; see :mod:`klack.analyses.store`."""
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import Analysis, StoredAnalysis
+from klack.analyses.comparison.calculix import (
+    PROGRAM_MEASURES,
+    CalculixJson,
+    comparison_to_json,
+    comparison_told,
+)
+from klack.analyses.comparison.measures import (
+    DISTRIBUTION_MEASURES,
+    DROPS_MEASURES,
+    HIGHEST_MEASURES,
+    IMPACT_MEASURES,
+    VARIANT_MEASURES,
+)
 from klack.analyses.comparison.shots_record import MeasuredShotsStudy
-from klack.analyses.comparison.shots_summary import measured_shots_to_json, measured_shots_told
+from klack.analyses.comparison.shots_summary import (
+    DropsJson,
+    drops_measured,
+    measured_shots_to_json,
+    measured_shots_told,
+)
 from klack.analyses.comparison.strokes_record import MeasuredStrokeStudy
-from klack.analyses.comparison.strokes_summary import measured_strokes_told, measured_to_json
+from klack.analyses.comparison.strokes_summary import (
+    StrokesJson,
+    measured_strokes_told,
+    measured_to_json,
+    strokes_measured,
+)
 from klack.analyses.store import RecordFormat
-from klack.report.page import Content
 
-__all__ = ["MEASURED_SHOTS", "MEASURED_STROKES"]
+__all__ = ["CALCULIX", "MEASURED_SHOTS", "MEASURED_STROKES"]
 
 _COMMAND = "klack compare RESULT --measurement"
 
 
-def _measured_strokes_content(study: MeasuredStrokeStudy) -> Content:
-    from klack.analyses.comparison.content import measured_strokes_content
-
-    return measured_strokes_content(study)
-
-
-MEASURED_STROKES = Analysis(
+MEASURED_STROKES = StoredAnalysis(
     form=RecordFormat(
         name="klack measured strokes",
         version=1,
@@ -40,19 +56,20 @@ MEASURED_STROKES = Analysis(
             ),
         },
     ),
-    content=_measured_strokes_content,
+    page="comparison.content:measured_strokes_content",
+    json=StrokesJson,
     to_json=measured_to_json,
     told=measured_strokes_told,
+    measures={
+        "variant beside a measurement": VARIANT_MEASURES,
+        "impact beside a measurement": IMPACT_MEASURES,
+        "highest measured rebound": HIGHEST_MEASURES,
+    },
+    measured=strokes_measured,
 )
 
 
-def _measured_shots_content(study: MeasuredShotsStudy) -> Content:
-    from klack.analyses.comparison.content import measured_shots_content
-
-    return measured_shots_content(study)
-
-
-MEASURED_SHOTS = Analysis(
+MEASURED_SHOTS = StoredAnalysis(
     form=RecordFormat(
         name="klack measured shots",
         version=1,
@@ -60,7 +77,20 @@ MEASURED_SHOTS = Analysis(
         command=_COMMAND,
         units={"time": "s", "lift": "m", "computed_time": "s", "computed_height": "m"},
     ),
-    content=_measured_shots_content,
+    page="comparison.content:measured_shots_content",
+    json=DropsJson,
     to_json=measured_shots_to_json,
     told=measured_shots_told,
+    measures={
+        "measured drops": DROPS_MEASURES,
+        "distribution beside a measurement": DISTRIBUTION_MEASURES,
+    },
+    measured=drops_measured,
+)
+
+CALCULIX = Analysis(
+    json=CalculixJson,
+    to_json=comparison_to_json,
+    told=comparison_told,
+    measures={"impact by a program": PROGRAM_MEASURES},
 )

@@ -1,37 +1,43 @@
 """A stored impact beside that of another program: the numbers of both, and how far apart."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isfinite
+from typing import Any, Literal, cast
+
+from typing_extensions import TypedDict
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.json_results import CalculixJson, ProgramJson
-from klack.analyses.measures import number_or_none
+from klack.analyses.impact.summary import DeviationJson
+from klack.analyses.json_parts import Real
+from klack.analyses.measures import (
+    Column,
+    Measure,
+    cells,
+    heads,
+    json_of,
+    with_measures,
+)
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
+from klack.terminal.tables import TextTable
 
 __all__ = [
     "COMPARISON_COLUMNS",
+    "PROGRAM_MEASURES",
+    "CalculixJson",
     "Comparison",
     "OtherRun",
     "compare_with",
     "comparison_rows",
     "comparison_to_json",
+    "comparison_told",
     "level_of",
     "with_other",
 ]
-
-COMPARISON_COLUMNS = (
-    "",
-    "peak force [N]",
-    "contact time [us]",
-    "impulse [mN s]",
-    "restitution",
-    "energy balance",
-    "steps",
-    "wall time [s]",
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +71,7 @@ class Comparison:
 
     Parameters
     ----------
-    case : str
+    case, title : str
     level : LevelResult
     other : OtherRun
     measures : ImpactMeasures
@@ -75,10 +81,31 @@ class Comparison:
     """
 
     case: str
+    title: str
     level: LevelResult
     other: OtherRun
     measures: ImpactMeasures
     deviation: Deviation
+
+    @property
+    def runs(self) -> tuple[LevelResult, LevelResult]:
+        """The other program, as if it were a level of klack, and klack."""
+        other, history = self.other, self.other.history
+        guest = LevelResult(
+            level=other.program.lower(),
+            label=other.program,
+            history=history,
+            measures=self.measures,
+            degrees_of_freedom=self.level.degrees_of_freedom,
+            steps=other.steps,
+            step=history.step,
+            wall_time=float("nan") if other.wall_time is None else other.wall_time,
+            setup_time=0.0,
+            energies=history.ledger.parts(),
+            energy_residual=history.ledger.residual,
+        )
+        label = f"klack, {self.level.level}"
+        return guest, replace(self.level, label=label, wall_time=self.wall_time)
 
     @property
     def wall_time(self) -> float:
@@ -90,6 +117,55 @@ class Comparison:
         """Wall-clock time of the other program over that of klack [-]."""
         other = self.other.wall_time
         return None if other is None or self.wall_time == 0.0 else other / self.wall_time
+
+
+_OF_LEVELS = {measure.key: measure for measure in LEVEL_MEASURES}
+PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
+    replace(_OF_LEVELS["peak_force"], column=Column("N", 1.0, ".3f")),
+    *(_OF_LEVELS[key] for key in ("contact_time", "impulse", "restitution")),
+    Measure(
+        key="energy_balance",
+        symbol="r_E",
+        definition="Energy gained (negative: lost) by the numerics of a run without damping, over "
+        "the energy turned over.",
+        source="theory/calculix",
+        read=lambda run: energy_balance(run.history.ledger),
+        form="power",
+        column=Column("", 1.0, "+.1e"),
+        absent="",
+    ),
+    replace(_OF_LEVELS["steps"], column=Column("", 1.0, "d")),
+    _OF_LEVELS["step"],
+    replace(_OF_LEVELS["wall_time"], absent=""),
+)
+"""Of an impact as one program computed it; the wall time of klack has its set-up in it."""
+
+COMPARISON_COLUMNS = ("", *heads(PROGRAM_MEASURES))
+
+
+@with_measures(PROGRAM_MEASURES)
+class ProgramJson(TypedDict):
+    """Impact as one program computed it."""
+
+
+class OtherProgramJson(ProgramJson):
+    """Impact as the other program computed it."""
+
+    iterations: int | None
+    energy_swing: Real
+
+
+class CalculixJson(TypedDict):
+    """``klack compare --calculix``."""
+
+    schema: Literal["klack-compare-calculix/1"]
+    case: str
+    level: str
+    program: str
+    klack: ProgramJson
+    other: OtherProgramJson
+    deviation: DeviationJson
+    wall_time_ratio: Real
 
 
 def level_of(study: ImpactStudy, name: str) -> LevelResult:
@@ -121,6 +197,7 @@ def compare_with(study: ImpactStudy, level: str, other: OtherRun) -> Comparison:
     chosen = level_of(study, level)
     return Comparison(
         case=study.case,
+        title=study.title,
         level=chosen,
         other=other,
         measures=measure_impact(other.history),
@@ -130,20 +207,7 @@ def compare_with(study: ImpactStudy, level: str, other: OtherRun) -> Comparison:
 
 def with_other(study: ImpactStudy, comparison: Comparison) -> ImpactStudy:
     """Study that holds the compared level and the other program as one more level, for charts."""
-    other, history = comparison.other, comparison.other.history
-    guest = LevelResult(
-        level=other.program.lower(),
-        label=other.program,
-        history=history,
-        measures=comparison.measures,
-        degrees_of_freedom=comparison.level.degrees_of_freedom,
-        steps=other.steps,
-        step=history.step,
-        wall_time=other.wall_time or 0.0,
-        setup_time=0.0,
-        energies=history.ledger.parts(),
-        energy_residual=history.ledger.residual,
-    )
+    guest, _ = comparison.runs
     return replace(
         study,
         levels={guest.level: guest, comparison.level.level: comparison.level},
@@ -154,23 +218,9 @@ def with_other(study: ImpactStudy, comparison: Comparison) -> ImpactStudy:
 
 def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`COMPARISON_COLUMNS`: the other program, klack, the deviation."""
-    level, other, deviation = comparison.level, comparison.other, comparison.deviation
-    ratio = comparison.wall_time_ratio
+    deviation, ratio = comparison.deviation, comparison.wall_time_ratio
     return (
-        _row(
-            other.program,
-            comparison.measures,
-            other.history.ledger,
-            other.steps,
-            other.wall_time,
-        ),
-        _row(
-            f"klack, {level.level}",
-            level.measures,
-            level.history.ledger,
-            level.steps,
-            comparison.wall_time,
-        ),
+        *((run.label, *cells(PROGRAM_MEASURES, run)) for run in comparison.runs),
         (
             "klack from it",
             f"{100 * deviation.peak_force:+.2f} %",
@@ -184,24 +234,21 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _row(
-    name: str,
-    measures: ImpactMeasures,
-    ledger: EnergyLedger,
-    steps: int,
-    wall_time: float | None,
-) -> tuple[str, ...]:
-    balance = energy_balance(ledger)
-    return (
-        name,
-        f"{measures.peak_force:.3f}",
-        f"{1e6 * measures.contact_time:.3f}",
-        f"{1e3 * measures.impulse:.4f}",
-        f"{measures.restitution:.4f}" if isfinite(measures.restitution) else "–",
-        "" if balance is None else f"{balance:+.1e}",
-        f"{steps}",
-        "" if wall_time is None else f"{wall_time:.3g}",
+def comparison_told(comparison: Comparison) -> Iterator[TextTable | str]:
+    """What a terminal shows: both programs, and how far their histories are apart."""
+    yield TextTable(
+        title=comparison.title, columns=COMPARISON_COLUMNS, rows=comparison_rows(comparison)
     )
+    d = comparison.deviation
+    yield (
+        f"Force history: {100 * d.history_l2:.2f} % rms of the peak; third octaves within "
+        f"{d.third_octave_max_dB:.2g} dB up to {d.third_octave_up_to_Hz / 1e3:.4g} kHz."
+    )
+    if (swing := comparison.other.energy_swing) is not None:
+        yield (
+            f"Energy of {comparison.other.program} within {swing:.1e} of that at the start at all "
+            "times."
+        )
 
 
 def energy_balance(ledger: EnergyLedger) -> float | None:
@@ -222,42 +269,20 @@ def _lost(ledger: EnergyLedger) -> float:
 
 def comparison_to_json(comparison: Comparison) -> CalculixJson:
     """Plain numbers in SI, the unit in the key; what is not known is None."""
-    level, other = comparison.level, comparison.other
-    d = comparison.deviation
-    return {
+    other = comparison.other
+    theirs, ours = comparison.runs
+    found: Any = {
         "schema": "klack-compare-calculix/1",
         "case": comparison.case,
-        "level": level.level,
+        "level": comparison.level.level,
         "program": other.program,
-        "klack": _numbers(level.measures, level.history, level.steps, comparison.wall_time),
+        "klack": json_of(PROGRAM_MEASURES, ours),
         "other": {
-            **_numbers(comparison.measures, other.history, other.steps, other.wall_time),
+            **json_of(PROGRAM_MEASURES, theirs),
             "iterations": other.iterations,
             "energy_swing": other.energy_swing,
         },
-        "deviation": {
-            "peak_force": number_or_none(d.peak_force),
-            "contact_time": number_or_none(d.contact_time),
-            "impulse": number_or_none(d.impulse),
-            "restitution": number_or_none(d.restitution),
-            "history_l2": number_or_none(d.history_l2),
-            "third_octave_max_dB": number_or_none(d.third_octave_max_dB),
-            "third_octave_up_to_Hz": number_or_none(d.third_octave_up_to_Hz),
-        },
+        "deviation": json_of(DEVIATION_MEASURES, comparison.deviation),
         "wall_time_ratio": comparison.wall_time_ratio,
     }
-
-
-def _numbers(
-    measures: ImpactMeasures, history: ImpactHistory, steps: int, wall_time: float | None
-) -> ProgramJson:
-    return {
-        "peak_force_N": number_or_none(measures.peak_force),
-        "contact_time_s": number_or_none(measures.contact_time),
-        "impulse_Ns": number_or_none(measures.impulse),
-        "restitution": number_or_none(measures.restitution),
-        "energy_balance": energy_balance(history.ledger),
-        "steps": steps,
-        "step_s": history.step,
-        "wall_time_s": wall_time,
-    }
+    return cast(CalculixJson, found)

@@ -1,7 +1,5 @@
 """What a report beside a measurement says, before it is laid out."""
 
-from collections.abc import Mapping
-
 from klack.analyses.comparison.figures import (
     drops_chart,
     first_touch_chart,
@@ -30,7 +28,7 @@ from klack.analyses.comparison.strokes_summary import (
 )
 from klack.analyses.page import page_of
 from klack.report.page import Content, Section, Table
-from klack.report.wording import count, quantity
+from klack.report.wording import count, quantity, typeset
 
 __all__ = ["measured_shots_content", "measured_strokes_content"]
 
@@ -99,10 +97,6 @@ def measured_shots_content(study: MeasuredShotsStudy) -> Content:
     )
 
 
-def _versions(version: str, libraries: Mapping[str, str]) -> str:
-    return ", ".join([f"klack {version}", *(f"{k} {v}" for k, v in libraries.items())])
-
-
 # --------------------------------------------------------------------------- sections
 
 
@@ -116,16 +110,16 @@ def _number_table(variants: tuple[ComparedVariant, ...]) -> Table:
             rows.append((title, "", "", scatter, "", str(variant.count), rms, over))
         rows += [(f"{head}{first}", *cells) for first, *cells in _one_column(variant, most=1)]
     return Table(
-        columns=("", *IMPACT_COLUMNS[2:]), rows=tuple(tuple(map(_typeset, row)) for row in rows)
+        columns=("", *IMPACT_COLUMNS[2:]), rows=tuple(tuple(map(typeset, row)) for row in rows)
     )
 
 
 def _variant_sections(variant: ComparedVariant) -> list[Section]:
     touches = (first_touch_chart(variant, stop) for stop in ("opening", "seat"))
-    rows = tuple(tuple(map(_typeset, row)) for row in _one_column(variant, most=_MOST_IMPACTS))
-    curves = tuple(tuple(map(_typeset, row)) for row in curve_rows(variant))
-    highest = tuple(tuple(map(_typeset, row)) for row in highest_rows(variant))
-    columns = tuple(map(_typeset, HIGHEST_COLUMNS))
+    rows = tuple(tuple(map(typeset, row)) for row in _one_column(variant, most=_MOST_IMPACTS))
+    curves = tuple(tuple(map(typeset, row)) for row in curve_rows(variant))
+    highest = tuple(tuple(map(typeset, row)) for row in highest_rows(variant))
+    columns = tuple(map(typeset, HIGHEST_COLUMNS))
     return [
         Section(
             title=f"The whole stroke: {variant.variant}",
@@ -152,12 +146,6 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
 def _one_column(variant: ComparedVariant, *, most: int) -> list[tuple[str, ...]]:
     """Rows of impacts with number and stop in one cell."""
     return [(f"{kind}\n{stop}", *cells) for stop, kind, *cells in impact_rows(variant, most)]
-
-
-def _typeset(text: str) -> str:
-    """A terminal writes um and -; a page has better signs."""
-    text = text.replace("[us]", "[µs]").replace("[um]", "[µm]")
-    return text.replace("-", "\N{MINUS SIGN}") if text[:1] == "-" else text
 
 
 def _measured(study: MeasuredStrokeStudy) -> Section:

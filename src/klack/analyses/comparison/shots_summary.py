@@ -2,22 +2,29 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Notes, TextTable
+from klack.analyses.analysis import Measured
+from klack.analyses.comparison.measures import DISTRIBUTION_MEASURES, DROPS_MEASURES
 from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
-from klack.analyses.json_results import DropsJson
-from klack.analyses.measures import number_or_none
+from klack.analyses.json_parts import Real, RejectedJson, Version
+from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.sample import moments
+from klack.terminal.tables import Notes, TextTable
 from klack.units import format_si
 
 __all__ = [
     "DROP_COLUMNS",
+    "DropsJson",
     "bias_sentence",
     "drop_rows",
     "drop_rule",
     "drop_verdict",
+    "drops_measured",
     "measured_shots_to_json",
     "measured_shots_told",
 ]
@@ -25,6 +32,35 @@ __all__ = [
 DROP_COLUMNS = ("measure", "", "median", "5 %", "95 %", "highest rebound", "shots")
 
 _KEYS = {"restitution": "restitution", "rebound height": "rebound_height_m"}
+
+
+_SHARES = (0.05, 0.5, 0.95)
+
+_Sample = Annotated[
+    dict[str, Real], Field(description="count, mean, standard_deviation, quantiles, highest.")
+]
+
+
+@with_measures(DISTRIBUTION_MEASURES)
+class DistributionJson(TypedDict):
+    """One number of many drops, in the unit of its key."""
+
+    computed: _Sample
+    measured: _Sample
+
+
+@with_measures(DROPS_MEASURES)
+class DropsJson(TypedDict):
+    """``klack compare`` of shots."""
+
+    schema: Literal["klack-compare-shots/1"]
+    case: str
+    klack: Version
+    rejected: list[RejectedJson]
+    distribution: Annotated[dict[str, DistributionJson], Field(description="By measure.")]
+    verdict: str
+    bias: str
+    rule: Annotated[str, Field(description="How the verdict is found.")]
 
 
 def measured_shots_told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
@@ -98,46 +134,38 @@ def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
         statistic and significance of the test; ``verdict``.  Numbers that do not exist (nan) are
         None.
     """
-    return {
+    found: Any = {
         "schema": "klack-compare-shots/1",
         "case": study.case,
         "klack": study.version,
-        "drops": len(study.names),
         "rejected": [{"name": item.name, "reason": item.reason} for item in study.rejected],
-        "approach_speed_m_s": number_or_none(study.approach_speed.computed),
-        "approach_speed_measured_m_s": number_or_none(study.approach_speed.measured),
-        "approach_speed_scatter_m_s": number_or_none(study.approach_speed.scatter),
+        **json_of(DROPS_MEASURES, study),
         "distribution": {_KEYS.get(d.name, d.name): _distribution(d) for d in study.distributions},
         "verdict": drop_verdict(study),
         "bias": bias_sentence(study),
         "rule": drop_rule(study),
     }
+    return cast(DropsJson, found)
+
+
+def drops_measured(study: MeasuredShotsStudy) -> Iterator[Measured]:
+    """All drops and each of their distributions with their measures."""
+    yield "drops", study, DROPS_MEASURES
+    for d in study.distributions:
+        yield d.name, d, DISTRIBUTION_MEASURES
 
 
 def _distribution(d: MeasuredDistribution) -> dict[str, Any]:
     return {
-        "computed": _moments(d.computed) | {"highest": number_or_none(d.computed_highest)},
-        "measured": _moments(d.measured) | {"highest": number_or_none(d.measured_highest)},
-        "reading_error": number_or_none(d.error),
-        "centred": number_or_none(d.centred),
-        "expected_highest": number_or_none(d.expected_highest),
-        "highest_bias": number_or_none(d.highest_bias),
-        "statistic": number_or_none(d.statistic),
-        "significance": number_or_none(d.significance),
+        "computed": _moments(d.computed, d.computed_highest),
+        "measured": _moments(d.measured, d.measured_highest),
+        **json_of(DISTRIBUTION_MEASURES, d),
     }
 
 
-def _moments(values: np.ndarray) -> dict[str, float | None]:
-    known = values[np.isfinite(values)]
-    quantiles = {
-        f"quantile_{q:g}": number_or_none(float(np.quantile(known, q))) for q in (0.05, 0.5, 0.95)
-    }
-    return {
-        "count": int(known.size),
-        "mean": number_or_none(float(np.mean(known))),
-        "standard_deviation": number_or_none(float(np.std(known))),
-        **quantiles,
-    }
+def _moments(values: np.ndarray, highest: float) -> dict[str, float | None]:
+    known = {"count": int(np.isfinite(values).sum()), "highest": number_or_none(highest)}
+    return moments(values, _SHARES) | known
 
 
 def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.comparison.strokes_record import (
-    IMPACT_MEASURES,
+    IMPACT_NUMBERS,
     Compared,
     ComparedImpact,
     ComparedVariant,
@@ -341,15 +341,12 @@ def _impact(
     """Numbers of one impact; times are not better known than the sampled trigger."""
     sampled = {"time": step / sqrt(12.0)}
     numbers = {
-        kind.field: compare_numbers(
-            [getattr(hit, kind.field) for hit in ours],
-            [getattr(hit, kind.field) for hit in theirs],
-            [
-                hypot(getattr(hit, _ERRORS[kind.field]), sampled.get(kind.field, 0.0))
-                for hit in theirs
-            ],
+        field: compare_numbers(
+            [getattr(hit, field) for hit in ours],
+            [getattr(hit, field) for hit in theirs],
+            [hypot(getattr(hit, _ERRORS[field]), sampled.get(field, 0.0)) for hit in theirs],
         )
-        for kind in IMPACT_MEASURES
+        for field in IMPACT_NUMBERS
     }
     return ComparedImpact(stop=stop, number=number, **numbers)
 

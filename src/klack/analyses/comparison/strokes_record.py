@@ -15,12 +15,11 @@ from klack.analyses.record import CaseRecord
 from klack.measurement.stroke_set import Rejection
 
 __all__ = [
-    "IMPACT_MEASURES",
+    "IMPACT_NUMBERS",
     "Compared",
     "ComparedImpact",
     "ComparedVariant",
     "HighestShot",
-    "ImpactMeasure",
     "MeasuredStrokeStudy",
     "stop_words",
 ]
@@ -69,41 +68,8 @@ class Compared:
         return self.difference / width
 
 
-@dataclass(frozen=True, slots=True)
-class ImpactMeasure:
-    """One number of an impact.
-
-    Parameters
-    ----------
-    field : str
-        Of :class:`ComparedImpact`.
-    name : str
-        In words.
-    unit : str
-        In which people read it; ``factor`` leads to it from SI, ``decimals`` are printed.
-    factor : float
-    decimals : int
-    """
-
-    field: str
-    name: str
-    unit: str
-    factor: float
-    decimals: int
-
-    @property
-    def title(self) -> str:
-        """Name with unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
-
-IMPACT_MEASURES = (
-    ImpactMeasure("time", "time", "us", 1e6, 1),
-    ImpactMeasure("approach_speed", "approach speed", "m/s", 1.0, 3),
-    ImpactMeasure("restitution", "restitution", "", 1.0, 3),
-    ImpactMeasure("rebound_height", "rebound height", "um", 1e6, 2),
-)
-"""What is compared of every impact."""
+IMPACT_NUMBERS = ("time", "approach_speed", "restitution", "rebound_height")
+"""What is compared of every impact: fields of :class:`ComparedImpact`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,11 +95,6 @@ class ComparedImpact:
     approach_speed: Compared
     restitution: Compared
     rebound_height: Compared
-
-    def measure(self, kind: ImpactMeasure) -> Compared:
-        """One of :data:`IMPACT_MEASURES`."""
-        value: Compared = getattr(self, kind.field)
-        return value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,9 +208,10 @@ class ComparedVariant:
         for stop in ("opening", "seat"):
             impact = self.first(stop)
             if impact is not None:
-                for kind in IMPACT_MEASURES:
-                    words = f"{kind.name} of the first impact on the {stop_words(stop)}"
-                    yield words, abs(impact.measure(kind).in_scatter)
+                for field in IMPACT_NUMBERS:
+                    number: Compared = getattr(impact, field)
+                    words = f"{field.replace('_', ' ')} of the first impact on the "
+                    yield words + stop_words(stop), abs(number.in_scatter)
         yield "lift over time", self.lift_rms / self.lift_scatter
         yield "velocity over time", self.velocity_rms / self.velocity_scatter
 

@@ -2,27 +2,36 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any, cast
+from typing import Annotated, Any, Literal, cast
 
-from klack.analyses.analysis import Notes, TextTable
-from klack.analyses.comparison.strokes_record import (
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.analysis import Measured
+from klack.analyses.comparison.measures import (
+    COMPARED,
+    HIGHEST_MEASURES,
     IMPACT_MEASURES,
-    Compared,
-    ComparedImpact,
+    LIFT,
+    LIFT_CURVE,
+    VARIANT_MEASURES,
+    VELOCITY_CURVE,
+)
+from klack.analyses.comparison.strokes_record import (
     ComparedVariant,
-    HighestShot,
-    ImpactMeasure,
     MeasuredStrokeStudy,
     stop_words,
 )
-from klack.analyses.json_results import ComparedVariantJson, HighestStrokeJson, StrokesJson
-from klack.analyses.measures import number_or_none
+from klack.analyses.json_parts import RejectedJson, Version
+from klack.analyses.measures import cells, heads, json_of, with_measures
+from klack.terminal.tables import Notes, TextTable
 
 __all__ = [
     "CURVE_COLUMNS",
     "HIGHEST_COLUMNS",
     "IMPACT_COLUMNS",
     "RULE",
+    "StrokesJson",
     "agreement",
     "curve_rows",
     "highest_rows",
@@ -30,21 +39,13 @@ __all__ = [
     "measured_strokes_told",
     "measured_to_json",
     "rule",
+    "strokes_measured",
     "verdict",
 ]
 
-CURVE_COLUMNS = ("over the whole record", "difference, rms", "scatter, rms", "over scatter")
-IMPACT_COLUMNS = (
-    "impact",
-    "number",
-    "computed",
-    "measured",
-    "scatter",
-    "reading error",
-    "strokes",
-    "difference",
-    "over scatter",
-)
+CURVE_COLUMNS = ("over the whole record", *heads(LIFT_CURVE))
+IMPACT_COLUMNS = ("impact", "number", *heads(LIFT))
+HIGHEST_COLUMNS = ("highest rebound", "stroke", *heads(HIGHEST_MEASURES))
 
 RULE = (
     "Rule: the agreement is excellent if every number of the first impact on each stop lies within "
@@ -53,22 +54,46 @@ RULE = (
     "strokes; fair up to {fair:g}. Later impacts and the lift between the stops are shown, not "
     "counted."
 )
-HIGHEST_COLUMNS = (
-    "highest rebound",
-    "stroke",
-    "height [um]",
-    "restitution",
-    "of strokes",
-    "too high by reading [um]",
-    "above the median [um]",
-    "bounces",
-)
-_KEYS = {
-    "time": "time{}_s",
-    "approach_speed": "approach_speed{}_m_s",
-    "restitution": "restitution{}",
-    "rebound_height": "rebound_height{}_m",
-}
+
+_Stop = Annotated[str, Field(description="``opening`` or ``seat``.")]
+
+
+@with_measures(IMPACT_MEASURES)
+class ComparedImpactJson(TypedDict):
+    """One impact, computed and measured."""
+
+    stop: _Stop
+    number: Annotated[int, Field(description="1 for the first on this stop.")]
+
+
+@with_measures(HIGHEST_MEASURES)
+class HighestStrokeJson(TypedDict):
+    """The measured stroke that rebounds highest from a stop."""
+
+    stop: _Stop
+    stroke: str
+
+
+@with_measures(VARIANT_MEASURES)
+class ComparedVariantJson(TypedDict):
+    """A variant beside its recording."""
+
+    agreement: Literal["excellent", "fair", "none", "unknown"]
+    verdict: str
+    rejected: list[RejectedJson]
+    impacts: list[ComparedImpactJson]
+    highest_rebound: list[HighestStrokeJson]
+
+
+class StrokesJson(ComparedVariantJson):
+    """``klack compare`` of strokes: numbers of the first variant, and of all."""
+
+    schema: Literal["klack-compare-strokes/1"]
+    case: str
+    klack: Version
+    variant: str
+    variants: Annotated[dict[str, ComparedVariantJson], Field(description="All of them by name.")]
+    rule: Annotated[str, Field(description="How the verdict is found.")]
 
 
 def measured_strokes_told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
@@ -127,66 +152,41 @@ def rule(study: MeasuredStrokeStudy) -> str:
 def curve_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`CURVE_COLUMNS`: lift and velocity."""
     return (
-        _curve_row("lift [um]", 1e6 * variant.lift_rms, 1e6 * variant.lift_scatter, 2),
-        _curve_row("velocity [m/s]", variant.velocity_rms, variant.velocity_scatter, 4),
+        ("lift [um]", *cells(LIFT_CURVE, variant)),
+        ("velocity [m/s]", *cells(VELOCITY_CURVE, variant)),
     )
-
-
-def _curve_row(name: str, rms: float, scatter: float, decimals: int) -> tuple[str, ...]:
-    form = f".{decimals}f"
-    return (name, _text(rms, form), _text(scatter, form), _text(rms / scatter, ".1f"))
 
 
 def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`IMPACT_COLUMNS`: the first ``most`` impacts on each stop."""
     rows = [
-        (f"{stop_words(impact.stop)} #{impact.number}", kind.title, *_cells(impact, kind))
+        (f"{stop_words(impact.stop)} #{impact.number}", title, *cells(measures, impact))
         for stop in ("opening", "seat")
         for impact in variant.impacts
         if impact.stop == stop and impact.number <= most
-        for kind in IMPACT_MEASURES
+        for title, measures in COMPARED
     ]
     if isfinite(variant.way.difference):
-        rows.append(("between the stops", "lift [um]", *_numbers(variant.way, 1e6, 2)))
+        rows.append(("between the stops", "lift [um]", *cells(LIFT, variant)))
     return tuple(rows)
 
 
 def highest_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`HIGHEST_COLUMNS`: the measured stroke that rebounds highest, per stop."""
     return tuple(
-        (
-            stop_words(shot.stop),
-            shot.stroke,
-            f"{1e6 * shot.rebound_height:.2f} ± {1e6 * shot.rebound_height_error:.2f}",
-            f"{shot.restitution:.3f} ± {shot.restitution_error:.3f}",
-            str(shot.count),
-            f"{1e6 * shot.by_reading:.2f}",
-            f"{1e6 * shot.above_median:.2f}",
-            f"{shot.bounces:g}",
-        )
+        (stop_words(shot.stop), shot.stroke, *cells(HIGHEST_MEASURES, shot))
         for shot in variant.highest
     )
 
 
-def _cells(impact: ComparedImpact, kind: ImpactMeasure) -> tuple[str, ...]:
-    return _numbers(impact.measure(kind), kind.factor, kind.decimals)
-
-
-def _numbers(number: Compared, factor: float, decimals: int) -> tuple[str, ...]:
-    form = f".{decimals}f"
-    return (
-        _text(factor * number.computed, form),
-        _text(factor * number.measured, form),
-        _text(factor * number.scatter, form),
-        _text(factor * number.error, form),
-        str(number.count),
-        _text(factor * number.difference, f"+{form}"),
-        _text(number.in_scatter, "+.1f"),
-    )
-
-
-def _text(value: float, form: str) -> str:
-    return f"{value:{form}}" if isfinite(value) else "–"
+def strokes_measured(study: MeasuredStrokeStudy) -> Iterator[Measured]:
+    """Every variant, its impacts and highest rebounds with their measures."""
+    for name, variant in study.variants.items():
+        yield name, variant, VARIANT_MEASURES
+        for impact in variant.impacts:
+            yield f"{name}, {impact.stop} {impact.number}", impact, IMPACT_MEASURES
+        for shot in variant.highest:
+            yield f"{name}, highest rebound from {shot.stop}", shot, HIGHEST_MEASURES
 
 
 # --------------------------------------------------------------------------- JSON
@@ -220,51 +220,18 @@ def measured_to_json(study: MeasuredStrokeStudy) -> StrokesJson:
 
 
 def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> ComparedVariantJson:
-    numbers = {
+    numbers: Any = {
         "agreement": agreement(study, variant),
         "verdict": verdict(study, variant),
-        "strokes": variant.count,
         "rejected": [{"name": item.name, "reason": item.reason} for item in variant.rejected],
-        "lift_rms_m": number_or_none(variant.lift_rms),
-        "lift_rms_scatter_m": number_or_none(variant.lift_scatter),
-        "velocity_rms_m_s": number_or_none(variant.velocity_rms),
-        "velocity_rms_scatter_m_s": number_or_none(variant.velocity_scatter),
-        "velocity_bandwidth_Hz": number_or_none(variant.velocity_bandwidth),
-        **_compared(variant.way, "lift{}_m"),
-        "impacts": [_impact(impact) for impact in variant.impacts],
-        "highest_rebound": [_highest(shot) for shot in variant.highest],
+        **json_of(VARIANT_MEASURES, variant),
+        "impacts": [
+            {"stop": impact.stop, "number": impact.number, **json_of(IMPACT_MEASURES, impact)}
+            for impact in variant.impacts
+        ],
+        "highest_rebound": [
+            {"stop": shot.stop, "stroke": shot.stroke, **json_of(HIGHEST_MEASURES, shot)}
+            for shot in variant.highest
+        ],
     }
     return cast(ComparedVariantJson, numbers)
-
-
-def _highest(shot: HighestShot) -> HighestStrokeJson:
-    return {
-        "stop": shot.stop,
-        "stroke": shot.stroke,
-        "strokes": shot.count,
-        "rebound_height_m": number_or_none(shot.rebound_height),
-        "rebound_height_error_m": number_or_none(shot.rebound_height_error),
-        "restitution": number_or_none(shot.restitution),
-        "restitution_error": number_or_none(shot.restitution_error),
-        "too_high_by_reading_m": number_or_none(shot.by_reading),
-        "above_median_m": number_or_none(shot.above_median),
-        "bounces": number_or_none(shot.bounces),
-    }
-
-
-def _impact(impact: ComparedImpact) -> dict[str, Any]:
-    numbers: dict[str, Any] = {"stop": impact.stop, "number": impact.number}
-    for kind in IMPACT_MEASURES:
-        numbers |= _compared(impact.measure(kind), _KEYS[kind.field])
-    return numbers
-
-
-def _compared(number: Compared, key: str) -> dict[str, float | None]:
-    return {
-        key.format(""): number_or_none(number.computed),
-        key.format("_measured"): number_or_none(number.measured),
-        key.format("_scatter"): number_or_none(number.scatter),
-        key.format("_reading_error"): number_or_none(number.error),
-        key.format("_difference"): number_or_none(number.difference),
-        key.split("{}")[0] + "_difference_in_scatter": number_or_none(number.in_scatter),
-    }

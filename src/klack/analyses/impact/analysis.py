@@ -3,12 +3,12 @@
 ``result.zarr/study/levels/full/history/force`` is the force of the full-order run in newtons.
 """
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
+from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.summary import study_measured, study_to_json, study_told
+from klack.analyses.impact.summary import ImpactJson, study_measured, study_to_json, study_told
 from klack.analyses.store import RecordFormat
 from klack.reduction.structure import STRUCTURE_UNITS
-from klack.report.page import Content
 
 __all__ = ["IMPACT"]
 
@@ -38,13 +38,7 @@ _UNITS = {
 }
 
 
-def _study_content(study: ImpactStudy) -> Content:
-    from klack.analyses.impact.content import report_content
-
-    return report_content(study)
-
-
-IMPACT = Analysis(
+IMPACT = StoredAnalysis(
     form=RecordFormat(
         name="klack impact study",
         version=1,
@@ -52,8 +46,13 @@ IMPACT = Analysis(
         command="klack impact",
         units=_UNITS,
     ),
-    content=_study_content,
+    page="impact.content:report_content",
+    json=ImpactJson,
     to_json=study_to_json,
     told=study_told,
+    measures={
+        "impact level": LEVEL_MEASURES,
+        "difference of two levels": DEVIATION_MEASURES,
+    },
     measured=study_measured,
 )

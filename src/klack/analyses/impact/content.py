@@ -262,8 +262,8 @@ def _energy_table(study: ImpactStudy) -> Table:
 
 def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     return (
-        *glossary(measure for measure in LEVEL_MEASURES if measure.page),
-        *glossary(measure for measure in DEVIATION_MEASURES if measure.page),
+        *glossary(LEVEL_MEASURES),
+        *glossary(DEVIATION_MEASURES),
         (
             "spectrum",
             "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "

@@ -21,17 +21,15 @@ from klack.report.chart import (
     BarChart,
     BarPart,
     Chart,
-    Colour,
     Curve,
     Mark,
     Panel,
-    Style,
     stems,
 )
+from klack.report.looks import OTHER, PART_LOOKS, Look, look_of
 from klack.report.wording import quantity, sentence
 
 __all__ = [
-    "PART_LOOKS",
     "approach_chart",
     "charts",
     "energy_bars",
@@ -44,37 +42,18 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-Look = tuple[Colour, Style, float]
 
 _LOOKS: dict[str, Look] = {
-    "full": ("black", "solid", 2.4),
-    "interface": ("sky", "solid", 1.6),
-    "reduced": ("red", "dashed", 2.2),
-    "reduced-participation": ("green", "long", 1.9),
-    "reduced-attachment": ("blue", "dashdot", 1.9),
-    "reduced-none": ("orange", "dotted", 1.9),
-    "lumped": ("pink", "sparse", 2.1),
+    "full": Look("black", "solid", 2.4),
+    "interface": Look("sky", "solid", 1.6),
+    "reduced": Look("red", "dashed", 2.2),
+    "reduced-participation": Look("green", "long", 1.9),
+    "reduced-attachment": Look("blue", "dashdot", 1.9),
+    "reduced-none": Look("orange", "dotted", 1.9),
+    "lumped": Look("pink", "sparse", 2.1),
 }
-_MORE_LOOKS: tuple[Look, ...] = (
-    ("red", "dashed", 1.6),
-    ("blue", "dashdot", 1.6),
-    ("green", "long", 1.6),
-    ("pink", "dotted", 1.8),
-    ("orange", "dashed", 1.6),
-    ("sky", "dashdot", 1.6),
-)
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 _TIME = AxisSpec(label="time since first touch", unit="µs")
-PART_LOOKS: tuple[tuple[Colour, str], ...] = (
-    ("blue", ""),
-    ("sky", "/"),
-    ("red", ""),
-    ("orange", "\\"),
-    ("green", ""),
-    ("pink", "x"),
-    ("yellow", "."),
-    ("grey", "-"),
-)
 
 
 def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
@@ -89,13 +68,11 @@ def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
 
 
 def _look(level: str) -> Look:
-    return _LOOKS.get(level, ("grey", "dashed", 1.9))
+    return _LOOKS.get(level, OTHER)
 
 
 def _level_curve(x: Floats, y: Floats, result: LevelResult, label: bool = True) -> Curve:
-    colour, style, width = _look(result.level)
-    name = result.label if label else ""
-    return Curve(x=x, y=y, label=name, colour=colour, style=style, width=width)
+    return _look(result.level).curve(x, y, result.label if label else "")
 
 
 def _since_touch(result: LevelResult, time: Floats) -> Floats:
@@ -283,15 +260,11 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
     frequency = 1e-3 * comparison.frequencies
     curves, differences, marks = [], [], []
     for i, label in enumerate(comparison.labels):
-        colour, style, width = _MORE_LOOKS[(i - 1) % len(_MORE_LOOKS)] if i else _LOOKS["full"]
-        magnitude = 1e9 * np.abs(comparison.curves[i])
-        curves.append(
-            Curve(x=frequency, y=magnitude, label=label, colour=colour, style=style, width=width)
-        )
+        curves.append(look_of(i).curve(frequency, 1e9 * np.abs(comparison.curves[i]), label))
         if i == 0:
             continue
         deviation = np.maximum(comparison.mean_deviations[i], 1e-3)
-        differences.append(Curve(x=frequency, y=deviation, colour=colour, style=style, width=width))
+        differences.append(look_of(i).curve(frequency, deviation))
         limit = 1e-3 * float(comparison.valid_up_to[i])
         if frequency[0] < limit < frequency[-1]:
             marks.append(Mark(value=limit, label=f"{limit:.3g} kHz"))
@@ -478,7 +451,7 @@ def modal_energy_chart(study: ImpactStudy) -> Chart:
     for body in (item.body for item in stems_of.modal_energy):
         curves: list[Curve] = []
         for result in results:
-            colour, _, _ = _look(result.level)
+            colour = _look(result.level).colour
             for item in result.modal_energy:
                 if item.body != body:
                     continue

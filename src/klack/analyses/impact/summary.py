@@ -1,9 +1,12 @@
 """The few numbers of a study that a script or a terminal wants."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from klack.analyses.analysis import Measured, TextTable
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.impact.measures import (
     CONTACT_TIME,
@@ -12,23 +15,58 @@ from klack.analyses.impact.measures import (
     PEAK_FORCE,
 )
 from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.json_results import ImpactJson
-from klack.analyses.measures import json_of
+from klack.analyses.json_parts import ContactJson
+from klack.analyses.measures import json_of, text_table, with_measures
 from klack.contact.restitution import Deviation
+from klack.terminal.tables import TextTable
 
 __all__ = [
-    "SUMMARY_COLUMNS",
+    "DeviationJson",
+    "ImpactJson",
     "answer_line",
     "estimate_lines",
     "no_estimate",
     "study_measured",
     "study_to_json",
     "study_told",
-    "summary_rows",
 ]
 
-_TOLD = tuple(measure for measure in LEVEL_MEASURES if measure.column is not None)
-SUMMARY_COLUMNS = ("level", *(measure.head for measure in _TOLD))
+
+@with_measures(DEVIATION_MEASURES)
+class DeviationJson(TypedDict):
+    """How far one result is from another one."""
+
+
+@with_measures(LEVEL_MEASURES)
+class LevelJson(TypedDict):
+    """Impact at one level."""
+
+    doubts: Annotated[list[str], Field(description="Why the level may be wrong.")]
+
+
+class ImpactJson(TypedDict):
+    """``klack impact`` and ``klack demo``."""
+
+    schema: Literal["klack-impact/1"]
+    case: str
+    complete: Annotated[bool, Field(description="False: a level failed.")]
+    failures: Annotated[
+        dict[str, str], Field(description="Why a level has no numbers, by its name.")
+    ]
+    answer: Annotated[str, Field(description="Name of the best level.")]
+    levels: Annotated[dict[str, LevelJson], Field(description="By the name of the level.")]
+    deviation: Annotated[
+        DeviationJson | None, Field(description="Of the level reduced from the reference.")
+    ]
+    deviations: Annotated[
+        dict[str, DeviationJson], Field(description="Of every level that is not the reference.")
+    ]
+    estimated_error: Annotated[
+        dict[str, DeviationJson | None],
+        Field(description="Of every reduced level, by a run at the interface level."),
+    ]
+    contact: Annotated[ContactJson, Field(description="All levels but lumped share it.")]
+    warnings: list[str]
 
 
 def study_to_json(study: ImpactStudy) -> ImpactJson:
@@ -67,7 +105,7 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
 
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     """What a terminal shows: the levels side by side, the answer, how good the others are."""
-    yield TextTable(title=study.title, columns=SUMMARY_COLUMNS, rows=summary_rows(study))
+    yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
         yield doubt
@@ -137,17 +175,9 @@ def _signed(value: float, digits: int) -> str:
     return f"{value:+.{digits}f}" if abs(value) < float("inf") else "unknown"
 
 
-def summary_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`SUMMARY_COLUMNS`, one per level, as text."""
-    return tuple(
-        (name, *(measure.cell(result) for measure in _TOLD))
-        for name, result in study.levels.items()
-    )
-
-
-def _level(result: LevelResult) -> dict[str, Any]:
+def _level(result: LevelResult) -> Any:
     return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts)}
 
 
-def _deviation(deviation: Deviation) -> dict[str, Any]:
+def _deviation(deviation: Deviation) -> Any:
     return json_of(DEVIATION_MEASURES, deviation)

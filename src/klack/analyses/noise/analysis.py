@@ -3,22 +3,16 @@
 ``result.zarr/study/designs/0/sound/pressure/values`` is the sound pressure of one click.
 """
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
+from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
 from klack.analyses.noise.record import NoiseStudy
-from klack.analyses.noise.summary import noise_to_json, noise_told
+from klack.analyses.noise.summary import NoiseJson, noise_measured, noise_to_json, noise_told
 from klack.analyses.store import RecordFormat
-from klack.report.page import Content
 
 __all__ = ["NOISE"]
 
 
-def _noise_content(study: NoiseStudy) -> Content:
-    from klack.analyses.noise.content import noise_content
-
-    return noise_content(study)
-
-
-NOISE = Analysis(
+NOISE = StoredAnalysis(
     form=RecordFormat(
         name="klack noise study",
         version=1,
@@ -43,7 +37,14 @@ NOISE = Analysis(
             "energy": "N^2 s, or Pa^2 s of a sound",
         },
     ),
-    content=_noise_content,
+    page="noise.content:noise_content",
+    json=NoiseJson,
     to_json=noise_to_json,
     told=noise_told,
+    measures={
+        "design and its noise": DESIGN_MEASURES,
+        "stop and its force": STOP_MEASURES,
+        "body that vibrates": BODY_MEASURES,
+    },
+    measured=noise_measured,
 )

@@ -1,12 +1,12 @@
 """What a noise report says, before it is laid out: the same words for screen and paper."""
 
-from collections.abc import Callable
 from math import isfinite
 
 import numpy as np
 
 from klack.acoustics.third_octave import ENERGY_REFERENCE, nominal_label
 from klack.acoustics.wav import level_statement, wav_bytes
+from klack.analyses.measures import glossary, page_cells, page_heads
 from klack.analyses.noise.body import ASSUMED_DAMPING
 from klack.analyses.noise.figures import (
     blocked_charts,
@@ -17,14 +17,15 @@ from klack.analyses.noise.figures import (
     spectrum_chart,
     strongest_chart,
 )
-from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
+from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
+from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
 from klack.analyses.noise.sounds import common_full_scale, study_sounds
 from klack.analyses.noise.surface import surface_figure
-from klack.analyses.noise.wording import decibels, force_level, noise_answer
+from klack.analyses.noise.wording import noise_answer
 from klack.analyses.page import page_of
 from klack.report.chart import Chart
 from klack.report.page import Content, Section, Sound, Table
-from klack.report.wording import listed, quantity, share, signed
+from klack.report.wording import fixed, listed, quantity, share, typeset
 
 __all__ = ["noise_content"]
 
@@ -70,100 +71,25 @@ def _forces(study: NoiseStudy) -> tuple[Chart, ...]:
 # --------------------------------------------------------------------------- numbers
 
 
-Cell = Callable[[NoiseDesign], float]
-
-
 def _number_table(study: NoiseStudy) -> Table:
     """Quantities down, designs across; the difference from the first one stands below."""
+    first, *others = study.designs
     rows = []
-    for title, value, unit, difference in _ROWS:
-        values = [value(design) for design in study.designs]
-        if not np.isfinite(values).any():
+    for measure in DESIGN_MEASURES:
+        values = [measure.read(design) for design in study.designs]
+        if not measure.page or not any(v is not None and isfinite(v) for v in values):
             continue
-        cells = [_text(values[0], unit)]
-        for other in values[1:]:
-            cells.append(_text(other, unit) + _difference(other, values[0], difference))
-        rows.append((title, *cells))
+        cells = [measure.on_page(first)]
+        for other in others:
+            apart = measure.apart(other, first).replace(measure.absent, "")
+            cells.append(f"{measure.on_page(other)}\n{typeset(apart)}".rstrip())
+        rows.append((measure.name, *cells))
     heads = [
         f"{design.name}{' (reference)' if i == 0 and len(study.designs) > 1 else ''}\n"
         f"{design.detail}"
         for i, design in enumerate(study.designs)
     ]
     return Table(columns=("", *heads), rows=tuple(rows))
-
-
-def _text(value: float, unit: str) -> str:
-    if not isfinite(value):
-        return _NONE
-    if unit == "dB":
-        return decibels(value)
-    if unit in ("sone", "acum", "phon", ""):
-        return f"{value:.3g}" + (f"\N{NO-BREAK SPACE}{unit}" if unit else "")
-    return quantity(value, unit, 3)
-
-
-def _difference(value: float, first: float, kind: str) -> str:
-    """Difference from the first design: of levels in dB, of the rest as level or as factor."""
-    if not (isfinite(value) and isfinite(first)) or not kind:
-        return ""
-    if kind == "level":
-        return "\n" + signed(value - first, 1, "dB")
-    if not (value > 0.0 and first > 0.0):
-        return ""
-    if kind == "factor":
-        return f"\n× {value / first:.3g}"
-    factor = 10.0 if kind == "energy" else 20.0
-    return "\n" + signed(float(factor * np.log10(value / first)), 1, "dB")
-
-
-def _of_sound(read: Callable[[ClickSound], float]) -> Cell:
-    return lambda design: read(design.sound) if design.sound is not None else float("nan")
-
-
-_ROWS: tuple[tuple[str, Cell, str, str], ...] = (
-    ("peak force", lambda d: max(stop.peak_force for stop in d.stops), "N", "amplitude"),
-    ("level of the unbalanced force", force_level, "dB", "level"),
-    (
-        "structure-borne energy injected, bodies rigidly held",
-        lambda d: d.injected_energy,
-        "J",
-        "energy",
-    ),
-    ("energy into mount and plate besides", lambda d: d.support_energy, "J", "energy"),
-    ("sound energy radiated (estimate)", lambda d: d.radiated_energy, "J", "energy"),
-    (
-        "in the audible range (estimate)",
-        lambda d: float(d.radiated_bands[d.band_middle <= 20e3].sum()),
-        "J",
-        "energy",
-    ),
-    ("sound energy, upper bound", lambda d: d.upper_bound, "J", "energy"),
-    ("peak level of a click", _of_sound(lambda s: s.statistics.peak_level), "dB", "level"),
-    (
-        "sound exposure level of a click",
-        _of_sound(lambda s: s.statistics.exposure_level),
-        "dB",
-        "level",
-    ),
-    ("the same, A-weighted", _of_sound(lambda s: s.statistics.exposure_level_A), "dB", "level"),
-    (
-        "level of the drive pattern, A-weighted",
-        _of_sound(lambda s: s.pattern.equivalent_level_A),
-        "dB",
-        "level",
-    ),
-    ("loudness, loudest moment", _of_sound(lambda s: s.loudness.maximum), "sone", "factor"),
-    ("loudness level there", _of_sound(lambda s: s.loudness.level), "phon", ""),
-    ("sharpness", _of_sound(lambda s: s.loudness.sharpness), "acum", "factor"),
-    ("kurtosis of the drive pattern", _of_sound(lambda s: s.pattern.kurtosis), "", "factor"),
-    (
-        "crest factor of the drive pattern",
-        _of_sound(lambda s: s.pattern.crest_factor),
-        "",
-        "factor",
-    ),
-    ("force valid up to", lambda d: d.valid_up_to, "Hz", ""),
-)
 
 
 # --------------------------------------------------------------------------- sections
@@ -214,10 +140,8 @@ def _force_table(study: NoiseStudy) -> Table:
             rows.append(
                 (
                     f"{whose}{stop.stop}",
-                    str(stop.impacts),
-                    quantity(stop.peak_force, "N", 4),
-                    quantity(stop.impulse, "N s", 4),
-                    decibels(level),
+                    *page_cells(STOP_MEASURES, stop),
+                    fixed(level, 1, "dB"),
                     top,
                     quantity(below, "Hz", 2),
                 )
@@ -225,9 +149,7 @@ def _force_table(study: NoiseStudy) -> Table:
     return Table(
         columns=(
             "stop",
-            "impacts",
-            "peak force",
-            "impulse of the record",
+            *page_heads(STOP_MEASURES),
             "unbalanced level",
             "highest band",
             "90 % of it below",
@@ -247,24 +169,12 @@ def _energy(study: NoiseStudy) -> Section:
                 (
                     f"{whose}{body.name}\n{through}",
                     quantity(float(injected), "J", 4),
-                    quantity(body.vibration_energy, "J", 4),
-                    quantity(body.vibration_spectral, "J", 4),
-                    quantity(body.dissipated, "J", 3),
-                    quantity(body.ringing, "J", 3),
-                    quantity(body.static_energy, "J", 3),
+                    *page_cells(BODY_MEASURES, body),
                 )
             )
     if not rows:
         return Section(title="Structure-borne energy")
-    columns = (
-        "body",
-        "injected\n∫ F v dt",
-        "vibration\nby time",
-        "vibration\n∫ 2 Re(Y) |F|² df",
-        "lost by the end",
-        "still ringing",
-        "stored more at rest",
-    )
+    columns = ("body", "injected\n∫ F v dt", *page_heads(BODY_MEASURES))
     worst = max(body.residual for _, body in _bodies(study))
     return Section(
         title="Structure-borne energy",
@@ -372,51 +282,15 @@ def _modes(design: NoiseDesign) -> str:
 
 
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
-    (
-        "level of the force",
-        "Third octaves after IEC 61260-1 (base ten) of ∫ F² dt, in dB re 1 pN² s = (1 µN)² s: the "
-        "level re 1 µN of a steady force with the same energy in one second. The force is held at "
-        "its first and last value outside the record.",
-    ),
-    (
-        "unbalanced force",
-        "Springs, magnet and fluid push the needle from the housing that it hits; below about one "
-        "over the time of flight they balance the contact forces. What is left is mass times "
-        "acceleration of the needle. Sound and surface motion have this share of every band; "
-        "injected energy, mobility and blocked force have the contact forces alone.",
-    ),
-    (
-        "structure-borne energy",
-        "Work of the contact and film forces on the modes of the rigidly held bodies, ∫ F v dt. "
-        "The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df. What a valve "
-        "as a whole passes on to its mount and plate comes on top.",
-    ),
+    *glossary(DESIGN_MEASURES),
     (
         "blocked force",
         "Axial force of the body on a rigid support. A softer structure takes up less.",
     ),
     (
-        "radiated sound energy",
-        "Estimate, over one run. Upper bound: equivalent radiated power, radiation efficiency 1.",
-    ),
-    (
         "sound pressure",
         "All radiated power as a monopole in a free field, with minimum phase. Reflections, "
         "directivity and the travel time are left out.",
-    ),
-    (
-        "peak level, sound exposure level",
-        "Largest pressure re 20 µPa; ∫ p² dt re (20 µPa)² s. Without weighting where none is said.",
-    ),
-    (
-        "loudness, sharpness",
-        "ISO 532-1 for sounds that vary in time (Zwicker), free field, largest value of one click; "
-        "DIN 45692 for the sharpness. 1 sone is the loudness of 40 dB at 1 kHz; twice the number "
-        "is twice as loud.",
-    ),
-    (
-        "kurtosis, crest factor",
-        "Of the drive pattern over whole periods: 3 for Gaussian noise; high for rare clicks.",
     ),
 )
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from klack.acoustics.signal_statistics import EXPOSURE_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
-from klack.report.chart import AxisSpec, Band, Chart, Colour, Curve, Mark, Panel, Style
+from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
+from klack.report.looks import look_of
 from klack.report.thinning import thinned
 from klack.report.wording import quantity
 
@@ -31,37 +32,9 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 SOUND_ENERGY_REFERENCE = 1e-12  # [J], the reference of ISO 3740 for sound energy levels
-_LOOKS: tuple[tuple[Colour, Style, float], ...] = (
-    ("black", "solid", 2.0),
-    ("red", "dashed", 2.0),
-    ("blue", "dashdot", 1.9),
-    ("orange", "dotted", 2.2),
-    ("green", "long", 1.9),
-    ("pink", "sparse", 2.1),
-)
 _SMALLEST = 1e-300
 _FREQUENCY = (0.02, 200.0)  # [kHz]
 _SILENCE = 60.0  # [dB] below the highest value that a level chart shows
-
-
-def _look(index: int) -> tuple[Colour, Style, float]:
-    return _LOOKS[index % len(_LOOKS)]
-
-
-def _curve(
-    x: Floats, y: Floats, index: int, label: str, *, listed: bool = True, steps: bool = False
-) -> Curve:
-    colour, style, width = _look(index)
-    return Curve(
-        x=x,
-        y=y,
-        label=label,
-        colour=colour,
-        style=style,
-        width=width,
-        listed=listed,
-        drawn="steps" if steps else "line",
-    )
 
 
 def _designs(study: NoiseStudy) -> list[tuple[int, NoiseDesign]]:
@@ -100,7 +73,7 @@ def force_chart(study: NoiseStudy) -> Chart:
                     x, y = thinned(scale * stop.force.time, stop.force.values)
                     listed = design.label not in named
                     named.add(design.label)
-                    curves.append(_curve(x, y, i, design.label, listed=listed))
+                    curves.append(look_of(i).curve(x, y, design.label, listed=listed))
         panels.append(Panel(y=AxisSpec(label=name, unit="N"), curves=tuple(curves), share=0.6))
     return Chart(
         name="force",
@@ -130,7 +103,7 @@ def strongest_chart(study: NoiseStudy) -> Chart:
                     x, y = thinned(1e6 * stop.first.time, stop.first.values)
                     listed = design.label not in named
                     named.add(design.label)
-                    curves.append(_curve(x, y, i, design.label, listed=listed))
+                    curves.append(look_of(i).curve(x, y, design.label, listed=listed))
         if curves:
             axis = AxisSpec(label=name, unit="N")
             panels.append(Panel(y=axis, curves=tuple(curves), share=0.7))
@@ -171,7 +144,7 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
                     listed = design.label not in named
                     named.add(design.label)
                     x = 1e-3 * stop.frequency
-                    curves.append(_curve(x, stop.level, i, design.label, listed=listed))
+                    curves.append(look_of(i).curve(x, stop.level, design.label, listed=listed))
         if curves:
             panels.append(_level_panel(name, "dB re 1 µN s", curves, 70.0))
     bands, left, gathered, differences = [], [], [], []
@@ -189,7 +162,7 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
         total = np.cumsum(design.unbalanced_energy)
         x = np.append(1e-3 * octaves.low[0], 1e-3 * octaves.high)
         share = 100.0 * np.append(0.0, total) / max(float(total[-1]), _SMALLEST)
-        gathered.append(_curve(x, share, i, design.label, listed=False))
+        gathered.append(look_of(i).curve(x, share, design.label, listed=False))
         if design is not reference and _same_bands(design, reference):
             apart = _level(design.unbalanced_energy, ENERGY_REFERENCE) - _level(
                 reference.unbalanced_energy, ENERGY_REFERENCE
@@ -239,7 +212,7 @@ def _steps(
     """Values as steps from band edge to band edge."""
     edges = 1e-3 * np.append(octaves.low, octaves.high[-1])
     heights = np.append(values, values[-1])
-    return _curve(edges, heights, index, label, listed=listed, steps=True)
+    return look_of(index).curve(edges, heights, label, listed=listed, drawn="steps")
 
 
 def _level_panel(label: str, unit: str, curves: Sequence[Curve], depth: float) -> Panel:
@@ -302,7 +275,7 @@ def _mobility_chart(study: NoiseStudy, name: str) -> Chart:
                 values = np.abs(body.mobility[p, q])
                 what = f"at '{port}'" if p == q else f"from '{port}' to '{body.ports[q]}'"
                 label = f"{whose}{what}"
-                curves.append(_curve(1e-3 * body.frequency, values, len(curves), label))
+                curves.append(look_of(len(curves)).curve(1e-3 * body.frequency, values, label))
         top = 1e-3 * body.highest_frequency
         if top < 1e-3 * body.frequency[-1]:
             marks[top] = Mark(value=top, label="highest kept mode")
@@ -352,7 +325,7 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         scale, unit = _time_unit(study)
         for i, design, body in found:
             x, y = thinned(scale * body.blocked.time, body.blocked.values)
-            curves.append(_curve(x, y, i, design.label))
+            curves.append(look_of(i).curve(x, y, design.label))
             level = _level(body.blocked_bands.energy, ENERGY_REFERENCE)
             bands.append((body.blocked_bands, level, i, design))
             first = bands[0]
@@ -440,10 +413,10 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
     window = (begin, 1e3 * max(ends))
     for i, design, sound in heard:
         x, y = thinned(1e3 * sound.pressure.time, 1e3 * sound.pressure.values, window=window)
-        waves.append(_curve(x, y, i, design.label))
+        waves.append(look_of(i).curve(x, y, design.label))
         loud.append(
-            _curve(
-                1e3 * sound.loudness.time, sound.loudness.loudness, i, design.label, listed=False
+            look_of(i).curve(
+                1e3 * sound.loudness.time, sound.loudness.loudness, design.label, listed=False
             )
         )
         level = _level(sound.bands.energy, EXPOSURE_REFERENCE)

@@ -8,7 +8,7 @@ from klack.acoustics.wav import full_scale_of, write_wav
 from klack.analyses.noise.record import NoiseDesign, NoiseStudy
 from klack.signals import TimeSeries
 
-__all__ = ["StudySound", "common_full_scale", "sound_names", "study_sounds", "write_sounds"]
+__all__ = ["StudySound", "common_full_scale", "study_sounds", "write_sounds"]
 
 StudySound = tuple[str, NoiseDesign, TimeSeries]
 """Name of the file, whose sound it is, and the sound pressure."""
@@ -30,16 +30,6 @@ def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
 def common_full_scale(sounds: tuple[StudySound, ...]) -> float:
     """Full scale of all files of a study [Pa], so that designs compare by ear."""
     return full_scale_of(*(pressure for *_, pressure in sounds))
-
-
-def sound_names(study: NoiseStudy) -> tuple[str, ...]:
-    """Names of the sound files of a study."""
-    return tuple(
-        _file_name(what, study, design)
-        for design in study.designs
-        if design.sound is not None
-        for what in ("click", "pattern")
-    )
 
 
 def write_sounds(study: NoiseStudy, folder: Path) -> tuple[str, ...]:

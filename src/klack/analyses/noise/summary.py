@@ -1,131 +1,102 @@
 """The few numbers of a noise study that a script or a terminal wants."""
 
 from collections.abc import Iterator, Sequence
-from typing import cast
+from dataclasses import replace
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
-from klack.analyses.analysis import TextTable
-from klack.analyses.json_results import (
-    BandJson,
-    BodyNoiseJson,
-    ClickJson,
-    DesignNoiseJson,
-    NoiseJson,
-)
-from klack.analyses.measures import number_or_none
-from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, NoiseStudy
+from klack.analyses.analysis import Measured
+from klack.analyses.json_parts import OwnComponents, Real
+from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
+from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
+from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
+from klack.terminal.tables import TextTable
 
-__all__ = ["NOISE_COLUMNS", "noise_rows", "noise_to_json", "noise_told"]
+__all__ = [
+    "NoiseJson",
+    "noise_measured",
+    "noise_to_json",
+    "noise_told",
+]
 
-# dBA: A-weighted, dBZ: unweighted (IEC 61672-1)
-NOISE_COLUMNS = (
-    "design",
-    "peak force [N]",
-    "force [dB]",
-    "injected [uJ]",
-    "to mount, plate [uJ]",
-    "radiated [nJ]",
-    "SEL [dBA]",
-    "SEL [dBZ]",
-    "peak [dBZ]",
-    "loudness [sone]",
-    "sharpness [acum]",
-    "up to [kHz]",
-)
+
+class BandJson(TypedDict):
+    """Level in a third octave."""
+
+    center_Hz: float
+    nominal: str
+    level_dB: Annotated[float, Field(description="re (1 uN)^2 s.")]
+
+
+@with_measures(STOP_MEASURES)
+class StopNoiseJson(TypedDict):
+    """Force of one stop."""
+
+    third_octave: list[BandJson]
+
+
+@with_measures(BODY_MEASURES)
+class BodyNoiseJson(TypedDict):
+    """Vibration and radiation of one body."""
+
+    injected_energy_J: Annotated[dict[str, Real], Field(description="By port.")]
+    radiated_energy_J: Annotated[dict[str, Real], Field(description="By group of surfaces.")]
+
+
+@with_measures(DESIGN_MEASURES)
+class DesignNoiseJson(TypedDict):
+    """Noise of one design; what is heard is null where nothing radiates."""
+
+    kind: str
+    run: str
+    own_components: OwnComponents
+    third_octave: Annotated[list[BandJson], Field(description="Of the force of all stops.")]
+    stops: Annotated[dict[str, StopNoiseJson], Field(description="By stop.")]
+    bodies: Annotated[dict[str, BodyNoiseJson], Field(description="By body.")]
+
+
+class NoiseJson(DesignNoiseJson):
+    """``klack noise``: numbers of the first design, and of all."""
+
+    schema: Literal["klack-noise/1"]
+    case: str
+    designs: Annotated[dict[str, DesignNoiseJson], Field(description="All of them by name.")]
 
 
 def noise_told(study: NoiseStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: the designs side by side."""
-    yield TextTable(title=study.title, columns=NOISE_COLUMNS, rows=noise_rows(study))
+    """What a terminal shows: the designs side by side, then how far each is from the first.
 
-
-def noise_rows(study: NoiseStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`NOISE_COLUMNS` as text: one per design, then how far each is from the first.
-
-    Differences are levels; those of loudness and sharpness are factors.
+    Differences are levels; those of loudness and sharpness are factors.  dBA: A-weighted, dBZ:
+    unweighted (IEC 61672-1).
     """
     first, *others = study.designs
-    return (
-        *(_row(design) for design in study.designs),
-        *(_difference_row(design, first) for design in others),
-    )
+    table = text_table(study.title, "design", DESIGN_MEASURES, ((d.name, d) for d in study.designs))
+    yield replace(table, rows=(*table.rows, *(_difference_row(other, first) for other in others)))
+
+
+def noise_measured(study: NoiseStudy) -> Iterator[Measured]:
+    """Every design, and each of its stops and bodies, with its measures."""
+    for design in study.designs:
+        yield design.name, design, DESIGN_MEASURES
+        for stop in design.stops:
+            yield f"{design.name}, {stop.stop}", stop, STOP_MEASURES
+        for body in design.bodies:
+            yield f"{design.name}, {body.name}", body, BODY_MEASURES
 
 
 def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:
-    now, then = design.sound, first.sound
-    heard = (
-        ("–",) * 5
-        if now is None or then is None
-        else (
-            _decibels(now.statistics.exposure_level_A - then.statistics.exposure_level_A),
-            _decibels(now.statistics.exposure_level - then.statistics.exposure_level),
-            _decibels(now.statistics.peak_level - then.statistics.peak_level),
-            _factor(now.loudness.maximum, then.loudness.maximum),
-            _factor(now.loudness.sharpness, then.loudness.sharpness),
-        )
-    )
     return (
         f"{design.name} - {first.name}",
-        _decibels(_ratio_level(_peak(design), _peak(first), 20.0)),
-        _decibels(_force_level(design) - _force_level(first)),
-        _decibels(_ratio_level(design.injected_energy, first.injected_energy, 10.0)),
-        _decibels(_ratio_level(design.support_energy, first.support_energy, 10.0)),
-        _decibels(_ratio_level(design.radiated_energy, first.radiated_energy, 10.0)),
-        *heard,
-        "",
+        *(
+            measure.apart(design, first) if measure.deviation else ""
+            for measure in DESIGN_MEASURES
+            if measure.column is not None
+        ),
     )
-
-
-def _ratio_level(value: float, other: float, factor: float) -> float:
-    """Level of a ratio [dB], ``factor`` 20 of forces and 10 of energies; nan unless both are."""
-    return factor * float(np.log10(value / other)) if value > 0.0 and other > 0.0 else float("nan")
-
-
-def _decibels(value: float) -> str:
-    return f"{round(value, 1) + 0.0:+.1f} dB" if np.isfinite(value) else "–"
-
-
-def _factor(value: float, other: float) -> str:
-    return f"x {value / other:.3g}" if value > 0.0 and other > 0.0 else "–"
-
-
-def _peak(design: NoiseDesign) -> float:
-    return max(stop.peak_force for stop in design.stops)
-
-
-def _force_level(design: NoiseDesign) -> float:
-    return float(10.0 * np.log10(max(design.unbalanced_energy.sum(), 1e-300) / ENERGY_REFERENCE))
-
-
-def _row(design: NoiseDesign) -> tuple[str, ...]:
-    sound = design.sound
-    heard = (
-        ("–",) * 5
-        if sound is None
-        else (
-            f"{sound.statistics.exposure_level_A:.1f}",
-            f"{sound.statistics.exposure_level:.1f}",
-            f"{sound.statistics.peak_level:.1f}",
-            f"{sound.loudness.maximum:.3g}",
-            f"{sound.loudness.sharpness:.3g}",
-        )
-    )
-    return (
-        design.name,
-        f"{_peak(design):.4g}",
-        f"{_force_level(design):.1f}",
-        _number(1e6 * design.injected_energy),
-        _number(1e6 * design.support_energy),
-        _number(1e9 * design.radiated_energy),
-        *heard,
-        _number(1e-3 * design.valid_up_to),
-    )
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else "–"
 
 
 def noise_to_json(study: NoiseStudy) -> NoiseJson:
@@ -148,31 +119,20 @@ def noise_to_json(study: NoiseStudy) -> NoiseJson:
 
 
 def _design(design: NoiseDesign) -> DesignNoiseJson:
-    bands = design.stops[0].bands
-    return {
+    found: Any = {
         "kind": design.kind,
         "run": design.run,
         "own_components": dict(design.own_components),
-        "third_octave": _bands(bands, design.band_energy),
-        "injected_energy_J": number_or_none(design.injected_energy),
-        "support_energy_J": number_or_none(design.support_energy),
-        "radiated_energy_J": number_or_none(design.radiated_energy),
-        "radiated_energy_upper_bound_J": number_or_none(design.upper_bound),
-        "valid_from_Hz": number_or_none(design.valid_from),
-        "balanced_below_Hz": number_or_none(design.balanced_below),
-        "valid_up_to_Hz": number_or_none(design.valid_up_to),
-        **_sound(design.sound),
+        "third_octave": _bands(design.stops[0].bands, design.band_energy),
+        **json_of(DESIGN_MEASURES, design),
         "stops": {
-            stop.stop: {
-                "impacts": stop.impacts,
-                "peak_force_N": number_or_none(stop.peak_force),
-                "impulse_Ns": number_or_none(stop.impulse),
-                "third_octave": _bands(stop.bands, stop.bands.energy),
-            }
+            stop.stop: json_of(STOP_MEASURES, stop)
+            | {"third_octave": _bands(stop.bands, stop.bands.energy)}
             for stop in design.stops
         },
         "bodies": {body.name: _body(body) for body in design.bodies},
     }
+    return cast(DesignNoiseJson, found)
 
 
 def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[BandJson]:
@@ -186,44 +146,9 @@ def _bands(bands: ThirdOctaves, energy: Sequence[float] | np.ndarray) -> list[Ba
     ]
 
 
-def _body(body: BodyNoise) -> BodyNoiseJson:
+def _body(body: BodyNoise) -> dict[str, Any]:
     radiated = body.radiated.sum(axis=1)
-    return {
-        "highest_mode_Hz": number_or_none(body.highest_frequency),
+    return json_of(BODY_MEASURES, body) | {
         "injected_energy_J": dict(zip(body.ports, map(number_or_none, body.injected), strict=True)),
-        "vibration_energy_J": number_or_none(body.vibration_energy),
-        "vibration_energy_by_mobility_J": number_or_none(body.vibration_spectral),
         "radiated_energy_J": dict(zip(body.groups, map(number_or_none, radiated), strict=True)),
     }
-
-
-def _sound(sound: ClickSound | None) -> ClickJson:
-    if sound is None:
-        return cast(ClickJson, dict.fromkeys(_SOUND_KEYS))
-    one, pattern = sound.statistics, sound.pattern
-    values = (
-        sound.loudness.maximum,
-        sound.loudness.level,
-        sound.loudness.sharpness,
-        pattern.kurtosis,
-        pattern.crest_factor,
-        one.exposure_level,
-        one.exposure_level_A,
-        one.peak_level,
-        pattern.equivalent_level_A,
-    )
-    numbers = {key: number_or_none(value) for key, value in zip(_SOUND_KEYS, values, strict=True)}
-    return cast(ClickJson, numbers)
-
-
-_SOUND_KEYS = (
-    "loudness_max_sone",
-    "loudness_level_phon",
-    "sharpness_acum",
-    "kurtosis",
-    "crest_factor",
-    "sound_exposure_level_dB",
-    "sound_exposure_level_dBA",
-    "peak_level_dB",
-    "pattern_level_dBA",
-)

@@ -3,23 +3,16 @@
 ``result.zarr/study/shots/restitution`` holds one number per shot.
 """
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.shots.measures import SHOT_MEASURES
 from klack.analyses.shots.record import ShotsStudy
-from klack.analyses.shots.summary import shots_measured, shots_to_json, shots_told
+from klack.analyses.shots.summary import ShotsJson, shots_measured, shots_to_json, shots_told
 from klack.analyses.store import RecordFormat
-from klack.report.page import Content
 
 __all__ = ["SHOTS"]
 
 
-def _shots_content(study: ShotsStudy) -> Content:
-    from klack.analyses.shots.content import shots_content
-
-    return shots_content(study)
-
-
-SHOTS = Analysis(
+SHOTS = StoredAnalysis(
     form=RecordFormat(
         name="klack shots study",
         version=1,
@@ -35,8 +28,10 @@ SHOTS = Analysis(
             "point_force": "N",
         },
     ),
-    content=_shots_content,
+    page="shots.content:shots_content",
+    json=ShotsJson,
     to_json=shots_to_json,
     told=shots_told,
+    measures={"shot": SHOT_MEASURES},
     measured=shots_measured,
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from klack.analyses.measures import Measure
+from klack.analyses.measures import Measure, described_in
 
 __all__ = ["DRAWN", "FIRST_IMPACT", "ROCKING", "SHOT_MEASURES", "Shot"]
 
@@ -11,43 +11,32 @@ Shot = Mapping[str, float]
 
 _THEORY = "theory/interface"
 
-DRAWN: tuple[Measure[Shot], ...] = (
+DRAWN: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
     Measure(
         key="eccentricity",
-        name="eccentricity",
         symbol="e_0",
         unit="m",
         definition="Distance of the axis of the moving body from that of the seat at the height of"
         " first touch, at the start of the drop.",
-        source=_THEORY,
-        read=lambda shot: shot["eccentricity"],
     ),
     Measure(
         key="direction",
-        name="direction",
         symbol="phi_e",
         unit="rad",
         definition="To which side the axis is off, counted from x to y.",
-        source=_THEORY,
-        read=lambda shot: shot["direction"],
     ),
     Measure(
         key="tilt",
-        name="tilt",
         symbol="theta",
         unit="rad",
         definition="Angle between both axes at the start of the drop.",
-        source=_THEORY,
-        read=lambda shot: shot["tilt"],
     ),
     Measure(
         key="tilt_direction",
-        name="tilt direction",
         symbol="phi_t",
         unit="rad",
         definition="Where the upper end leans to, counted from x to y.",
-        source=_THEORY,
-        read=lambda shot: shot["tilt_direction"],
     ),
     Measure(
         key="force",
@@ -55,17 +44,12 @@ DRAWN: tuple[Measure[Shot], ...] = (
         symbol="F_0",
         unit="N",
         definition="Force that closes the valve at first touch.",
-        source=_THEORY,
-        read=lambda shot: shot["force"],
     ),
     Measure(
         key="friction",
         name="friction in the guide",
         symbol="mu",
-        unit="1",
         definition="Coulomb's coefficient in the guide.",
-        source=_THEORY,
-        read=lambda shot: shot["friction"],
         form="fixed",
     ),
     Measure(
@@ -74,22 +58,17 @@ DRAWN: tuple[Measure[Shot], ...] = (
         symbol="w",
         unit="m",
         definition="Root mean square deviation of the ring from a circle.",
-        source=_THEORY,
-        read=lambda shot: shot["waviness"],
     ),
 )
 """What differs from shot to shot."""
 
-FIRST_IMPACT: tuple[Measure[Shot], ...] = (
+FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
     Measure(
         key="restitution",
-        name="restitution",
         symbol="e",
-        unit="1",
         definition="Velocity of the centre of mass along the axis after the first impact over that"
         " before it.",
-        source=_THEORY,
-        read=lambda shot: shot["restitution"],
         form="fixed",
         note="It is a result, never an input. A closing force goes on working while the "
         "bodies touch: a strong one lifts the restitution of an eccentric impact, even "
@@ -97,40 +76,28 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = (
     ),
     Measure(
         key="rebound_height",
-        name="rebound height",
         symbol="h",
         unit="m",
         definition="Highest position of the centre of mass between the first impact and the "
         "second, above that at first touch.",
-        source=_THEORY,
-        read=lambda shot: shot["rebound_height"],
     ),
     Measure(
         key="peak_force",
-        name="peak force",
         symbol="F_max",
         unit="N",
         definition="Largest contact force of any time step of the first impact.",
-        source=_THEORY,
-        read=lambda shot: shot["peak_force"],
     ),
     Measure(
         key="contact_time",
-        name="contact time",
         symbol="t_c",
         unit="s",
         definition="From first touch to the end of the first uninterrupted contact.",
-        source=_THEORY,
-        read=lambda shot: shot["contact_time"],
     ),
     Measure(
         key="impulse",
-        name="impulse",
         symbol="J",
         unit="N s",
         definition="Integral of the contact force over the first impact, with all its contacts.",
-        source=_THEORY,
-        read=lambda shot: shot["impulse"],
     ),
 )
 """What is measured of the first impact; the first two tell how high it comes back."""
@@ -139,69 +106,42 @@ ROCKING = Measure[Shot](
     key="rocking",
     name="motion across the axis after it",
     symbol="E_r/E_0",
-    unit="1",
     definition="Kinetic energy of rotation and sideways motion right after the first impact, "
     "over the energy of approach.",
-    source=_THEORY,
-    read=lambda shot: shot["rocking"],
     form="share",
     digits=2,
     note="What an eccentric or tilted impact takes from the rebound.",
 )
 
-SHOT_MEASURES: tuple[Measure[Shot], ...] = (
+SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
     *DRAWN,
     Measure(
         key="approach_speed",
-        name="approach speed",
         symbol="v_0",
         unit="m/s",
         definition="Speed of the centre of mass along the axis before the first impact.",
-        source=_THEORY,
-        read=lambda shot: shot["approach_speed"],
     ),
     *FIRST_IMPACT,
     Measure(
         key="sub_contacts",
-        name="sub contacts",
         symbol="n_c",
-        unit="1",
         definition="Contacts of which the first impact consists.",
-        source=_THEORY,
-        read=lambda shot: shot["sub_contacts"],
         kind="whole",
-        form="count",
     ),
     ROCKING,
     Measure(
         key="second_impact",
-        name="second impact",
         symbol="t_2",
         unit="s",
         definition="Time from the first touch to that of the second impact.",
-        source=_THEORY,
-        read=lambda shot: shot["second_impact"],
     ),
-    Measure(
-        key="impacts",
-        name="impacts",
-        symbol="n",
-        unit="1",
-        definition="Impacts until the shot ended.",
-        source=_THEORY,
-        read=lambda shot: shot["impacts"],
-        kind="whole",
-        form="count",
-    ),
+    Measure(key="impacts", symbol="n", definition="Impacts until the shot ended.", kind="whole"),
     Measure(
         key="energy_residual",
-        name="energy residual",
         symbol="r_E",
-        unit="1",
         definition="Energy from nowhere over the initial energy, of the whole shot: round-off in a"
         " sound run.",
-        source=_THEORY,
-        read=lambda shot: shot["energy_residual"],
         form="power",
     ),
 )

@@ -1,6 +1,6 @@
 """``klack shots``: many drops of one valve, each a little different, and the centred one."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import PressureRecord
+from klack.analyses.logged_work import LoggedWork
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.draw import (
     ShotDraw,
@@ -16,10 +17,9 @@ from klack.analyses.shots.draw import (
     draw_shot,
     shots_of,
 )
-from klack.analyses.shots.log import shot_log, shots_mark
+from klack.analyses.shots.log import ShotLog, shot_log, shots_mark
 from klack.analyses.shots.model import ShotModel, build_shots
 from klack.analyses.shots.one_shot import ShotSetup, columns_of, run_shot, simulate_shot, traces_of
-from klack.analyses.shots.pool import run_shots_on
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
@@ -30,7 +30,7 @@ from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["judge_rule", "run_shots"]
+__all__ = ["judge_rule", "run_shots", "run_shots_on"]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
@@ -124,6 +124,22 @@ def run_shots(
         pressures=pressures,
         warnings=(*notes, *_notes(model, shots)),
     )
+
+
+def run_shots_on(
+    workers: int, setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
+) -> None:
+    """Run the shots that the log does not hold yet, and put them there.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        Of the first shot that fails; it is named.
+    """
+    with LoggedWork(run_shot, setup, workers, log, "shot {}".format, fewest=3) as work:
+        progress("shots", len(log.done) / len(draws))
+        for _ in work.completed({draw.index: draw for draw in draws}):
+            progress("shots", len(log.done) / len(draws))
 
 
 def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVerdict:

@@ -2,20 +2,24 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any
+from typing import Annotated, Any, Literal
 
-import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured, TextTable
-from klack.analyses.json_results import ShotsJson
-from klack.analyses.measures import json_of, number_or_none
+from klack.analyses.analysis import Measured
+from klack.analyses.json_parts import Real, Version
+from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.sample import moments
 from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
     "DISTRIBUTION_COLUMNS",
     "QUANTILES",
+    "ShotsJson",
     "distribution_rows",
     "shots_measured",
     "shots_to_json",
@@ -35,6 +39,44 @@ DISTRIBUTION_COLUMNS = (
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Shares of the shots that stay below."""
+
+
+@with_measures(SHOT_MEASURES)
+class ShotJson(TypedDict):
+    """One shot."""
+
+
+class HighestRuleJson(TypedDict):
+    """Highest rebound against the centred shot."""
+
+    holds: bool
+    restitution_bias: Real
+    rebound_height_bias: Real
+    relative_restitution_bias: Real
+    relative_rebound_height_bias: Real
+    shots_at_least_as_high_as_centric: int
+    sentence: str
+
+
+class ShotsJson(TypedDict):
+    """``klack shots``."""
+
+    schema: Literal["klack-shots/1"]
+    case: str
+    klack: Version
+    seed: int
+    centric: Annotated[ShotJson, Field(description="The centred shot.")]
+    shots: list[ShotJson]
+    highest: Annotated[int, Field(description="Index of the highest rebound.")]
+    distribution: Annotated[
+        dict[str, dict[str, Real]],
+        Field(description="By measure: mean, standard_deviation, quantile_0 to quantile_1."),
+    ]
+    rule: HighestRuleJson
+    wall_time_s: Real
+    shot_time_s: Real
+    workers: int
+    resumed: Annotated[int, Field(description="Shots taken over from an interrupted run.")]
 
 
 def shots_to_json(study: ShotsStudy) -> ShotsJson:
@@ -58,7 +100,7 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         "shots": [_row(study.shots, i) for i in range(study.shots.count)],
         "highest": study.highest,
         "distribution": {
-            measure.json_key: _distribution(getattr(study.shots, measure.key))
+            measure.json_key: moments(getattr(study.shots, measure.key), QUANTILES)
             for measure in FIRST_IMPACT
         },
         "rule": {
@@ -96,32 +138,18 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
     rows = []
     for measure in FIRST_IMPACT:
         values = getattr(study.shots, measure.key)
-        known = values[np.isfinite(values)]
+        found = moments(values, (0.0, 0.5, 1.0))
         numbers = (
             float(getattr(study.centric, measure.key)[0]),
             float(values[study.highest]),
-            float(np.mean(known)),
-            float(np.std(known)),
-            *(float(np.quantile(known, share)) for share in (0.0, 0.5, 1.0)),
+            *(float("nan") if number is None else number for number in found.values()),
         )
         rows.append((measure.name, *(_text(number, measure.unit) for number in numbers)))
     return tuple(rows)
 
 
-def _row(columns: ShotColumns, index: int) -> dict[str, Any]:
+def _row(columns: ShotColumns, index: int) -> Any:
     return json_of(SHOT_MEASURES, columns.row(index))
-
-
-def _distribution(values: np.ndarray) -> dict[str, float | None]:
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return dict.fromkeys(("mean", "standard_deviation"))
-    quantiles = {f"quantile_{share:g}": float(np.quantile(known, share)) for share in QUANTILES}
-    return {
-        "mean": float(np.mean(known)),
-        "standard_deviation": float(np.std(known)),
-        **quantiles,
-    }
 
 
 def _text(value: float, unit: str) -> str:

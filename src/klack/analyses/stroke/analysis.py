@@ -7,21 +7,14 @@ run; its unit stands beside it as ``unit``.
 from dataclasses import replace
 from math import isfinite
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.store import RecordFormat
-from klack.analyses.stroke.measures import EVENT_MEASURES
+from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeStudy
-from klack.analyses.stroke.summary import stroke_measured, stroke_to_json, stroke_told
+from klack.analyses.stroke.summary import StrokeJson, stroke_measured, stroke_to_json, stroke_told
 from klack.reduction.structure import STRUCTURE_UNITS
-from klack.report.page import Content
 
 __all__ = ["STROKE"]
-
-
-def _stroke_content(study: StrokeStudy) -> Content:
-    from klack.analyses.stroke.content import stroke_content
-
-    return stroke_content(study)
 
 
 def _renewed(study: StrokeStudy) -> StrokeStudy:
@@ -33,7 +26,7 @@ def _known(value: float | None) -> float | None:
     return value if value is not None and isfinite(value) else None
 
 
-STROKE = Analysis(
+STROKE = StoredAnalysis(
     form=RecordFormat(
         name="klack stroke study",
         version=1,
@@ -57,9 +50,11 @@ STROKE = Analysis(
         },
         tables=("events",),
     ),
-    content=_stroke_content,
+    page="stroke.content:stroke_content",
+    json=StrokeJson,
     to_json=stroke_to_json,
     told=stroke_told,
+    measures={"stroke variant": VARIANT_MEASURES, "impact of a stroke": EVENT_MEASURES},
     measured=stroke_measured,
     renewed=_renewed,
 )

@@ -358,11 +358,11 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "together. A touch slower than 2 % of the fastest impact on a stop does not count as its "
         "first impact.",
     ),
-    *glossary(measure for measure in EVENT_MEASURES if measure.page),
+    *glossary(EVENT_MEASURES),
     *glossary(
         measure
         for measure in VARIANT_MEASURES
-        if measure.page and measure.key not in ("opening_time", "closing_time")  # above
+        if measure.key not in ("opening_time", "closing_time")  # above
     ),
     (
         "echo time 2L/a",

@@ -11,7 +11,6 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.impact.figures import PART_LOOKS
 from klack.analyses.stroke.record import LineSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.summary import first_impact
 from klack.report.chart import (
@@ -20,12 +19,11 @@ from klack.report.chart import (
     BarChart,
     BarPart,
     Chart,
-    Colour,
     Curve,
     Mark,
     Panel,
-    Style,
 )
+from klack.report.looks import OTHER, PART_LOOKS, Look, look_of
 from klack.report.thinning import thinned
 from klack.report.wording import listed, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
@@ -42,23 +40,13 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-Look = tuple[Colour, Style, float]
 
 _LOOKS: dict[str, Look] = {
-    "wet": ("black", "solid", 2.2),
-    "dry": ("red", "dashed", 2.0),
-    "wet-lumped": ("blue", "dashdot", 2.0),
-    "dry-lumped": ("orange", "dotted", 2.2),
+    "wet": Look("black", "solid", 2.2),
+    "dry": Look("red", "dashed", 2.0),
+    "wet-lumped": Look("blue", "dashdot", 2.0),
+    "dry-lumped": Look("orange", "dotted", 2.2),
 }
-_CURVE_LOOKS: tuple[Look, ...] = (
-    ("black", "solid", 1.8),
-    ("red", "dashed", 1.8),
-    ("blue", "dashdot", 1.8),
-    ("green", "long", 1.8),
-    ("orange", "dotted", 2.0),
-    ("pink", "sparse", 2.0),
-    ("sky", "dashed", 1.6),
-)
 _TIME = AxisSpec(label="time", unit="ms")
 _ZERO = Mark(value=0.0, axis="y")
 _SMALL = 0.01
@@ -152,9 +140,8 @@ def _channel_panel(
         data = variant.channel(name)
         if data is None:
             continue
-        colour, style, width = _CURVE_LOOKS[len(curves) % len(_CURVE_LOOKS)]
         x, y = thinned(1e3 * variant.result.time, factor * data.values)
-        curves.append(Curve(x=x, y=y, label=name, colour=colour, style=style, width=width))
+        curves.append(look_of(len(curves)).curve(x, y, name))
     if len(curves) == 1:  # the axis says what it is
         curves = [replace(curves[0], listed=False)]
     return Panel(y=axis, curves=tuple(curves), share=share)
@@ -179,10 +166,7 @@ def _variant_panel(
 
 
 def _variant_curve(variant: StrokeVariant, x: Floats, y: Floats, *, label: bool = True) -> Curve:
-    colour, style, width = _LOOKS.get(variant.name, ("grey", "dashed", 1.8))
-    return Curve(
-        x=x, y=y, label=variant.label, colour=colour, style=style, width=width, listed=label
-    )
+    return _LOOKS.get(variant.name, OTHER).curve(x, y, variant.label, listed=label)
 
 
 def _axis_over(*variants: StrokeVariant) -> AxisSpec:
@@ -370,9 +354,8 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
     for i, name in enumerate(study.channels.pressures):
         data = variant.channel(name)
         if data is not None:
-            colour, style, width = _CURVE_LOOKS[i % len(_CURVE_LOOKS)]
             x, y = thinned(since, 1e-5 * data.values, window=window)
-            pressures.append(Curve(x=x, y=y, label=name, colour=colour, style=style, width=width))
+            pressures.append(look_of(i).curve(x, y, name))
     return Chart(
         name=f"echo-{stop}-{line.name}",
         title=f"After the first impact on '{stop}', echoes of the line '{line.name}'",
@@ -553,13 +536,12 @@ def _bars(
     rest = tuple(
         factor * sum(value for key, value in entry.items() if key not in named) for entry in entries
     )
-    looks = [*PART_LOOKS]
     parts = [
         BarPart(label=key, values=value, colour=colour, hatch=hatch)
-        for key, value, (colour, hatch) in zip(named, values, looks, strict=False)
+        for key, value, (colour, hatch) in zip(named, values, PART_LOOKS, strict=False)
     ]
     if any(rest):
-        colour, hatch = looks[-1]
+        colour, hatch = PART_LOOKS[-1]
         parts.append(BarPart(label="everything else", values=rest, colour=colour, hatch=hatch))
     return BarChart(
         name=name,

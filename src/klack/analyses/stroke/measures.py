@@ -1,8 +1,9 @@
 """Measures of a stroke: of every impact, and of a variant as a whole."""
 
 from operator import attrgetter
+from typing import Literal
 
-from klack.analyses.measures import Column, Measure
+from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.stroke.record import StrokeVariant
 from klack.report.wording import count
 from klack.simulation.network_result import ImpactEvent
@@ -24,99 +25,75 @@ def _steps(variant: StrokeVariant) -> str:
     return f"\n{count(result.fine_steps)} fine, {count(result.coarse_steps)} coarse"
 
 
-EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
+EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
+    "theory/stroke",
     Measure(
         key="time",
-        name="time",
         symbol="t",
         unit="s",
         definition="First touch, from the start of the run.",
-        source="theory/stroke",
-        read=attrgetter("time"),
         digits=5,
         column=Column("ms", 1000.0, ".4f"),
         page=True,
     ),
     Measure(
         key="approach_speed",
-        name="approach speed",
         title="speed",
         symbol="v_0",
         unit="m/s",
         definition="Closing speed of the centres of mass at first touch, or the highest one "
         "since the film began to press.",
-        source="theory/stroke",
-        read=attrgetter("approach_speed"),
         form="fixed",
         column=Column("m/s", 1.0, ".4f", "speed"),
         page=True,
     ),
     Measure(
         key="peak_force",
-        name="peak force",
         symbol="F_max",
         unit="N",
         definition="Largest force of contact and film together.",
-        source="theory/stroke",
-        read=attrgetter("peak_force"),
         column=Column("N", 1.0, ".4g"),
         page=True,
     ),
     Measure(
         key="peak_time",
-        name="peak time",
         symbol="t_max",
         unit="s",
         definition="When the peak force acts, from the start of the run.",
-        source="theory/stroke",
-        read=attrgetter("peak_time"),
         digits=5,
     ),
     Measure(
         key="contact_time",
-        name="contact time",
         symbol="t_c",
         unit="s",
         definition="Time closed, all contacts of the impact together.",
-        source="theory/stroke",
-        read=attrgetter("contact_time"),
         column=Column("us", 1000000.0, ".2f"),
         page=True,
     ),
     Measure(
         key="separation_time",
-        name="separation time",
         symbol="t_1",
         unit="s",
         definition="End of the last contact, from the start of the run; missing if it stays "
         "closed.",
-        source="theory/stroke",
-        read=attrgetter("separation_time"),
         digits=5,
     ),
     Measure(
         key="impulse",
-        name="impulse",
         symbol="J",
         unit="N s",
         definition="Integral of the force of contact and film together.",
-        source="theory/stroke",
-        read=attrgetter("impulse"),
         column=Column("mN s", 1000.0, ".4g"),
         page=True,
     ),
     Measure(
         key="restitution",
-        name="restitution",
         symbol="e",
-        unit="1",
         definition="Opening speed over approach speed of the centres of mass; missing without "
         "separation.",
         note="It is a result of waves, fluid and films, never an input of the flexible "
         "variants; a body that still vibrates from an impact before may rebound "
         "faster than it came.",
-        source="theory/stroke",
-        read=attrgetter("restitution"),
         form="fixed",
         digits=3,
         column=Column("", 1.0, ".4f"),
@@ -124,12 +101,9 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
     ),
     Measure(
         key="energy_loss",
-        name="energy loss",
         symbol="W",
         unit="J",
         definition="Kinetic energy of the centre of mass before the impact less that after it.",
-        source="theory/stroke",
-        read=attrgetter("energy_loss"),
         digits=3,
         column=Column("uJ", 1000000.0, ".4g"),
         page=True,
@@ -137,138 +111,73 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = (
 )
 """Of one impact; contacts closer together than the longest period of the needle are one."""
 
-VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
+
+def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVariant], ...]:
+    return tuple(
+        Measure(
+            key=f"{way}_time_at_{share}_percent",
+            symbol=f"t_{way[0]},{share}",
+            unit="s",
+            definition=f"From the start of the run until {share} % of the lift are passed on the "
+            f"way of {way}.",
+            read=attrgetter(f"needle_times.{way}.at_{share}"),
+            absent=NOT_REACHED,
+        )
+        for share in (10, 50, 90)
+    )
+
+
+VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
+    "theory/stroke",
     Measure(
         key="opening_time",
-        name="opening time",
         symbol="t_o",
         unit="s",
         definition="From the start of the run to the first touch of the opening stop.",
-        source="theory/stroke",
         read=lambda variant: variant.needle_times.opening.touch,
         column=Column("ms", 1000.0, ".4f", "opens"),
         page=True,
         absent=NOT_REACHED,
     ),
-    Measure(
-        key="opening_time_at_10_percent",
-        name="opening time at 10 percent",
-        symbol="t_o,10",
-        unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "opening.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.opening.at_10,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="opening_time_at_50_percent",
-        name="opening time at 50 percent",
-        symbol="t_o,50",
-        unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "opening.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.opening.at_50,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="opening_time_at_90_percent",
-        name="opening time at 90 percent",
-        symbol="t_o,90",
-        unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "opening.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.opening.at_90,
-        absent=NOT_REACHED,
-    ),
+    *_at_shares("opening"),
     Measure(
         key="closing_time",
-        name="closing time",
         symbol="t_c",
         unit="s",
         definition="From the start of the run to the first touch of the seat.",
-        source="theory/stroke",
         read=lambda variant: variant.needle_times.closing.touch,
         column=Column("ms", 1000.0, ".4f", "closes"),
         page=True,
         absent=NOT_REACHED,
     ),
-    Measure(
-        key="closing_time_at_10_percent",
-        name="closing time at 10 percent",
-        symbol="t_c,10",
-        unit="s",
-        definition="From the start of the run until 10 % of the lift are passed on the way of "
-        "closing.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.closing.at_10,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="closing_time_at_50_percent",
-        name="closing time at 50 percent",
-        symbol="t_c,50",
-        unit="s",
-        definition="From the start of the run until 50 % of the lift are passed on the way of "
-        "closing.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.closing.at_50,
-        absent=NOT_REACHED,
-    ),
-    Measure(
-        key="closing_time_at_90_percent",
-        name="closing time at 90 percent",
-        symbol="t_c,90",
-        unit="s",
-        definition="From the start of the run until 90 % of the lift are passed on the way of "
-        "closing.",
-        source="theory/stroke",
-        read=lambda variant: variant.needle_times.closing.at_90,
-        absent=NOT_REACHED,
-    ),
+    *_at_shares("closing"),
     Measure(
         key="complete",
-        name="complete",
-        symbol="",
-        unit="1",
         definition="Whether the run came to its end.",
-        source="theory/stroke",
         read=lambda variant: not variant.result.failure,
-        form="count",
         kind="truth",
     ),
     Measure(
         key="impacts",
-        name="impacts",
         symbol="n",
-        unit="1",
         definition="Impacts on all stops.",
-        source="theory/stroke",
         read=lambda variant: len(variant.result.events),
-        form="count",
         column=Column("", 1.0, "d"),
         page=True,
         kind="whole",
     ),
     Measure(
         key="end_time",
-        name="end time",
         symbol="t_e",
         unit="s",
         definition="How far the run came.",
-        source="theory/stroke",
         read=lambda variant: float(variant.result.time[-1]),
     ),
     Measure(
         key="energy_residual",
-        name="energy residual",
         symbol="r_E",
-        unit="1",
         definition="Supplies less losses less the rise of all stores, over the throughput: "
         "round-off in a sound run.",
-        source="theory/stroke",
         read=lambda variant: variant.result.books.relative_residual,
         form="power",
         column=Column("", 1.0, ".1e"),
@@ -276,67 +185,47 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
     ),
     Measure(
         key="energy_throughput",
-        name="energy throughput",
         symbol="E",
         unit="J",
         definition="All energy that came in or was taken from a store.",
-        source="theory/stroke",
         read=lambda variant: variant.result.books.throughput,
     ),
     Measure(
         key="degrees_of_freedom",
-        name="degrees of freedom",
         symbol="n",
-        unit="1",
         definition="Modes and rigid motions of all bodies.",
-        source="theory/stroke",
         read=lambda variant: variant.modes,
-        form="count",
         column=Column("", 1.0, "d"),
         page=True,
         kind="whole",
     ),
     Measure(
         key="steps",
-        name="steps",
         symbol="n_t",
-        unit="1",
         definition="Time steps of the run, fine and coarse ones.",
-        source="theory/stroke",
         read=lambda variant: variant.result.fine_steps + variant.result.coarse_steps,
-        form="count",
         column=Column("", 1.0, "d"),
         kind="whole",
     ),
     Measure(
         key="fine_steps",
-        name="fine steps",
         symbol="n_f",
-        unit="1",
         definition="Fine time steps.",
-        source="theory/stroke",
         read=lambda variant: variant.result.fine_steps,
-        form="count",
         kind="whole",
     ),
     Measure(
         key="coarse_steps",
-        name="coarse steps",
         symbol="n_c",
-        unit="1",
         definition="Coarse time steps, in flight.",
-        source="theory/stroke",
         read=lambda variant: variant.result.coarse_steps,
-        form="count",
         kind="whole",
     ),
     Measure(
         key="step",
-        name="step",
         symbol="dt",
         unit="s",
         definition="Length of a fine time step.",
-        source="theory/stroke",
         read=lambda variant: variant.result.step,
         digits=3,
         page=True,
@@ -345,11 +234,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
     ),
     Measure(
         key="wall_time",
-        name="wall time",
-        symbol="",
         unit="s",
         definition="Wall time of the time loop.",
-        source="theory/stroke",
         read=lambda variant: variant.result.wall_time,
         digits=3,
         column=Column("s", 1.0, ".3g"),
@@ -360,10 +246,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
     Measure(
         key="real_time_factor",
         name="real-time factor",
-        symbol="",
-        unit="1",
         definition="Wall time of the time loop, on one core, over the simulated time.",
-        source="theory/stroke",
         read=real_time_factor,
         form="fixed",
         digits=3,
@@ -371,12 +254,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = (
     ),
     Measure(
         key="setup_time",
-        name="setup time",
-        symbol="",
         unit="s",
         definition="Wall time of everything before the time loop.",
-        source="theory/stroke",
-        read=lambda variant: variant.setup_time,
         digits=3,
     ),
 )

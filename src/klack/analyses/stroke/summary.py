@@ -2,42 +2,35 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Annotated, Any, Literal, cast
 
-from klack.analyses.analysis import Measured, TextTable
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
-from klack.analyses.json_results import (
-    PassageJson,
-    StartJson,
-    StrokeJson,
-    TimesJson,
-    VariantJson,
-)
-from klack.analyses.measures import json_of, number_or_none
+from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
+from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.simulation.network_result import ImpactEvent
+from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
-    "IMPACT_COLUMNS",
     "TIME_COLUMNS",
-    "VARIANT_COLUMNS",
+    "StrokeJson",
     "first_impact",
-    "impact_rows",
     "start_text",
     "stroke_measured",
     "stroke_to_json",
     "stroke_told",
     "time_rows",
     "touch_event",
-    "variant_rows",
 ]
 
-_TOLD_OF_VARIANT = tuple(measure for measure in VARIANT_MEASURES if measure.column is not None)
-VARIANT_COLUMNS = ("variant", *(measure.head for measure in _TOLD_OF_VARIANT))
 TIME_COLUMNS = (
     "variant",
     "body",
@@ -49,13 +42,85 @@ TIME_COLUMNS = (
     "touch [ms]",
     "of",
 )
-_TOLD_OF_IMPACT = tuple(measure for measure in EVENT_MEASURES if measure.column is not None)
-IMPACT_COLUMNS = ("stop", *(measure.head for measure in _TOLD_OF_IMPACT))
 
 _TOLD = 20
 """Impacts of a variant on a terminal."""
 _NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as the first one."""
+
+
+@with_measures(EVENT_MEASURES)
+class EventJson(TypedDict):
+    """One impact of a stroke."""
+
+    stop: Annotated[str, Field(description="Name of the end stop.")]
+
+
+class PassageJson(TypedDict):
+    """One way between two stops; null for what the run does not reach."""
+
+    at_10_percent_s: Annotated[Real, Field(description="Of the lift.")]
+    at_50_percent_s: Real
+    at_90_percent_s: Real
+    stop: Annotated[str | None, Field(description="Name of the end stop.")]
+    touch_s: Annotated[Real, Field(description="First touch of that stop.")]
+
+
+class TimesJson(TypedDict):
+    """Opening and closing of one body."""
+
+    starts: Annotated[str, Field(description="closed or open: which way comes first.")]
+    lift_m: Real
+    lift_between_stops: Annotated[bool, Field(description="False: largest less smallest lift.")]
+    opening: PassageJson
+    closing: PassageJson
+
+
+class StartJson(TypedDict):
+    """Static equilibrium at time zero."""
+
+    displacement_m: Annotated[dict[str, float], Field(description="By port.")]
+    pressure_Pa: Annotated[dict[str, float], Field(description="Absolute, by node.")]
+    pressure_stated: Annotated[
+        dict[str, bool], Field(description="Whether the case states it; else it is found.")
+    ]
+    mass_flow_kg_s: Annotated[dict[str, float], Field(description="By restriction.")]
+    residual_force_N: Annotated[dict[str, float], Field(description="What is left, by body.")]
+    notes: Annotated[list[str], Field(description="What has no steady state.")]
+
+
+@with_measures(VARIANT_MEASURES)
+class VariantJson(TimesJson):
+    """One variant of a stroke; opening and closing are those of the needle."""
+
+    label: str
+    start: Annotated[
+        StartJson | None, Field(description="Null for a run that goes on or began free.")
+    ]
+    failure: Annotated[str | None, Field(description="Why the run ended early.")]
+    fine_record_ends_s: Annotated[
+        dict[str, Real],
+        Field(description="Stops whose force in fine steps is known up to there only."),
+    ]
+    events: Annotated[list[EventJson], Field(description="Impacts in the order of time.")]
+    bodies: Annotated[
+        dict[str, TimesJson], Field(description="Of every other body between stops, by name.")
+    ]
+
+
+class StrokeJson(VariantJson):
+    """``klack stroke``: numbers of the reference variant, and of all."""
+
+    schema: Literal["klack-stroke/1"]
+    case: str
+    klack: Version
+    own_components: OwnComponents
+    variant: Annotated[str, Field(description="Name of the reference variant.")]
+    variants: Annotated[dict[str, VariantJson], Field(description="All of them by name.")]
+    stops: Annotated[
+        dict[str, ContactJson],
+        Field(description="By the name of the end stop; all variants but lumped ones share them."),
+    ]
 
 
 def stroke_to_json(study: StrokeStudy) -> StrokeJson:
@@ -76,7 +141,7 @@ def stroke_to_json(study: StrokeStudy) -> StrokeJson:
 
 def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
     """What a terminal shows: variants side by side, times at shares of the lift, impacts."""
-    yield TextTable(title=study.title, columns=VARIANT_COLUMNS, rows=variant_rows(study))
+    yield text_table(study.title, "variant", VARIANT_MEASURES, study.variants.items())
     if times := time_rows(study):
         title = "times at shares of the lift"
         yield TextTable(title=title, columns=TIME_COLUMNS, rows=times, left=3)
@@ -89,7 +154,8 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             continue
         if total > _TOLD:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
-        yield TextTable(title=title, columns=IMPACT_COLUMNS, rows=tuple(impact_rows(variant)))
+        events = variant.result.events[:_TOLD]
+        yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
     for stop in study.stops:
         if doubt := contact_doubt(stop):
             yield f"Impacts on '{stop.name}': {doubt}"
@@ -103,14 +169,6 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
         for event in variant.result.events:
             counts[event.stop] += 1
             yield f"{name}, {event.stop} {counts[event.stop]}", event, EVENT_MEASURES
-
-
-def variant_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`VARIANT_COLUMNS`, one per variant, as text."""
-    return tuple(
-        (variant.name, *(measure.cell(variant) for measure in _TOLD_OF_VARIANT))
-        for variant in study.variants.values()
-    )
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
@@ -143,12 +201,6 @@ def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
         ),
         None,
     )
-
-
-def impact_rows(variant: StrokeVariant, most: int = _TOLD) -> Iterator[tuple[str, ...]]:
-    """Rows of :data:`IMPACT_COLUMNS`, the first ``most`` impacts of a variant, as text."""
-    for event in variant.result.events[:most]:
-        yield (event.stop, *(measure.cell(event) for measure in _TOLD_OF_IMPACT))
 
 
 def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:

@@ -8,12 +8,13 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from klack.contact.laws import ContactLaw, HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.exchange.fmu.model_description import communication_step
 from klack.exchange.fmu.model_exchange import supports_model_exchange
 from klack.exchange.fmu.pictures import answer_picture, icon, port_picture
 from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import ModalModel, ModelContact
+from klack.network.protocols import InterfaceLaw
 
 __all__ = ["documentation_files"]
 
@@ -112,7 +113,7 @@ def _contact_words(contact: ModelContact) -> _ContactWords:
     )
 
 
-def _law_words(law: ContactLaw | None) -> str:
+def _law_words(law: InterfaceLaw | None) -> str:
     match law:
         case None:
             return "no contact"
@@ -127,6 +128,8 @@ def _law_words(law: ContactLaw | None) -> str:
             )
         case HuntCrossley():
             return f"{_law_words(law.law)}, with dissipation {law.dissipation:.3g}"
+        case _:
+            return type(law).__name__
 
 
 def _license() -> bytes:

@@ -1,28 +1,41 @@
 """Results as xarray datasets, for notebooks."""
 
+from collections.abc import Iterable
 from typing import Any
 
+from klack.analyses.analysis import Measured
 from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.noise.record import NoiseStudy
+from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
 from klack.errors import InputError, MissingExtraError
+from klack.exchange.results.about import about_study
 from klack.exchange.results.naming import identifiers
+from klack.exchange.results.noise_dataset import noise_variables
+from klack.exchange.results.shots_dataset import shots_variables
 from klack.exchange.results.study_table import result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar
+from klack.exchange.results.variables import Variable, about_measure
 
 __all__ = ["dataset_of"]
 
+Variables = dict[str, Variable]
 
-def dataset_of(record: object, run: str | None = None) -> Any:
+
+def dataset_of(record: object, measured: Iterable[Measured], run: str | None = None) -> Any:
     """Curves and numbers of one run of a record as an ``xarray.Dataset``.
 
-    Coordinates are the axes of the run; every variable has ``units``, ``long_name`` and
-    ``comment``, as in netCDF files (:func:`klack.exchange.results.netcdf.write_netcdf`).
+    Coordinates are the axes of the run; every variable has ``units`` and ``long_name``, as in
+    netCDF files (:func:`klack.exchange.results.netcdf.write_netcdf`).
 
     Parameters
     ----------
-    record : ImpactStudy or StrokeStudy
+    record : ImpactStudy, StrokeStudy, ShotsStudy or NoiseStudy
+    measured : iterable of (name, part of the record, measures)
+        Those of the record; the numbers of a noise study are read from them.
     run : str, optional
-        Level or variant; the answer of an impact, the reference of a stroke by default.
+        Level, variant or design; the answer of an impact, the reference of a stroke, the first
+        design by default.  Shots have one run.
 
     Raises
     ------
@@ -31,54 +44,78 @@ def dataset_of(record: object, run: str | None = None) -> Any:
     InputError
         For another record, or a run that it does not have.
     """
-    if not isinstance(record, ImpactStudy | StrokeStudy):
-        raise InputError(
-            "to_xarray",
-            got=f"a {type(record).__name__}",
-            expected="the record of an impact or a stroke",
-            hint="its arrays are fields of the record: result.record.",
-        )
     try:
         import xarray
     except ImportError as error:
         raise MissingExtraError("xarray", "datasets of results", "exchange") from error
-    table = result_table(record)
-    usual = record.reference if isinstance(record, ImpactStudy) else record.reference.name
-    runs = {item.name: item for item in table.runs}
-    if (run or usual) not in runs:
+    about: dict[str, str]
+    if isinstance(record, ImpactStudy | StrokeStudy):
+        table = result_table(record)
+        usual = record.reference if isinstance(record, ImpactStudy) else record.reference.name
+        runs = {item.name: item for item in table.runs}
+        found = runs[_named(run, usual, runs)]
+        variables, coordinates = _table_variables(found)
+        about = {**table.about, "run": found.name, "label": found.label}
+    elif isinstance(record, ShotsStudy):
+        _named(run, "shots", ("shots",))
+        variables, coordinates = shots_variables(record)
+        about = about_study(record, {"surfaces": record.surfaces, "guide": record.guide})
+    elif isinstance(record, NoiseStudy):
+        designs = {item.name: item for item in record.designs}
+        design = designs[_named(run, record.reference.name, designs)]
+        variables, coordinates = noise_variables(design)
+        for _, of, measures in measured:
+            if of is design:
+                variables |= {
+                    item.key: Variable((), _number(item.read(of)), about_measure(item))
+                    for item in measures
+                }
+        about = about_study(record, {"run": design.name, "label": design.label})
+    else:
         raise InputError(
             "to_xarray",
-            got=f"'{run}'",
-            expected=f"one of: {', '.join(runs)}",
-            hint="name a level, a variant, or a transfer function of this result.",
+            got=f"a {type(record).__name__}",
+            expected="the record of an impact, a stroke, shots or noise",
+            hint="its arrays are fields of the record: result.record.",
         )
-    found = runs[run or usual]
-    variables, coordinates = _variables(found)
-    about = {key: text for key, text in table.about.items() if text}
-    attributes = {**about, "run": found.name, "label": found.label}
-    return xarray.Dataset(variables, coords=coordinates, attrs=attributes)
+    shown = {key: text for key, text in about.items() if text}
+    return xarray.Dataset(variables, coords=coordinates, attrs=shown)
 
 
-def _variables(run: ResultRun) -> tuple[dict[str, Any], dict[str, Any]]:
+def _named(run: str | None, usual: str, known: Iterable[str]) -> str:
+    name = usual if run is None else run
+    if name not in known:
+        raise InputError(
+            "to_xarray",
+            got=f"'{name}'",
+            expected=f"one of: {', '.join(known)}",
+            hint="name a level, a variant, a design, or a transfer function of this result.",
+        )
+    return name
+
+
+def _number(value: float | int | bool | None) -> float | int | bool:
+    return float("nan") if value is None else value
+
+
+def _table_variables(run: ResultRun) -> tuple[Variables, Variables]:
     """Data variables and coordinates, by names that Python takes."""
     axes = identifiers([axis.name for axis in run.axes])
     dimension = dict(zip([axis.name for axis in run.axes], axes, strict=True))
     coordinates = {
-        dimension[axis.name]: (
-            (dimension[axis.name],),
-            axis.values,
-            {"units": axis.unit, "long_name": axis.meaning},
+        dimension[axis.name]: Variable(
+            (dimension[axis.name],), axis.values, {"units": axis.unit, "long_name": axis.meaning}
         )
         for axis in run.axes
     }
     words = [item.name for item in run.channels] + [item.name for item in run.scalars]
     names = identifiers(words, axes)
-    variables: dict[str, Any] = {
-        name: ((dimension[item.axis],), item.values, _about(item))
+    curves = {
+        name: Variable((dimension[item.axis],), item.values, _about(item))
         for name, item in zip(names, run.channels, strict=False)
     }
     numbers = zip(names[len(run.channels) :], run.scalars, strict=True)
-    return variables | {name: ((), n.value, _about(n)) for name, n in numbers}, coordinates
+    return curves | {name: Variable((), n.value, _about(n)) for name, n in numbers}, coordinates
 
 
 def _about(item: ResultChannel | ResultScalar) -> dict[str, str]:

@@ -38,6 +38,7 @@ def impact_table(study: ImpactStudy) -> ResultTable:
             "contact": study.contact.surfaces,
             "reference": study.reference,
         },
+        study.bodies,
     )
     runs = [_level(level) for level in study.ordered]
     runs += [_transfer(item) for item in study.transfer]

@@ -39,7 +39,10 @@ def stroke_table(study: StrokeStudy) -> ResultTable:
         own["fluid"] = f"{study.fluid.name} at {study.fluid.temperature!r} K"
     runs = tuple(_variant(item, study.step) for item in study.variants.values())
     return ResultTable(
-        kind="stroke", about=about_study(study, own), case_text=study.case_text, runs=runs
+        kind="stroke",
+        about=about_study(study, own, study.bodies),
+        case_text=study.case_text,
+        runs=runs,
     )
 
 

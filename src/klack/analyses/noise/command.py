@@ -6,19 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
-    Components,
-    Json,
-    Out,
-    Quiet,
-    Threads,
-    imported,
-    require_threads,
-)
-from klack.cli.output import require_json_target
-from klack.cli.progress import Progress, show_progress
-from klack.cli.stored import is_result
+from klack.analyses.ending import Ending
+from klack.analyses.result_folder import is_result
+from klack.terminal.options import Components, imported
+from klack.terminal.progress import Progress, show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource
@@ -56,31 +48,25 @@ def noise(
     *,
     variant: _Names = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Estimate what is heard: force spectra, vibration, radiated sound, loudness, WAV files."""
-    require_json_target(json)
-    require_threads(threads)
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
     _require_known(paths)
     own = imported(component)
-    folder = out if out is not None else Path("klack-results") / _folder_name(paths)
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = Ending.of(wanted, _folder_name(paths))
 
-    with show_progress(quiet):
+    with show_progress(wanted.quiet):
         from klack.analyses.noise.analysis import NOISE
         from klack.analyses.noise.run import run_noise
         from klack.analyses.noise.sounds import write_sounds
 
-    with show_progress(quiet) as progress:
+    with show_progress(wanted.quiet) as progress:
         sources = [
-            source for path in paths for source in _sources(path, names, own, progress, threads)
+            source
+            for path in paths
+            for source in _sources(path, names, own, progress, wanted.threads)
         ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
     return ending.end(NOISE, study, beside=lambda folder: write_sounds(study, folder))

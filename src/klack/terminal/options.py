@@ -18,6 +18,7 @@ __all__ = [
     "Levels",
     "Out",
     "Quiet",
+    "Report",
     "Threads",
     "imported",
     "require_files",
@@ -39,6 +40,7 @@ Out = Annotated[
     Path | None,
     Parameter(name="--out", help="Folder for the results. [default: klack-results/NAME]"),
 ]
+Report = Annotated[bool, Parameter(help="Write report.html and report.pdf.")]
 Quiet = Annotated[
     bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress and no tables.")
 ]

@@ -1,27 +1,14 @@
 """``klack advise``: mesh sizes, modes and steps for a target, from measured convergence."""
 
 import os
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.options import (
-    CaseArgument,
-    Components,
-    Json,
-    Quiet,
-    Threads,
-    imported,
-    require_threads,
-)
-from klack.cli.output import require_json_target, write_json
-from klack.cli.progress import show_progress
-from klack.cli.tables import print_table
-
-if TYPE_CHECKING:
-    from klack.analyses.advice.advice import Advice
+from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["advise"]
 
@@ -72,15 +59,11 @@ def advise(
         bool, Parameter(help="Run the advised case and lay it over the finest run.")
     ] = True,
     component: Components = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: Wanted = WANTED,
 ) -> int:
     """Advise mesh sizes, modes and step of a case, with the error expected of each."""
     from klack.units import FREQUENCY, RATIO, parse_quantity
 
-    require_json_target(json)
-    require_threads(threads)
     _require_new_file(write)
     limit = _within("--error", error, parse_quantity(error, RATIO, "--error"), _MOST_ERROR, "1 %")
     decibel = _within("--bands", bands, _decibel(bands), _MOST_LEVEL, "1 dB")
@@ -95,10 +78,11 @@ def advise(
 
     from klack import __version__
     from klack.analyses.advice.advised_case import advice_yaml, advised_text, changed_values
+    from klack.analyses.advice.analysis import ADVICE
     from klack.analyses.advice.any_case import advise_case
-    from klack.analyses.advice.summary import advice_to_json
+    from klack.analyses.advice.summary import AdvisedCase
 
-    with show_progress(quiet) as progress:
+    with show_progress(wanted.quiet) as progress:
         advice = advise_case(
             checked,
             error=limit,
@@ -107,16 +91,18 @@ def advise(
             level=level,
             confirm=confirm,
             progress=progress,
-            threads=threads,
+            threads=wanted.threads,
         )
-    values = changed_values(tree, advice)
     if write is not None:
         _write_whole(write, advised_text(tree, advice, write, __version__))
-    if not quiet:
-        to_stderr = str(json) == "-"
-        _print_advice(advice, advice_yaml(tree, advice), write, to_stderr=to_stderr)
-    if json is not None:
-        write_json(json, advice_to_json(advice, values))
+    advised = AdvisedCase(
+        advice=advice,
+        changes=changed_values(tree, advice),
+        yaml=advice_yaml(tree, advice),
+        written=write,
+    )
+    wanted.show(ADVICE.told(advised))
+    wanted.write(lambda: ADVICE.to_json(advised))
     return 0
 
 
@@ -174,18 +160,3 @@ def _write_whole(path: Path, text: str) -> None:
 
     with whole_file(path) as new:
         new.write_text(text, encoding="utf-8")
-
-
-def _print_advice(advice: "Advice", yaml: str, written: Path | None, *, to_stderr: bool) -> None:
-    from klack.analyses.advice.summary import ADVICE_COLUMNS, advice_lines, advice_rows
-
-    title = f"{advice.title}: advice for the {advice.level} level"
-    print_table(title, ADVICE_COLUMNS, advice_rows(advice), to_stderr=to_stderr)
-    stream = sys.stderr if to_stderr else sys.stdout
-    for line in advice_lines(advice):
-        print(line, file=stream)
-    if yaml:
-        print("\nIn place of the same keys of the case:\n", file=stream)
-        print(yaml, file=stream)
-    if written is not None:
-        print(f"The case with the advice: {written}", file=stream)

@@ -5,19 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
-    CaseArgument,
-    Components,
-    Json,
-    Out,
-    Quiet,
-    Threads,
-    imported,
-    require_threads,
-)
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase
@@ -60,37 +51,29 @@ def stroke(
     step: _Step = None,
     continued: _Continue = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    asked: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
     from klack.case.shipped import find_case
 
-    require_json_target(json)
-    require_threads(threads)
-    with show_progress(quiet):
+    with show_progress(asked.quiet):
         checked = _checked_case(find_case(case), duration, step, imported(component))
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
-    folder = out if out is not None else Path("klack-results") / checked.name
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = Ending.of(asked, checked.name)
 
-    with show_progress(quiet):
+    with show_progress(asked.quiet):
         from klack.analyses.stroke.analysis import STROKE
         from klack.analyses.stroke.record import IncompleteStrokeError
         from klack.analyses.stroke.run import run_stroke
 
         after = STROKE.load(continued) if continued is not None else None
     incomplete: Exception | None = None
-    with show_progress(quiet) as progress:
+    with show_progress(asked.quiet) as progress:
         try:
             study = run_stroke(
-                checked, variants=wanted, after=after, progress=progress, threads=threads
+                checked, variants=wanted, after=after, progress=progress, threads=asked.threads
             )
         except IncompleteStrokeError as error:
             study, incomplete = error.study, error

@@ -19,17 +19,14 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
 
-__all__ = ["energy_books", "energy_stores", "reset_books"]
+__all__ = ["balance_since", "energy_stores", "reset_accounts"]
 
 
-def reset_books(network: CompiledNetwork) -> None:
-    """Begin new books: all supplies and losses are zero, works what elements have still to see."""
-    nodes, interfaces = network.nodes, network.interfaces
-    work = network.bodies.at[WORK : WORK + PORTS]
-    accounts = (network.books, network.line_books, work, nodes.numeric)
-    for account in (*accounts, nodes.supply, interfaces.contact_loss, interfaces.film_loss):
+def reset_accounts(network: CompiledNetwork) -> None:
+    """Begin a new energy balance: no supplies and losses, works that elements have still to see."""
+    for account in network.accounts:
         account[:] = 0.0
-    work[:] = _unseen_work(network)
+    network.bodies.at[WORK : WORK + PORTS] = _unseen_work(network)
 
 
 def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
@@ -49,7 +46,8 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
 
     Of a body without the work that elements have still to see.
     """
-    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    rows, nodes, state = network.rows, network.nodes, network.node_state
+    interfaces, touching = network.interfaces, network.interface_state
     stores = {}
     unseen, place = _unseen_work(network), 0
     for b, row in enumerate(rows.bodies):
@@ -57,9 +55,9 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
         ahead = float(unseen[place : place + len(row.ports)].sum())
         place += len(row.ports)
         stores[f"{row.component} {BODY_STORE}"] = kinetic + strain - ahead
-    for i, kind in enumerate(network.book_kind):
+    for i, kind in enumerate(network.account_kind):
         if kind == STORE:
-            stores[network.book_names[i]] = float(network.books[i])
+            stores[network.account_names[i]] = float(network.accounts.rows[i])
     for c, contact in enumerate(rows.interfaces):
         stores[f"{contact.component} contact"] = float(
             interface_store(
@@ -67,45 +65,44 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
                 interfaces.law,
                 int(interfaces.law0[c]),
                 float(interfaces.series[c]),
-                float(interfaces.gap[c]),
-                float(interfaces.e[c]),
+                float(touching.gap[c]),
+                float(touching.e[c]),
             )
         )
     for i in range(nodes.volumes):
-        excess = nodes.p[i] - nodes.ambient
+        excess = state.p[i] - nodes.ambient
         name = rows.nodes[network.node_order[i]].component
-        stores[f"{name} compression"] = float(nodes.mass[i] * nodes.g[i] - excess * nodes.held[i])
+        stores[f"{name} compression"] = float(state.mass[i] * state.g[i] - excess * state.held[i])
     for k, line in enumerate(rows.lines):
         stores[f"{line.component} waves"] = float(line_store(network.lines, network.line_state, k))
     return stores
 
 
-def energy_books(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
-    """Books from the moment of ``before`` until now.
+def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
+    """Energy balance from the moment of ``before`` until now.
 
     The damping of modes is what is missing in the balance of its body.
     """
-    rows, nodes, interfaces = network.rows, network.nodes, network.interfaces
+    rows, nodes, accounts = network.rows, network.nodes, network.accounts
     after = energy_stores(network)
     supplies: dict[str, float] = {}
     losses: dict[str, float] = {}
-    for i, kind in enumerate(network.book_kind):
+    for i, kind in enumerate(network.account_kind):
         if kind != STORE:
-            (supplies if kind == SUPPLY else losses)[network.book_names[i]] = float(
-                network.books[i]
-            )
-    for i, energy in enumerate(nodes.supply):
+            owner = supplies if kind == SUPPLY else losses
+            owner[network.account_names[i]] = float(accounts.rows[i])
+    for i, energy in enumerate(accounts.supply):
         name = rows.nodes[network.node_order[nodes.volumes + i]].component
         supplies[f"{name} pressure"] = supplies.get(f"{name} pressure", 0.0) + float(energy)
     for i in range(nodes.volumes):
         name = rows.nodes[network.node_order[i]].component
-        losses[f"{name} implicit step"] = float(nodes.numeric[i])
+        losses[f"{name} implicit step"] = float(accounts.implicit[i])
     for c, contact in enumerate(rows.interfaces):
-        losses[f"{contact.component} contact"] = float(interfaces.contact_loss[c])
-        losses[f"{contact.component} film"] = float(interfaces.film_loss[c])
+        losses[f"{contact.component} contact"] = float(accounts.contact[c])
+        losses[f"{contact.component} film"] = float(accounts.film[c])
     for k, line in enumerate(rows.lines):
         for j, what in enumerate(LINE_LOSSES):
-            losses[f"{line.component} {what}"] = float(network.line_books[k, j])
+            losses[f"{line.component} {what}"] = float(accounts.lines[k, j])
     works = network.bodies.at[WORK : WORK + PORTS] - _unseen_work(network)
     place = 0
     for row in rows.bodies:

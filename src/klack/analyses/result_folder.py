@@ -1,24 +1,29 @@
-"""Results of finished studies, of either kind, with their reports beside them."""
+"""Folders of results: a record, and its report beside it."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from klack.cli.output import staged_folder
 from klack.errors import InputError
 from klack.held_folder import Mark
+from klack.terminal.output import staged_folder
 from klack.uninterrupted import uninterrupted
-from klack.whole_file import mark_of, outdated
+from klack.whole_file import completed, mark_of, outdated
 
 if TYPE_CHECKING:
     from klack.analyses.unfinished import LogForm
     from klack.progress import Progress
     from klack.report.page import Content
 
-__all__ = ["REPORTS", "beside_result", "write_reports", "write_result"]
+__all__ = ["REPORTS", "beside_result", "is_result", "write_reports", "write_result"]
 
 REPORTS = ("report.html", "report.pdf")
 _RESULT = "result.zarr"
+
+
+def is_result(path: Path) -> bool:
+    """Tell a folder with a result, or a store itself, from a case."""
+    return (completed(path) / _RESULT).is_dir() or (path / "zarr.json").is_file()
 
 
 def write_reports(content: "Content", folder: Path) -> None:

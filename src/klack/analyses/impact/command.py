@@ -5,10 +5,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import CaseArgument, Json, Levels, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument, Levels
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["impact", "run_case"]
 
@@ -18,7 +18,6 @@ def impact(
     /,
     *,
     level: Levels = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
     certify: Annotated[
         bool,
         Parameter(
@@ -26,61 +25,35 @@ def impact(
             "twice as many modes."
         ),
     ] = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute one impact; several levels are compared with each other."""
     # both "--level a,b" and "--level a --level b"
     levels = [name for item in level or () for name in item.split(",") if name]
-    run_case(
-        case,
-        levels,
-        report=report,
-        certify=certify,
-        out=out,
-        json=json,
-        threads=threads,
-        quiet=quiet,
-    )
+    run_case(case, levels, wanted, certify=certify)
     return 0
 
 
-def run_case(
-    case: Path,
-    level: list[str],
-    *,
-    report: bool,
-    certify: bool = True,
-    out: Path | None,
-    json: Path | None,
-    threads: int | None,
-    quiet: bool,
-) -> Path:
+def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: bool = True) -> Path:
     """Run a case, write and print what came out; return the folder of the results."""
     from klack.case import find_case, load_case
 
-    require_json_target(json)
-    require_threads(threads)
-    with show_progress(quiet):
+    with show_progress(wanted.quiet):
         checked = load_case(find_case(case))
         levels = checked.require_levels(level if level else checked.run.levels)
-        folder = out if out is not None else Path("klack-results") / checked.name
-        ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-        ending.require_possible()
+        ending = Ending.of(wanted, checked.name)
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact
         from klack.analyses.incomplete import IncompleteImpactError
 
     incomplete: Exception | None = None
-    with show_progress(quiet) as progress:
+    with show_progress(wanted.quiet) as progress:
         try:
             study = run_impact(
-                checked, levels=levels, certify=certify, progress=progress, threads=threads
+                checked, levels=levels, certify=certify, progress=progress, threads=wanted.threads
             )
         except IncompleteImpactError as error:
             study, incomplete = error.study, error
     ending.end(IMPACT, study, incomplete=incomplete)
-    return folder
+    return ending.folder

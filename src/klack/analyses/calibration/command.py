@@ -1,27 +1,13 @@
 """``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import (
-    CaseArgument,
-    Components,
-    Json,
-    Out,
-    Quiet,
-    Threads,
-    imported,
-    require_files,
-    require_threads,
-)
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
-
-if TYPE_CHECKING:
-    pass
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument, Components, imported, require_files
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["calibrate"]
 
@@ -53,19 +39,13 @@ def calibrate(
     strokes: _Strokes = None,
     workers: _Workers = None,
     component: Components = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Fit parameters of a valve to measured strokes, with their uncertainty."""
     from dataclasses import replace
 
     from klack.errors import require_positive
 
-    require_json_target(json)
-    require_threads(threads)
     require_files("--measurement", measurement)
     for option, number, unit in (("--strokes", strokes, "strokes"), ("--workers", workers, "")):
         if number is not None:
@@ -78,9 +58,7 @@ def calibrate(
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     fitted = calibration_of(checked).channels
-    folder = out if out is not None else Path("klack-results") / f"{checked.name}-calibration"
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    ending = Ending.of(wanted, f"{checked.name}-calibration")
 
     from klack.analyses.calibration.analysis import CALIBRATION
     from klack.analyses.calibration.calibrated_case import CALIBRATED_NAME, calibrated_text
@@ -88,31 +66,25 @@ def calibrate(
     from klack.measurement.loading import load_stroke_set
 
     def calibrated(stage: Path) -> tuple[str, ...]:
-        text = calibrated_text(tree, study, folder)
+        text = calibrated_text(tree, study, ending.folder)
         (stage / CALIBRATED_NAME).write_text(text, encoding="utf-8")
         return (CALIBRATED_NAME,)
 
-    with show_progress(quiet) as progress:
-        try:
-            measured = load_stroke_set(
-                measurement,
-                checked.measurement,
-                lambda share: progress("measurement", share),
-                roles=("lift", *fitted),
-            )
-            study = run_calibration(
-                tree,
-                measured
-                if strokes is None
-                else replace(measured, strokes=measured.strokes[:strokes]),
-                folder=folder,
-                workers=workers,
-                progress=progress,
-                threads=threads,
-            )
-        except KeyboardInterrupt as stop:
-            count = TRIAL_LOG.count(folder)
-            kept = f"{count} computed strokes are kept in {folder / TRIAL_LOG.file}"
-            stop.add_note(f"{kept}, the same command resumes.")
-            raise
+    with ending.resumable(TRIAL_LOG) as progress:
+        measured = load_stroke_set(
+            measurement,
+            checked.measurement,
+            lambda share: progress("measurement", share),
+            roles=("lift", *fitted),
+        )
+        if strokes is not None:
+            measured = replace(measured, strokes=measured.strokes[:strokes])
+        study = run_calibration(
+            tree,
+            measured,
+            folder=ending.folder,
+            workers=workers,
+            progress=progress,
+            threads=wanted.threads,
+        )
     return ending.end(CALIBRATION, study, beside=calibrated, unfinished=TRIAL_LOG)

@@ -1,14 +1,13 @@
 """``klack shots``: many drops of one valve, each a little different."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.ending import Ending
-from klack.cli.options import CaseArgument, Json, Out, Quiet, Threads, require_threads
-from klack.cli.output import require_json_target
-from klack.cli.progress import show_progress
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["shots"]
 
@@ -39,17 +38,11 @@ def shots(
     count: _Count = None,
     seed: _Seed = None,
     workers: _Workers = None,
-    report: Annotated[bool, Parameter(help="Write report.html and report.pdf.")] = True,
-    out: Out = None,
-    json: Json = None,
-    threads: Threads = None,
-    quiet: Quiet = False,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Drop the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
     from klack.errors import require_nonnegative, require_positive
 
-    require_json_target(json)
-    require_threads(threads)
     if count is not None:
         require_positive("--shots", count, "shots")
     if seed is not None:
@@ -62,29 +55,22 @@ def shots(
     from klack.case.shipped import find_case
 
     checked = load_case(find_case(case))
-    total = count if count is not None else shots_of(checked).count
-    folder = out if out is not None else Path("klack-results") / checked.name
-    ending = Ending(folder=folder, report=report, json=json, quiet=quiet)
-    ending.require_possible()
+    shots_of(checked)
+    ending = Ending.of(wanted, checked.name)
 
-    with show_progress(quiet):
+    with show_progress(wanted.quiet):
         from klack.analyses.shots.analysis import SHOTS
         from klack.analyses.shots.log import SHOT_LOG
         from klack.analyses.shots.run import run_shots
 
-    with show_progress(quiet) as progress:
-        try:
-            study = run_shots(
-                checked,
-                count=count,
-                seed=seed,
-                workers=workers,
-                folder=folder,
-                progress=progress,
-                threads=threads,
-            )
-        except KeyboardInterrupt as stop:
-            kept = f"{SHOT_LOG.count(folder)} of {total} shots are kept in {folder / SHOT_LOG.file}"
-            stop.add_note(f"{kept}, the same command resumes.")
-            raise
+    with ending.resumable(SHOT_LOG) as progress:
+        study = run_shots(
+            checked,
+            count=count,
+            seed=seed,
+            workers=workers,
+            folder=ending.folder,
+            progress=progress,
+            threads=wanted.threads,
+        )
     return ending.end(SHOTS, study, unfinished=SHOT_LOG)

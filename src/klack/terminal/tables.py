@@ -2,12 +2,30 @@
 
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-from klack.cli.printable import printable
+from klack.terminal.printable import printable
 
-__all__ = ["print_table"]
+__all__ = ["Notes", "TextTable", "print_table"]
 
 _WIDE = 160  # where no terminal limits the width
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextTable:
+    """A table for a terminal; the first ``left`` columns are words, the others numbers."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """Notes on what stands above them."""
+
+    notes: Sequence[str]
 
 
 def print_table(

@@ -1,0 +1,364 @@
+"""Measures of noise: of a design, of the force of a stop, and of the vibration of a body."""
+
+from collections.abc import Callable
+from math import log10
+
+from klack.acoustics.third_octave import ENERGY_REFERENCE
+from klack.analyses.measures import Column, Measure, described_in
+from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, StopForce
+
+__all__ = [
+    "BODY_MEASURES",
+    "DESIGN_MEASURES",
+    "EXPOSURE_LEVEL_A",
+    "FORCE_LEVEL",
+    "STOP_MEASURES",
+    "strongest",
+]
+
+_THEORY, _SOUND = "theory/noise", "theory/sound"
+_AUDIBLE = 20e3  # [Hz]
+
+
+def strongest(design: NoiseDesign) -> StopForce:
+    """Stop with the highest force."""
+    return max(design.stops, key=lambda stop: stop.peak_force)
+
+
+def _heard(read: Callable[[ClickSound], float]) -> Callable[[NoiseDesign], float | None]:
+    return lambda design: None if design.sound is None else read(design.sound)
+
+
+FORCE_LEVEL = Measure[NoiseDesign](
+    key="force_level",
+    name="level of the unbalanced force",
+    symbol="L_F",
+    unit="dB",
+    definition="Level of ∫ F² dt over all bands, re 1 pN² s = (1 µN)² s: the level re 1 µN of a "
+    "steady force with the same energy in one second.",
+    note="Springs, magnet and fluid push the needle from the housing that it hits; below about one "
+    "over the time of flight they balance the contact forces. What is left is mass times "
+    "acceleration of the needle. Sound and surface motion have this share of every band; injected "
+    "energy, mobility and blocked force have the contact forces alone. Third octaves are those of "
+    "IEC 61260-1 (base ten); the force is held at its first and last value outside the record.",
+    read=lambda design: (
+        10.0 * log10(max(float(design.unbalanced_energy.sum()), 1e-300) / ENERGY_REFERENCE)
+    ),
+    form="fixed",
+    digits=1,
+    column=Column("dB", 1.0, ".1f", "force"),
+    deviation="difference",
+    page=True,
+)
+EXPOSURE_LEVEL_A = Measure[NoiseDesign](
+    key="sound_exposure_level_weighted",
+    json_name="sound_exposure_level_dBA",
+    name="sound exposure level of a click, A-weighted",
+    symbol="L_AE",
+    unit="dBA",
+    definition="Level of ∫ p² dt of one click with weighting A, re (20 µPa)² s.",
+    source=_SOUND,
+    read=_heard(lambda sound: sound.statistics.exposure_level_A),
+    form="fixed",
+    digits=1,
+    column=Column("dBA", 1.0, ".1f", "SEL"),
+    deviation="difference",
+    page=True,
+)
+DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="peak_force",
+        symbol="F_max",
+        unit="N",
+        definition="Largest force of any stop, mean over a time step.",
+        source="theory/impact",
+        read=lambda design: strongest(design).peak_force,
+        digits=3,
+        column=Column("N", 1.0, ".4g"),
+        deviation="amplitude",
+        page=True,
+    ),
+    FORCE_LEVEL,
+    Measure(
+        key="injected_energy",
+        name="structure-borne energy injected, bodies rigidly held",
+        symbol="W_in",
+        unit="J",
+        definition="Work of contact and film forces on the modes of the rigidly held bodies, "
+        "∫ F v dt.",
+        note="The same from the real part of the drive-point mobility: ∫ 2 Re(Y) |F|² df.",
+        digits=3,
+        column=Column("uJ", 1e6, ".4g", "injected"),
+        deviation="energy",
+        page=True,
+    ),
+    Measure(
+        key="support_energy",
+        name="energy into mount and plate besides",
+        symbol="W_s",
+        unit="J",
+        definition="Energy through the held surfaces into mount and plate.",
+        note="A valve as a whole passes it on; it comes on top of the injected energy.",
+        digits=3,
+        column=Column("uJ", 1e6, ".4g", "to mount, plate"),
+        deviation="energy",
+        page=True,
+    ),
+    Measure(
+        key="radiated_energy",
+        name="sound energy radiated (estimate)",
+        symbol="W_rad",
+        unit="J",
+        definition="Sound energy that the surfaces radiate during one run, estimated.",
+        digits=3,
+        column=Column("nJ", 1e9, ".4g", "radiated"),
+        deviation="energy",
+        page=True,
+    ),
+    Measure(
+        key="audible_energy",
+        name="sound energy up to 20 kHz (estimate)",
+        symbol="W_aud",
+        unit="J",
+        definition="Part of the radiated sound energy up to 20 kHz, estimated.",
+        read=lambda design: float(design.radiated_bands[design.band_middle <= _AUDIBLE].sum()),
+        digits=3,
+        deviation="energy",
+        page=True,
+    ),
+    Measure(
+        key="radiated_energy_upper_bound",
+        name="sound energy, upper bound",
+        symbol="W_erp",
+        unit="J",
+        definition="Equivalent radiated energy, radiation efficiency 1.",
+        read=lambda design: design.upper_bound,
+        digits=3,
+        deviation="energy",
+        page=True,
+    ),
+    EXPOSURE_LEVEL_A,
+    Measure(
+        key="sound_exposure_level",
+        name="sound exposure level of a click",
+        symbol="L_E",
+        unit="dB",
+        definition="Level of ∫ p² dt of one click without weighting, re (20 µPa)² s.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.statistics.exposure_level),
+        form="fixed",
+        digits=1,
+        column=Column("dBZ", 1.0, ".1f", "SEL"),
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="peak_level",
+        name="peak level of a click",
+        symbol="L_peak",
+        unit="dB",
+        definition="Level of the largest pressure of one click without weighting, re 20 µPa.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.statistics.peak_level),
+        form="fixed",
+        digits=1,
+        column=Column("dBZ", 1.0, ".1f", "peak"),
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="pattern_level",
+        name="level of the drive pattern, A-weighted",
+        symbol="L_Aeq",
+        unit="dBA",
+        definition="Equivalent level of the drive pattern over whole periods with weighting A, "
+        "re 20 µPa.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.pattern.equivalent_level_A),
+        form="fixed",
+        digits=1,
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="loudness_max",
+        name="loudness, loudest moment",
+        symbol="N_max",
+        unit="sone",
+        definition="Loudness of one click at its loudest moment, ISO 532-1 for sounds that vary in "
+        "time (Zwicker), free field.",
+        note="1 sone is the loudness of 40 dB at 1 kHz; twice the number is twice as loud.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.loudness.maximum),
+        digits=3,
+        column=Column("sone", 1.0, ".3g", "loudness"),
+        deviation="factor",
+        page=True,
+    ),
+    Measure(
+        key="loudness_level",
+        name="loudness level, loudest moment",
+        symbol="L_N",
+        unit="phon",
+        definition="Loudness level of the loudest moment.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.loudness.level),
+        digits=3,
+        page=True,
+    ),
+    Measure(
+        key="sharpness",
+        symbol="S",
+        unit="acum",
+        definition="Sharpness of one click, DIN 45692; 0 where the click is too faint for it.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.loudness.sharpness),
+        digits=3,
+        column=Column("acum", 1.0, ".3g"),
+        deviation="factor",
+        page=True,
+    ),
+    Measure(
+        key="kurtosis",
+        name="kurtosis of the drive pattern",
+        symbol="k",
+        definition="Fourth moment of the drive pattern over whole periods, over the squared "
+        "second: 3 for Gaussian noise, high for rare clicks.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.pattern.kurtosis),
+        digits=3,
+        deviation="factor",
+        page=True,
+    ),
+    Measure(
+        key="crest_factor",
+        name="crest factor of the drive pattern",
+        symbol="p_max/p_rms",
+        definition="Largest over root mean square pressure of the drive pattern.",
+        source=_SOUND,
+        read=_heard(lambda sound: sound.pattern.crest_factor),
+        digits=3,
+        deviation="factor",
+        page=True,
+    ),
+    Measure(
+        key="valid_from",
+        symbol="f_1",
+        unit="Hz",
+        definition="One over the length of the record; 0 where every force ends as it began.",
+        source="theory/spectra",
+        digits=3,
+    ),
+    Measure(
+        key="balanced_below",
+        symbol="f_b",
+        unit="Hz",
+        definition="Frequency below which half of the forces or more is balanced in the valve.",
+        digits=3,
+    ),
+    Measure(
+        key="valid_up_to",
+        name="force valid up to",
+        symbol="f_2",
+        unit="Hz",
+        definition="Lowest of the highest kept modes of the bodies.",
+        source="theory/reduction",
+        digits=3,
+        column=Column("kHz", 1e-3, ".4g", "up to"),
+        page=True,
+    ),
+)
+"""Of one design: from the force of the stops to what is heard of one stroke."""
+
+STOP_MEASURES: tuple[Measure[StopForce], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="impacts",
+        symbol="n",
+        definition="Impacts on the stop.",
+        source="theory/stroke",
+        kind="whole",
+        page=True,
+    ),
+    Measure(
+        key="peak_force",
+        symbol="F_max",
+        unit="N",
+        definition="Largest force of the stop, mean over a time step.",
+        source="theory/impact",
+        page=True,
+    ),
+    Measure(
+        key="impulse",
+        name="impulse of the record",
+        symbol="J",
+        unit="N s",
+        definition="Integral of the force over the whole record, with what presses at rest.",
+        source="theory/impact",
+        page=True,
+    ),
+)
+"""Of the force of one stop."""
+
+BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="highest_mode",
+        symbol="f_max",
+        unit="Hz",
+        definition="Frequency of the highest kept mode.",
+        source="theory/reduction",
+        read=lambda body: body.highest_frequency,
+        digits=3,
+    ),
+    Measure(
+        key="vibration_energy",
+        title="vibration\nby time",
+        symbol="E_v",
+        unit="J",
+        definition="Energy lost in the modes or still ringing when the record ends, by the motion "
+        "over time.",
+        page=True,
+    ),
+    Measure(
+        key="vibration_energy_by_mobility",
+        title="vibration\n∫ 2 Re(Y) |F|² df",
+        symbol="E_v",
+        unit="J",
+        definition="The same over frequency, ∫ 2 Re(Y) |F|² df; missing for a body without "
+        "damping.",
+        read=lambda body: body.vibration_spectral,
+        page=True,
+    ),
+    Measure(
+        key="dissipated_energy",
+        title="lost by the end",
+        symbol="E_d",
+        unit="J",
+        definition="Part of the vibration energy that is lost by the end of the record.",
+        read=lambda body: body.dissipated,
+        digits=3,
+        page=True,
+    ),
+    Measure(
+        key="ringing_energy",
+        title="still ringing",
+        symbol="E_r",
+        unit="J",
+        definition="Part of the vibration energy that still rings at the end of the record.",
+        read=lambda body: body.ringing,
+        digits=3,
+        page=True,
+    ),
+    Measure(
+        key="static_energy",
+        title="stored more at rest",
+        symbol="E_s",
+        unit="J",
+        definition="Energy that the modes store statically at the end, less that at the start.",
+        digits=3,
+        page=True,
+    ),
+)
+"""Of one rigidly held body."""

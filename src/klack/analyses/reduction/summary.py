@@ -1,0 +1,172 @@
+"""The few numbers of a reduction that a script or a terminal wants."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.analysis import Measured
+from klack.analyses.measures import (
+    Column,
+    Measure,
+    described_in,
+    json_of,
+    text_table,
+    with_measures,
+)
+from klack.analyses.reduction.run import ReductionStudy
+from klack.assembling.modes import elastic_count
+from klack.reduction.reduced_body import ReducedBody
+from klack.terminal.tables import TextTable
+
+__all__ = [
+    "BODY_MEASURES",
+    "ReductionJson",
+    "reduction_measured",
+    "reduction_to_json",
+    "reduction_told",
+]
+
+_THEORY = "theory/reduction"
+
+
+def _highest(body: ReducedBody) -> float:
+    kept = body.frequencies[: body.rigid_count + elastic_count(body)]
+    return float(kept[-1]) if len(kept) else 0.0
+
+
+def _share(body: ReducedBody) -> float | None:
+    return float(body.compliance_share[0]) if body.static_compliance[0, 0] else None
+
+
+BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="mass",
+        symbol="m",
+        unit="kg",
+        definition="Mass of the body; missing where a reduced model does not tell it.",
+    ),
+    Measure(
+        key="degrees_of_freedom",
+        symbol="n",
+        definition="Free displacements of the body before reduction.",
+        read=lambda body: body.dof_count,
+        kind="whole",
+        column=Column("", 1.0, "d"),
+    ),
+    Measure(
+        key="rigid_modes",
+        symbol="n_r",
+        definition="Rigid motions that are kept.",
+        read=lambda body: body.rigid_count,
+        kind="whole",
+    ),
+    Measure(
+        key="elastic_modes",
+        name="modes",
+        symbol="n_e",
+        definition="Elastic eigenmodes that are kept, without attachment modes.",
+        read=elastic_count,
+        kind="whole",
+        column=Column("", 1.0, "d"),
+    ),
+    Measure(
+        key="highest_mode",
+        symbol="f_max",
+        unit="Hz",
+        definition="Highest frequency of a mode that is no attachment mode; 0 without any.",
+        read=_highest,
+        column=Column("kHz", 1e-3, ".4g", "up to"),
+    ),
+    Measure(
+        key="static_compliance",
+        symbol="b^T K^+ b",
+        unit="m/N",
+        definition="Displacement of the contact per static force on it, of the whole body.",
+        read=lambda body: float(body.static_compliance[0, 0]),
+        column=Column("m/N", 1.0, ".4g"),
+    ),
+    Measure(
+        key="modal_compliance",
+        symbol="sum phi^2/omega^2",
+        unit="m/N",
+        definition="Part of the static compliance that the kept modes have.",
+        read=lambda body: float(body.modal_compliance[0, 0]),
+    ),
+    Measure(
+        key="compliance_share",
+        name="share of the modes",
+        definition="Modal over static compliance.",
+        read=_share,
+        form="share",
+        column=Column("%", 100.0, ".3g"),
+    ),
+)
+"""Of one reduced body at its contact."""
+
+
+@with_measures(BODY_MEASURES)
+class ReducedBodyJson(TypedDict):
+    """A body after reduction."""
+
+    frequencies_Hz: Annotated[
+        list[float], Field(description="Of the elastic modes, attachment modes included.")
+    ]
+    correction: str
+
+
+class TransferJson(TypedDict):
+    """Transfer functions of a body."""
+
+    valid_up_to_Hz: Annotated[dict[str, float], Field(description="By the kind of reduction.")]
+    tolerance_dB: float
+    loss_factor: float
+
+
+class ReductionJson(TypedDict):
+    """``klack reduce``."""
+
+    schema: Literal["klack-reduce/1"]
+    case: str
+    bodies: Annotated[dict[str, ReducedBodyJson], Field(description="By name.")]
+    transfer: Annotated[dict[str, TransferJson], Field(description="By body.")]
+
+
+def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
+    """What a terminal shows: both bodies."""
+    yield text_table(study.title, "body", BODY_MEASURES, ((b.name, b) for b in study.bodies))
+
+
+def reduction_measured(study: ReductionStudy) -> Iterator[Measured]:
+    """Both bodies with their measures."""
+    for body in study.bodies:
+        yield body.name, body, BODY_MEASURES
+
+
+def reduction_to_json(study: ReductionStudy) -> dict[str, Any]:
+    """Plain numbers in SI, the unit in the key."""
+    return {
+        "schema": "klack-reduce/1",
+        "case": study.case,
+        "bodies": {
+            body.name: {
+                **json_of(BODY_MEASURES, body),
+                "frequencies_Hz": [float(f) for f in body.frequencies[body.rigid_count :]],
+                "correction": body.correction,
+            }
+            for body in study.bodies
+        },
+        "transfer": {
+            item.body: {
+                "valid_up_to_Hz": {
+                    label: float(limit)
+                    for label, limit in zip(item.labels, item.valid_up_to, strict=True)
+                },
+                "tolerance_dB": item.tolerance,
+                "loss_factor": item.loss_factor,
+            }
+            for item in study.transfer
+        },
+    }

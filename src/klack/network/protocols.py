@@ -1,0 +1,121 @@
+"""What a network asks of the fluid in it and of the laws of its contacts, whatever they are."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["InterfaceLaw", "LawNumbers", "NetworkFluid", "PressureBounds"]
+
+Values = NDArray[np.float64]
+
+
+class PressureBounds(Protocol):
+    """Absolute pressures for which a fluid is described, and where that comes from.
+
+    Attributes
+    ----------
+    lowest, highest : float [Pa]
+        Between them its numbers are right.
+    usable : float [Pa]
+        Above it a number means nothing any more, and a run stops.
+    source : str
+    """
+
+    @property
+    def lowest(self) -> float: ...  # noqa: D102
+    @property
+    def highest(self) -> float: ...  # noqa: D102
+    @property
+    def usable(self) -> float: ...  # noqa: D102
+    @property
+    def source(self) -> str: ...  # noqa: D102
+
+
+class NetworkFluid(Protocol):
+    """A fluid at one temperature whose density follows from the pressure alone.
+
+    Attributes
+    ----------
+    name : str
+    temperature : float [K]
+    vapour_pressure : float [Pa]
+        At which it boils.
+    all_liquid_from : float [Pa]
+        Above it no vapour is left.
+    kinks : tuple of float [Pa]
+        Where the second derivative of the density jumps, increasing.
+    pressure_range : PressureBounds
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def temperature(self) -> float: ...  # noqa: D102
+    @property
+    def vapour_pressure(self) -> float: ...  # noqa: D102
+    @property
+    def all_liquid_from(self) -> float: ...  # noqa: D102
+    @property
+    def kinks(self) -> tuple[float, ...]: ...  # noqa: D102
+    @property
+    def pressure_range(self) -> PressureBounds: ...  # noqa: D102
+
+    def density(self, pressure: ArrayLike) -> Values:
+        """Density [kg/m^3] at the absolute pressure [Pa]."""
+        ...
+
+    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+        """``rho dp/drho`` [Pa]."""
+        ...
+
+    def sound_speed(self, pressure: ArrayLike) -> Values:
+        """Speed of pressure waves in an unbounded fluid [m/s]."""
+        ...
+
+    def viscosity(self, pressure: ArrayLike) -> Values:
+        """Dynamic viscosity [Pa s]."""
+        ...
+
+    def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+        """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)]."""
+        ...
+
+
+class LawNumbers(Protocol):
+    """A law as plain numbers for the time loop: its kind, its parameters, its damping.
+
+    Attributes
+    ----------
+    kind : int
+    parameters : array
+    dissipation : float [-]
+        0 for an elastic law.
+    """
+
+    @property
+    def kind(self) -> int: ...  # noqa: D102
+    @property
+    def parameters(self) -> Values: ...  # noqa: D102
+    @property
+    def dissipation(self) -> float: ...  # noqa: D102
+
+
+class InterfaceLaw(Protocol):
+    """Force of a contact over its indentation."""
+
+    def force(self, indentation: ArrayLike) -> Values:
+        """Return the force [N] at the given indentation [m]."""
+        ...
+
+    def tangent_stiffness(self, indentation: ArrayLike) -> Values:
+        """Return the tangent stiffness [N/m] at the given indentation [m]."""
+        ...
+
+    def potential(self, indentation: ArrayLike) -> Values:
+        """Return the stored energy [J] at the given indentation [m]."""
+        ...
+
+    def flat(self) -> LawNumbers:
+        """Return the law as plain numbers."""
+        ...

@@ -1,0 +1,385 @@
+"""Phases of a step for pressures and flows: all nodes together, implicit, by Newton's method."""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from klack.hydraulics.fluid_table import fluid_at, pressure_at
+from klack.network.step_function import shift
+from klack.simulation.network_arrays import FORCE, SEEN, STORE, USED, Step
+from klack.simulation.phase import phase
+from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
+from klack.simulation.step_status import (
+    STATUS_BRANCH,
+    STATUS_DONE,
+    STATUS_PRESSURES,
+    STATUS_REFUSED,
+)
+
+__all__ = [
+    "begin_fluid",
+    "bracketed",
+    "end_branches",
+    "end_ends",
+    "end_nodes",
+    "guess_pressures",
+    "push_by_fluid",
+    "solve_mass_balance",
+    "solve_pressures",
+]
+
+_MOST_NEWTON = 80
+_FULL_NEWTON = 15  # of them with whole steps
+_PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
+_LEAST_PRESSURE = 1.0  # [Pa]
+_LARGE_STEP = 1e-3  # of the pressure
+_PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
+_MOST_OF = 0.9  # longest step within this interval
+_NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
+
+
+@phase
+def begin_fluid(fluid: Any) -> None:
+    """Begin a run with the pressures of the last step; no density is known."""
+    trial, flows = fluid.trial, fluid.flows
+    for i in range(fluid.nodes.nodes):
+        trial.p[i] = fluid.state.p[i]
+        trial.known[i] = -1.0
+    for e in range(fluid.nodes.ends):
+        flows.Z[e] = 1.0
+
+
+@njit(cache=True)
+def _table(time: Any, value: Any, first: int, last: int, t: float) -> float:
+    """Lines through points, constant beyond them."""
+    if t <= time[first]:
+        return value[first]
+    if t >= time[last - 1]:
+        return value[last - 1]
+    low, high = first, last - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    share = (t - time[low]) / (time[high] - time[low])
+    return value[low] + share * (value[high] - value[low])
+
+
+@phase
+def guess_pressures(fluid: Any, end: float, straight: bool) -> None:
+    """Pressures of volumes as they were, or ``straight`` on; given ones at the end of the step."""
+    nodes, state, p = fluid.nodes, fluid.state, fluid.trial.p
+    for i in range(nodes.volumes):
+        if straight:
+            p[i] = max(2.0 * state.p[i] - state.before[i], _LEAST_PRESSURE)
+        else:
+            p[i] = state.p[i]
+    for i in range(nodes.volumes, nodes.nodes):
+        k = i - nodes.volumes
+        p[i] = _table(nodes.time, nodes.pressure, nodes.table0[k], nodes.table0[k + 1], end)
+
+
+@phase
+def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
+    """All pressures and flows at the end of the step, with ports where the last sweep left them."""
+    nodes, trial = fluid.nodes, fluid.trial
+    p, r = trial.p, trial.r
+    gamma = shift(nodes.gamma, step.level * max(nodes.volumes, 1))
+    _place_walls(fluid, S)
+    for iteration in range(_MOST_NEWTON):
+        _look_up(fluid)
+        _add_up_volumes(fluid, gamma)
+        failed, code = _add_up_branches(fluid, S, step)
+        if code != 0:
+            report[0], report[1], report[2] = failed, code, step.t
+            return STATUS_BRANCH
+        _add_up_ends(fluid, step.H)
+        if nodes.volumes == 1:
+            r[0] /= trial.own[0]
+        else:
+            solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
+        worst, total = _limit_steps(fluid, iteration)
+        finite = abs(total) < np.inf
+        if finite and worst < _PRESSURE_LEFT:
+            for i in range(nodes.volumes):
+                p[i] += r[i]
+            break
+        # a root-like law about no drop lets Newton's method swing across for ever
+        share = 1.0 if iteration < _FULL_NEWTON else 0.5
+        for i in range(nodes.volumes):
+            p[i] += share * r[i]
+        # at once, while it can be seen which branch is to blame
+        if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
+            if step.level == 1:  # fine steps may do
+                return STATUS_REFUSED
+            report[0], report[2] = _worst_volume(fluid, worst), step.t
+            return STATUS_PRESSURES
+    failed, code = _finish_flows(fluid)
+    if code != 0:
+        report[0], report[1], report[2] = failed, code, step.t
+        return STATUS_BRANCH
+    for i in range(nodes.volumes):
+        trial.V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
+    return STATUS_DONE
+
+
+@phase
+def _place_walls(fluid: Any, S: Any) -> None:
+    """Volumes with the walls where the last sweep left them, at the pressures that it had."""
+    nodes, trial = fluid.nodes, fluid.trial
+    for i in range(nodes.volumes):
+        trial.V_used[i] = nodes.volume[i]
+        trial.p_used[i] = trial.p[i]
+    for w in range(nodes.walls):
+        i = nodes.wall_node[w]
+        if i < nodes.volumes:
+            trial.V_used[i] += nodes.wall_area[w] * S[USED + nodes.wall_port[w]]
+
+
+@phase
+def _look_up(fluid: Any) -> None:
+    """Density, its slope and pressure energy of every node at the present pressures."""
+    nodes, trial, hint = fluid.nodes, fluid.trial, fluid.state.hint
+    p = trial.p
+    for i in range(nodes.nodes):
+        if i < nodes.volumes or p[i] != trial.known[i]:
+            trial.rho[i], trial.slope[i], trial.g[i], hint[i] = fluid_at(nodes.fluid, p[i], hint[i])
+            trial.known[i] = p[i]
+
+
+@phase
+def _add_up_volumes(fluid: Any, gamma: Any) -> None:
+    """Mass that each volume misses, without flows, and what the pressures change in it."""
+    nodes, trial = fluid.nodes, fluid.trial
+    p, rho, V = trial.p, trial.rho, trial.V
+    for i in range(nodes.volumes):
+        V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
+        trial.r[i] = fluid.state.mass[i] - V[i] * rho[i]
+        for j in range(nodes.volumes):
+            trial.matrix[i * nodes.volumes + j] = 0.0
+        trial.own[i] = V[i] * trial.slope[i] + rho[i] * gamma[i]
+
+
+@phase
+def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
+    """Flows of all branches at the present pressures; the row that failed and its status."""
+    trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
+    volumes, H = fluid.nodes.volumes, step.H
+    A, own, r = trial.matrix, trial.own, trial.r
+    seen, used = shift(S, SEEN), shift(S, USED)
+    for k in range(branches.rows):
+        status = ask_branch(branches, k, step.t, H, seen, used, trial.p, trial.rho)
+        if status != 0:
+            return k, status
+        a, b, o0 = branches.a[k], branches.b[k], branches.output0[k]
+        flows.mdot[k] = branches.outputs[o0]
+        flows.slope_a[k] = branches.outputs[o0 + 1]
+        flows.slope_b[k] = branches.outputs[o0 + 2]
+        if a < volumes:
+            r[a] -= H * flows.mdot[k]
+            if b < volumes:
+                A[a * volumes + b] += H * flows.slope_b[k]
+                A[b * volumes + a] -= H * flows.slope_a[k]
+            else:
+                own[a] += H * flows.slope_a[k]
+        if b < volumes:
+            r[b] += H * flows.mdot[k]
+            if a >= volumes:
+                own[b] -= H * flows.slope_b[k]
+    return -1, 0
+
+
+@phase
+def _add_up_ends(fluid: Any, H: float) -> None:
+    """Flows into all ends of lines at the present pressures."""
+    nodes, trial, flows = fluid.nodes, fluid.trial, fluid.flows
+    for e in range(nodes.ends):
+        i = nodes.end_node[e]
+        flows.q[e] = (nodes.density * trial.g[i] - flows.c[e]) / flows.Z[e]
+        if i < nodes.volumes:
+            trial.r[i] -= H * nodes.density * flows.q[e]
+            trial.own[i] += H * nodes.density * (nodes.density / trial.rho[i]) / flows.Z[e]
+
+
+@njit(cache=True, error_model="numpy")
+def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
+    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
+
+    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
+    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
+    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
+    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
+    """
+    for k in range(n):
+        pivot = own[k]
+        for i in range(k + 1, n):
+            pivot -= A[i * n + k]
+        A[k * n + k] = pivot
+        inverse = 1.0 / pivot
+        share = own[k] * inverse
+        for j in range(k + 1, n):
+            own[j] -= A[k * n + j] * share
+        for i in range(k + 1, n):
+            if A[i * n + k] != 0.0:
+                c = A[i * n + k] * inverse
+                for j in range(k + 1, n):
+                    A[i * n + j] -= c * A[k * n + j]
+                r[i] -= c * r[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            r[k] -= A[k * n + j] * r[j]
+        r[k] /= A[k * n + k]
+
+
+@njit(cache=True)
+def bracketed(
+    target: float, density: float, lower: float, upper: float
+) -> tuple[float, float, float]:
+    """Density to go to from ``density``, and the interval known to hold the root.
+
+    Where a chamber is about to fill with liquid, the slope on the boiling side leads far into the
+    liquid, and that of the liquid back: Newton alone goes to and fro.
+    """
+    if upper - lower < _NARROW * density:
+        lower, upper = 0.0, np.inf
+    if target > density:
+        lower = density
+    else:
+        upper = density
+    if abs(target - density) > _MOST_OF * (upper - lower):
+        target = 0.5 * (lower + upper)
+    return target, lower, upper
+
+
+@phase
+def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
+    """Newton steps that the fluid can follow; the largest over its pressure, and their sum."""
+    nodes, trial, hint = fluid.nodes, fluid.trial, fluid.state.hint
+    p, r, rho, lower, upper = trial.p, trial.r, trial.rho, trial.lower, trial.upper
+    worst, total = 0.0, 0.0
+    for i in range(nodes.volumes):
+        total += r[i]
+        target = rho[i] + trial.slope[i] * r[i]
+        large = abs(r[i]) > _LARGE_STEP * p[i]
+        if iteration >= _PLAIN_NEWTON:
+            if iteration == _PLAIN_NEWTON:
+                lower[i], upper[i] = 0.0, np.inf
+            target, lower[i], upper[i] = bracketed(target, rho[i], lower[i], upper[i])
+            large = True
+        if large:
+            # boiling: the density takes the step, the pressure follows it
+            new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
+            r[i] = new - p[i]
+        worst = max(worst, abs(r[i]) / max(p[i], nodes.ambient))
+    return worst, total
+
+
+@phase
+def _worst_volume(fluid: Any, worst: float) -> int:
+    p, r, found = fluid.trial.p, fluid.trial.r, 0
+    for i in range(fluid.nodes.volumes):
+        if abs(r[i]) / max(p[i], fluid.nodes.ambient) == worst:
+            found = i
+    return found
+
+
+@phase
+def _finish_flows(fluid: Any) -> tuple[int, int]:
+    """Take the last Newton step with the slopes: mass is conserved exactly."""
+    branches, flows, p, r = fluid.branches, fluid.flows, fluid.trial.p, fluid.trial.r
+    for k in range(branches.rows):
+        a, b = branches.a[k], branches.b[k]
+        if a < fluid.nodes.volumes:
+            flows.mdot[k] += flows.slope_a[k] * r[a]
+        if b < fluid.nodes.volumes:
+            flows.mdot[k] += flows.slope_b[k] * r[b]
+        if branches.accounts[k] > 0:
+            # what it stores has to follow from the pressures that do the work
+            i0 = branches.input0[k]
+            branches.inputs[i0 + 2] = p[a]
+            branches.inputs[i0 + 3] = p[b]
+            status = ask_again(branches, k)
+            if status != 0:
+                return k, status
+            flows.mdot[k] = branches.outputs[branches.output0[k]]
+    return -1, 0
+
+
+@phase
+def push_by_fluid(fluid: Any, S: Any) -> None:
+    """Add the forces of pressures on walls and those of branches to those of the ports."""
+    force = shift(S, FORCE)
+    push_walls(fluid.nodes, fluid.trial.p, force)
+    for k in range(fluid.branches.rows):
+        push_ports(fluid.branches, k, force)
+
+
+@phase
+def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: Any) -> None:
+    """Take over flows and states of branches; the hydraulic power is stored, supplied or lost."""
+    trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
+    inflow, g, r, rho = trial.inflow, trial.g, trial.r, trial.rho
+    for i in range(fluid.nodes.nodes):
+        inflow[i] = 0.0
+    for i in range(fluid.nodes.volumes):
+        # r is the last Newton step: g to second order in it
+        g[i] += r[i] / rho[i] * (1.0 - 0.5 * r[i] * trial.slope[i] / rho[i])
+    for k in range(branches.rows):
+        a, b, mdot = branches.a[k], branches.b[k], flows.mdot[k]
+        inflow[a] -= H * mdot
+        inflow[b] += H * mdot
+        sums[k] += H * mdot
+        power = (g[a] - g[b]) * mdot * H
+        o0, q0 = branches.output0[k] + branches.head, branches.port0[k]
+        for j in range(q0, branches.port0[k + 1]):
+            port = branches.ports[j]
+            power -= branches.outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
+        o0 = take_states(branches, k)
+        for j in range(branches.accounts[k]):
+            account, value = branches.account0[k] + j, branches.outputs[o0 + j]
+            if kind[account] == STORE:
+                power -= value - accounts.rows[account]
+                accounts.rows[account] = value
+        if branches.supply[k] >= 0:
+            accounts.rows[branches.supply[k]] -= power
+        else:
+            accounts.rows[branches.loss[k]] += power
+
+
+@phase
+def end_ends(fluid: Any, H: float) -> None:
+    """Flows into the ends of lines, with the last Newton step of the pressures."""
+    nodes, trial, flows = fluid.nodes, fluid.trial, fluid.flows
+    for e in range(nodes.ends):
+        i = nodes.end_node[e]
+        q = flows.q[e]
+        if i < nodes.volumes:
+            q += nodes.density / trial.rho[i] / flows.Z[e] * trial.r[i]
+        flows.q[e] = q
+        trial.inflow[i] -= H * nodes.density * q
+
+
+@phase
+def end_nodes(fluid: Any, accounts: Any) -> None:
+    """Take over masses, volumes and pressures, with the loss of the implicit step."""
+    nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
+    p, g, V, inflow = trial.p, trial.g, trial.V, trial.inflow
+    for i in range(nodes.volumes):
+        mass = state.mass[i] + inflow[i]
+        excess = p[i] - nodes.ambient
+        stored = mass * g[i] - excess * V[i]
+        was = state.mass[i] * state.g[i]
+        was -= (state.p[i] - nodes.ambient) * state.held[i]
+        work = excess * (V[i] - state.held[i])
+        accounts.implicit[i] += was - stored + g[i] * inflow[i] - work
+        state.mass[i] = mass
+        state.held[i] = V[i]
+    for i in range(nodes.volumes, nodes.nodes):
+        accounts.supply[i - nodes.volumes] -= g[i] * inflow[i]
+    for i in range(nodes.nodes):
+        state.before[i] = state.p[i]
+        state.p[i] = p[i]
+        state.g[i] = g[i]

@@ -1,0 +1,15 @@
+"""How a step of a network ended."""
+
+__all__ = [
+    "STATUS_BRANCH",
+    "STATUS_DONE",
+    "STATUS_ELEMENT",
+    "STATUS_FORCES",
+    "STATUS_PRESSURES",
+    "STATUS_REFUSED",
+]
+
+STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
+
+STATUS_REFUSED = -1
+"""Of a coarse step: fine ones may do."""
