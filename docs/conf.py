@@ -17,7 +17,7 @@ project_copyright = "the klack founders, BSD-3-Clause"
 version = release = __version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",  # pages and notebooks
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
@@ -35,6 +35,8 @@ exclude_patterns = ["_build", "extensions", "**/__pycache__", "**/klack-results"
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3  # links such as case.md#measurement
 myst_dmath_double_inline = True  # $$...$$ in the middle of a paragraph
+nb_execution_mode = "off"  # notebooks carry their outputs: docs/run_notebooks.py
+nb_mime_priority_overrides = [("html", "text/html", 0), ("html", "image/png", 1)]
 
 # docstrings
 napoleon_google_docstring = False

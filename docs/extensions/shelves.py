@@ -16,14 +16,15 @@ __all__ = ["setup", "shelves"]
 # folder of pages -> shelf of those that no row names
 _SHELF_OF_FOLDER = {
     "tutorials": "tutorials",
+    "notebooks": "notebooks",
     "how-to": "how-to",
     "theory": "theory",
     "reference": "reference",
     "project": "reference",
 }
-_ORDER = ("start", "tutorials")  # first, whether or not the table has them
+_ORDER = ("start", "tutorials", "notebooks")  # first, whether or not the table has them
 _ROW = re.compile(r"^\| *(?P<shelf>[^|]+?) *\| *(?P<pages>.*?) *\|$", re.MULTILINE)
-_PAGE = re.compile(r"\[(?P<name>[^\]]+)\]\((?P<page>[^)#:]+)\.md\)")
+_PAGE = re.compile(r"\[(?P<name>[^\]]+)\]\((?P<page>[^)#:]+)\.(?:md|ipynb)\)")
 
 
 def shelves(index: str, pages: list[str]) -> dict[str, dict[str, str]]:

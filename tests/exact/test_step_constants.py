@@ -38,6 +38,7 @@ USERS = (
     "simulation.contact_step",
     "simulation.interface_step",
     "simulation.kernel",
+    "simulation.network_interfaces",
     "simulation.propagator",
     "simulation.single_contact",
 )

@@ -5,7 +5,7 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -56,15 +56,7 @@ Level = Literal[
     "interface",
     "full",
 ]
-LEVELS: tuple[Level, ...] = (
-    "lumped",
-    "reduced",
-    "reduced-attachment",
-    "reduced-none",
-    "reduced-participation",
-    "interface",
-    "full",
-)
+LEVELS: tuple[Level, ...] = get_args(Level)
 _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 

@@ -10,6 +10,7 @@ from klack.contact.step_constants import shared_constants
 from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.exchange.model_folder import model_folder, named_apart
+from klack.exchange.results.naming import octave_text
 from klack.exchange.state_space import (
     contact_kind,
     law_table,
@@ -33,23 +34,13 @@ def write_matlab(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]
     ``NAME_block.m`` a block of Simulink; of a pair ``NAME_rhs.m`` is the right-hand side with the
     contacts and ``NAME_impact.m`` runs it.
 
-    Parameters
-    ----------
-    models : sequence of ModalModel
-        With distinct names.
-    folder : Path
-        Made where it is missing; files of the same name are replaced.
+    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
+    a model of more than 2 GB and a contact law with dissipation are errors as well.
 
     Returns
     -------
     tuple of Path
         The ``.mat`` file of each model, followed by its scripts.
-
-    Raises
-    ------
-    InputError
-        For two models of one name, a model without modes or of more than 2 GB, a contact law with
-        dissipation, or a folder that cannot be written to.
     """
     from scipy.io import savemat
 
@@ -123,8 +114,8 @@ def matlab_structure(model: ModalModel) -> dict[str, Any]:
         "step_s": model.step,
         "duration_s": model.duration,
         "provenance": {
-            "case": _text(origin.case),
-            "title": _text(origin.title),
+            "case": octave_text(origin.case),
+            "title": octave_text(origin.title),
             "klack_version": origin.version,
             "created": origin.created,
             "meshes": _cells([f"{name}: {words}" for name, words in origin.meshes.items()]),
@@ -188,16 +179,8 @@ def _about(model: ModalModel) -> list[str]:
 
 def _cells(words: Sequence[str]) -> np.ndarray[Any, Any]:
     cells = np.empty((len(words), 1), dtype=object)
-    cells[:, 0] = [_text(word) for word in words]
+    cells[:, 0] = [octave_text(word) for word in words]
     return cells
-
-
-def _text(words: str) -> str:
-    """Text with a blank for each further byte of its letters.
-
-    scipy counts letters where Octave reads bytes: without them the end of "Stäbe" is lost.
-    """
-    return words + " " * (len(words.encode()) - len(words))
 
 
 def _require_size(model: ModalModel, content: dict[str, Any]) -> None:

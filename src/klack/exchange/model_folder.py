@@ -21,6 +21,13 @@ LONGEST = 55
 def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
     """Give a place for the files of these models; they move into ``folder`` when all are complete.
 
+    Parameters
+    ----------
+    models : sequence of ModalModel
+        With distinct names.
+    folder : Path
+        Made where it is missing; files of the same name are replaced.
+
     Raises
     ------
     InputError

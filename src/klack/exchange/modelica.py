@@ -24,22 +24,8 @@ __all__ = ["modelica_text", "write_modelica"]
 def write_modelica(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
     """Write one file ``NAME.mo`` for each model.
 
-    Parameters
-    ----------
-    models : sequence of ModalModel
-        With distinct names.
-    folder : Path
-        Made where it is missing; files of the same name are replaced.
-
-    Returns
-    -------
-    tuple of Path
-
-    Raises
-    ------
-    InputError
-        For two models of one name, a model without modes, a contact law with dissipation, or a
-        folder that cannot be written to.
+    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
+    a contact law with dissipation is an error as well.
     """
     names = [f"{class_name(model.name)}.mo" for model in models]
     with model_folder(models, folder) as stage:

@@ -32,22 +32,8 @@ def write_text(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
     there are several contacts) indentation and force; ``NAME_info.txt`` says what is what.  A body
     has a D with its residual compliance as well, ``NAME_D_with_residual_compliance``.
 
-    Parameters
-    ----------
-    models : sequence of ModalModel
-        With distinct names.
-    folder : Path
-        Made where it is missing; files of the same name are replaced.
-
-    Returns
-    -------
-    tuple of Path
-
-    Raises
-    ------
-    InputError
-        For two models of one name, a model without modes or of more than 2 GB, a contact law with
-        dissipation, or a folder that cannot be written to.
+    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
+    a model of more than 2 GB and a contact law with dissipation are errors as well.
     """
     names: list[str] = []
     with model_folder(models, folder) as stage:

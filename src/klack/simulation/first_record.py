@@ -9,9 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import NO_LAW
 from klack.network.rows import BranchRow, ElementRow
 from klack.simulation.contact_step import mean_force
-from klack.simulation.interface_step import NO_LAW, film_force
+from klack.simulation.interface_step import film_force
 from klack.simulation.network_arrays import StepRows
 from klack.simulation.network_compile import CompiledNetwork
 

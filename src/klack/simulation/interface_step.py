@@ -47,7 +47,7 @@ from klack.contact.step_constants import (
 )
 from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
 
-__all__ = ["NO_LAW", "film_force", "interface_store", "solve_interface"]
+__all__ = ["film_force", "interface_store", "solve_interface"]
 
 Vector = NDArray[np.float64]
 Step = tuple[float, float, float, float, int, float, float]

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
-from klack.simulation.phase import phase
+from klack.simulation.phase import compiled, phase
 
 __all__ = [
     "FAST",
     "STATUS_CONTACTS",
     "STATUS_FINE",
+    "Damped",
     "add_release",
     "push_on",
     "run_steps",
@@ -32,7 +33,7 @@ STATUS_FINE, STATUS_CONTACTS = 0, 1
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _free(q: Vector, v: Vector, A: Matrix, row: Vector) -> float:
     """Free motion over a step, in place; returns ``row . q``."""
     y = 0.0
@@ -44,7 +45,7 @@ def _free(q: Vector, v: Vector, A: Matrix, row: Vector) -> float:
     return y
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _forced(q: Vector, v: Vector, A: Matrix, row: Vector, P: Matrix, F: float) -> float:
     """Free motion after the modal force ``F P`` of the step before; returns ``row . q``."""
     y = 0.0
@@ -56,7 +57,7 @@ def _forced(q: Vector, v: Vector, A: Matrix, row: Vector, P: Matrix, F: float) -
     return y
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _dot(a: Vector, b: Vector) -> float:
     y = 0.0
     for i in range(a.size):
@@ -119,7 +120,7 @@ def _copy(q: Vector, v: Vector, q0: Vector, v0: Vector) -> None:
         v0[i] = v[i]
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
     for i in range(f.size):
         f[i] = rows[0, i] * F[0]
@@ -128,7 +129,7 @@ def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
             f[i] += rows[c, i] * F[c]
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> float:
     """Energy of the damped modes after the pending modal force ``f``."""
     total = 0.0
@@ -139,7 +140,7 @@ def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> flo
     return total
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def _damping_loss(q: Vector, v: Vector, B: Matrix, f_before: Vector, f: Vector, Q: Matrix) -> float:
     """Loss of a step that started after the pending ``f_before`` and had the modal force ``f``."""
     total = 0.0
@@ -149,6 +150,14 @@ def _damping_loss(q: Vector, v: Vector, B: Matrix, f_before: Vector, f: Vector, 
         total += Q[0, i] * qi * qi + Q[1, i] * qi * vi + Q[2, i] * vi * vi
         total += f[i] * (Q[3, i] * qi + Q[4, i] * vi + Q[5, i] * f[i])
     return total
+
+
+class Damped(NamedTuple):
+    """Energy of the damped modes."""
+
+    loss: float  # [J] so far
+    in_flight: bool
+    flight_energy: float  # [J] when the flight began
 
 
 class _Now(NamedTuple):
@@ -202,11 +211,20 @@ def _begin(modes: StepMatrices, contacts: Contacts) -> _Now:
 
 
 @phase
-def _pend(modes: StepMatrices, now: _Now) -> None:
-    """Effect of the contact forces of the last step on this one."""
-    for i in range(now.f.size):
-        now.pending[0, i] = modes.P[0, i] * now.f[i]
-        now.pending[1, i] = modes.P[1, i] * now.f[i]
+def _move(
+    modes: StepMatrices, contacts: Contacts, q: Vector, v: Vector, now: _Now, pending: bool
+) -> None:
+    """All modes over a step, after the forces of the step before where these are pending."""
+    if pending:
+        for i in range(now.f.size):
+            now.pending[0, i] = modes.P[0, i] * now.f[i]
+            now.pending[1, i] = modes.P[1, i] * now.f[i]
+        now.free[0] = _forced(q, v, modes.A, contacts.rows[0], now.pending, 1.0)
+    else:
+        now.free[0] = _free(q, v, modes.A, contacts.rows[0])
+    push_on(modes, now.pushed_q, now.pushed_v)
+    for c in range(1, contacts.gap.size):
+        now.free[c] = _dot(contacts.rows[c], q)
 
 
 @phase
@@ -261,6 +279,27 @@ def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
         if count == 1 or change <= SETTLED * largest:
             return True, closed, lost
     return False, closed, 0.0
+
+
+@phase
+def _damp(B: Matrix, rows: Matrix, losses: Losses, now: _Now, at: Damped, closed: bool) -> Damped:
+    """Damping loss; flight: energy at its two ends, contact: the exact loss of each step."""
+    loss, in_flight, flight_energy = at
+    if closed:
+        for i in range(now.f.size):
+            now.f_before[i] = now.f[i]
+        if in_flight:
+            loss += flight_energy - _damped_energy(now.q0, now.v0, B, now.f, losses.weight)
+            in_flight = False
+        _modal_force(rows, now.F, now.f)
+        loss += _damping_loss(now.q0, now.v0, B, now.f_before, now.f, losses.forms)
+    elif not in_flight:
+        # the step that has just gone was the first of the flight
+        flight_energy = _damped_energy(now.q0, now.v0, B, now.f, losses.weight)
+        in_flight = True
+        for i in range(now.f.size):
+            now.f[i] = 0.0
+    return Damped(loss, in_flight, flight_energy)
 
 
 @phase
@@ -336,69 +375,49 @@ def run_steps(
     int
         ``STATUS_FINE`` or ``STATUS_CONTACTS`` (the forces of several contacts did not settle).
     """
-    A, B, rows, row0, weight = modes.A, modes.B, contacts.rows, contacts.rows[0], losses.weight
     now = _begin(modes, contacts)
-    F, f, f_before, q0, v0 = now.F, now.f, now.f_before, now.q0, now.v0
-    for c in range(F.size):
-        now.gap[c] = contacts.gap[c] + _dot(rows[c], q)
-    pending, in_flight = False, True
-    flight_energy = _damped_energy(q, v, B, f, weight) if losses.damped else 0.0
-    contact_loss, release_loss, damping = 0.0, 0.0, 0.0
+    for c in range(contacts.gap.size):
+        now.gap[c] = contacts.gap[c] + _dot(contacts.rows[c], q)
+    closed = False
+    energy = _damped_energy(q, v, modes.B, now.f, losses.weight) if losses.damped else 0.0
+    damped = Damped(0.0, True, energy)
+    contact_loss, release_loss = 0.0, 0.0
 
     for place in range(record.force.shape[0]):
         for _ in range(steps_per_record):
             if losses.damped:
-                _copy(q, v, q0, v0)
-            if pending:
-                _pend(modes, now)
-                now.free[0] = _forced(q, v, A, row0, now.pending, 1.0)
-            else:
-                now.free[0] = _free(q, v, A, row0)
-            push_on(modes, now.pushed_q, now.pushed_v)
-            for c in range(1, F.size):
-                now.free[c] = _dot(rows[c], q)
+                _copy(q, v, now.q0, now.v0)
+            _move(modes, contacts, q, v, now, closed)
+            touched = closed
             closed = False
             if _near(modes, contacts, now):
                 settled, closed, lost = _settle(contacts, now)
                 if not settled:
                     return STATUS_CONTACTS
                 contact_loss += lost
-            elif pending:
-                F[:] = 0.0
+            elif touched:
+                now.F[:] = 0.0
                 now.F_before[:] = 0.0
             if losses.damped:
-                # flight: energy at its two ends; contact: the exact loss of each step
-                if closed:
-                    for i in range(f.size):
-                        f_before[i] = f[i]
-                    if in_flight:
-                        damping += flight_energy - _damped_energy(q0, v0, B, f_before, weight)
-                        in_flight = False
-                    _modal_force(rows, F, f)
-                    damping += _damping_loss(q0, v0, B, f_before, f, losses.forms)
-                elif not in_flight:
-                    # the step that has just gone was the first of the flight
-                    flight_energy = _damped_energy(q0, v0, B, f, weight)
-                    in_flight = True
-                    f[:] = 0.0
+                damped = _damp(modes.B, contacts.rows, losses, now, damped, closed)
             elif closed:
-                _modal_force(rows, F, f)
-            pending = closed
+                _modal_force(contacts.rows, now.F, now.f)
             release_loss = _end_step(contacts, now, closed, release_loss)
         _end_record(modes, q, v, now, record, place, steps_per_record)
-        _watch_all(watched.q, watched.q_force, q, F, record.q, place + 1)
-        _watch_all(watched.v, watched.v_force, v, F, record.v, place + 1)
+        _watch_all(watched.q, watched.q_force, q, now.F, record.q, place + 1)
+        _watch_all(watched.v, watched.v_force, v, now.F, record.v, place + 1)
 
-    if pending:
-        _modal_force(rows, F, f)
-        for i in range(f.size):
-            q[i] += B[0, i] * f[i]
-            v[i] += B[1, i] * f[i]
-    if losses.damped and in_flight:
-        f[:] = 0.0
-        damping += flight_energy - _damped_energy(q, v, B, f, weight)
+    if closed:
+        _modal_force(contacts.rows, now.F, now.f)
+        for i in range(q.size):
+            q[i] += modes.B[0, i] * now.f[i]
+            v[i] += modes.B[1, i] * now.f[i]
+    damping = damped.loss
+    if losses.damped and damped.in_flight:
+        now.f[:] = 0.0
+        damping += damped.flight_energy - _damped_energy(q, v, modes.B, now.f, losses.weight)
     books[0], books[1], books[2] = contact_loss, release_loss, damping
-    for c in range(F.size):
+    for c in range(contacts.gap.size):
         books[3 + 2 * c] = now.gap[c]
         books[4 + 2 * c] = now.e[c]
     return STATUS_FINE

@@ -7,13 +7,13 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import NO_LAW
 from klack.errors import InputError
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
-from klack.simulation.interface_step import NO_LAW
 from klack.simulation.modal_step import (
     FIXED_ROWS,
     ROW,

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from klack.contact.step_constants import SEPARATED, SLOWEST
 from klack.simulation.contact_step import mean_force
 from klack.simulation.interface_step import solve_interface
-from klack.simulation.kernel import SEPARATED
 from klack.simulation.network_arrays import FORCE, PORTS, USED, Y1, Recording, Step
 from klack.simulation.phase import phase
 
@@ -20,8 +20,6 @@ __all__ = [
     "push_by_interfaces",
     "solve_interfaces",
 ]
-
-_SLOWEST = 1e-3  # [m/s] approach speed from which on a dashpot of a given restitution is scaled
 
 
 @phase
@@ -123,7 +121,7 @@ def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
         trial.contact_loss[c] = trial.film_loss[c] = 0.0
         return
     if rows.alpha[c] > 0.0 and state.chi[c] == 0.0 and gap_free < 0.0:
-        speed = max((g0 - gap_free) * step.rate, _SLOWEST)
+        speed = max((g0 - gap_free) * step.rate, SLOWEST)
         state.chi[c] = rows.alpha[c] / speed
     (
         trial.contact[c],

@@ -12,7 +12,7 @@ One step of length ``h`` (or ``M h`` while nothing touches):
    pass over the modes.
 
 A coarse step is tried when all interfaces are far apart or at rest; if it ends in a contact, in a
-release or in a noticeable film, it is discarded and repeated in fine steps.
+release or in a noticeable film, it is discarded and done again in fine steps.
 """
 
 from typing import Any, NamedTuple
@@ -73,7 +73,7 @@ from klack.simulation.network_pressures import (
     solve_pressures,
 )
 from klack.simulation.network_record import record_means, record_points
-from klack.simulation.phase import phase
+from klack.simulation.phase import phase, unfolded
 from klack.simulation.step_status import STATUS_DONE, STATUS_FORCES, STATUS_REFUSED
 
 __all__ = ["run_network"]
@@ -179,7 +179,7 @@ def run_network(
     return STATUS_DONE
 
 
-@phase
+@unfolded
 def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _Loop:
     """Begin a run: no force is pending, no density known, nothing summed."""
     loop = _Loop(
@@ -216,7 +216,7 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
     return loop
 
 
-@phase
+@unfolded
 def _try_step(step: Step, loop: Any, straight: bool, report: Any) -> int:
     """One step up to what it would change; ``straight`` guesses on the line of the last two.
 
@@ -239,7 +239,7 @@ def _try_step(step: Step, loop: Any, straight: bool, report: Any) -> int:
     return status
 
 
-@phase
+@unfolded
 def _end_step(step: Step, loop: Any) -> None:
     """Take over states, masses, waves and accounts; the forces stay pending."""
     bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
@@ -259,7 +259,7 @@ def _end_step(step: Step, loop: Any) -> None:
     end_ports(bodies)
 
 
-@phase
+@unfolded
 def _settle(step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, report: Any) -> int:
     """Sweep over elements, pressures and interfaces until no port moves any more.
 

@@ -27,3 +27,7 @@ compiled = partial(njit, cache=True, _nrt=True, error_model="python", forceinlin
 
 Says what numba would else take over from whichever function calls it first.
 """
+
+unfolded = njit(inline="always")
+"""Write a function out in the one that calls it: for those made of phases, which would else be
+optimised once for each of them that contains the other."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
-from klack.simulation.kernel import FAST, STATUS_FINE, add_release, push_on
+from klack.simulation.kernel import FAST, STATUS_FINE, Damped, add_release, push_on
 from klack.simulation.phase import compiled, phase
 
 __all__ = ["run_one_contact"]
@@ -209,14 +209,6 @@ class _Contact(NamedTuple):
     hint: int  # interval of a table
 
 
-class _Damped(NamedTuple):
-    """Energy of the damped modes."""
-
-    loss: float  # [J] so far
-    in_flight: bool
-    flight_energy: float  # [J] when the flight began
-
-
 @phase
 def _move(S: Matrix, K: Matrix, modes: int, F: float, gap: float) -> float:
     """All modes over a step, after the force of the step before; adds to the gap."""
@@ -261,7 +253,7 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
 
 
 @phase
-def _damp(L: Matrix, S: Matrix, now: _Contact, at: _Damped) -> _Damped:
+def _damp(L: Matrix, S: Matrix, now: _Contact, at: Damped) -> Damped:
     """Damping loss; flight: energy at its two ends, contact: the exact loss of each step.
 
     ``S`` is the state before the step.
@@ -277,7 +269,7 @@ def _damp(L: Matrix, S: Matrix, now: _Contact, at: _Damped) -> _Damped:
         # the step that has just gone was the first of the flight
         flight_energy = _damped_energy(S, L, now.F_before)
         in_flight = True
-    return _Damped(loss, in_flight, flight_energy)
+    return Damped(loss, in_flight, flight_energy)
 
 
 @phase
@@ -322,7 +314,7 @@ def run_one_contact(
     linear = contacts.law_kind[0] == LAW_LINEAR and contacts.alpha[0] == 0.0
     now = _Contact(0.0, 0.0, contacts.gap[0] + row @ q, 0.0, 0.0, True, 0.0, 0)
     contact_loss, release_loss = 0.0, 0.0
-    damped = _Damped(0.0, True, _damped_energy(S, L, 0.0) if losses.damped else 0.0)
+    damped = Damped(0.0, True, _damped_energy(S, L, 0.0) if losses.damped else 0.0)
 
     for place in range(record.force.shape[0]):
         sum_gap, sum_force, peak = 0.0, 0.0, 0.0

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
@@ -37,7 +38,6 @@ from klack.network.rows import LimitRow
 from klack.network.travel import Travel
 from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import start_lines
-from klack.simulation.interface_step import NO_LAW
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
     BEFORE,

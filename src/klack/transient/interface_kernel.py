@@ -495,8 +495,18 @@ def _count(
 
 
 @phase
-def _finish(modes: Modes, state: State, step: _Step, drift: Matrix, taken: int) -> None:
+def _finish(
+    modes: Modes,
+    state: State,
+    step: _Step,
+    record: Record,
+    taken: int,
+    gap: float,
+    outside: float,
+) -> None:
     """The end of the step becomes the state."""
+    record.gap[taken] = gap
+    record.outside[taken] = outside
     for i in range(len(state.q)):
         state.q[i] = step.q[i]
         state.v[i] = step.v[i]
@@ -506,7 +516,7 @@ def _finish(modes: Modes, state: State, step: _Step, drift: Matrix, taken: int) 
         s = 0.0
         for i in range(len(state.v)):
             s += modes.drift[b, i] * state.v[i]
-        drift[taken, b] = s
+        record.drift[taken, b] = s
 
 
 @njit(cache=True)
@@ -577,10 +587,9 @@ def march(
             pay, potential, answer = _pay(modes, points, state, step, share, potential, answer)
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
-        _finish(modes, state, step, record.drift, taken)
-        record.gap[taken] = 0.5 * (least + smallest) if taken else least
+        mean_gap = 0.5 * (least + smallest) if taken else least
+        _finish(modes, state, step, record, taken, mean_gap, axial + answer + braking)
         smallest = least
-        record.outside[taken] = axial + answer + braking
         if wait and books[OPEN_STEPS] > wait:
             return taken + 1, OPEN
     return steps, FINISHED

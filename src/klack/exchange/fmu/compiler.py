@@ -15,7 +15,7 @@ from klack.input.problem import one_of
 __all__ = ["PLATFORMS", "Target", "compile_library", "require_compilers", "this_platform"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Target:
     """A platform that binaries can be made for.
 
@@ -27,60 +27,39 @@ class Target:
         Of a shared library.
     triple : str
         What zig calls it.
+    package : str
+        Words for who has no compiler.
     cross : tuple of str
         Programs that compile for it on any machine.
-    package : str
-        Words for who has none of them.
     """
 
     folders: tuple[str, str]
     suffix: str
     triple: str
-    cross: tuple[str, ...]
     package: str
+    cross: tuple[str, ...] = ()
 
     def folder(self, fmi: int) -> str:
         """Folder under ``binaries``."""
         return self.folders[fmi - 2]
 
 
+_XCODE = "the Xcode command line tools"
 _LOCAL = ("gcc", "cc", "clang")  # for the machine that they run on
 
 PLATFORMS = {
-    "linux64": Target(
-        folders=("linux64", "x86_64-linux"),
-        suffix=".so",
-        triple="x86_64-linux-gnu",
-        cross=(),
-        package="gcc",
-    ),
+    "linux64": Target(("linux64", "x86_64-linux"), ".so", "x86_64-linux-gnu", "gcc"),
     "win64": Target(
-        folders=("win64", "x86_64-windows"),
-        suffix=".dll",
-        triple="x86_64-windows-gnu",
+        ("win64", "x86_64-windows"),
+        ".dll",
+        "x86_64-windows-gnu",
+        "mingw-w64",
         cross=("x86_64-w64-mingw32-gcc",),
-        package="mingw-w64",
     ),
-    "darwin64": Target(
-        folders=("darwin64", "x86_64-darwin"),
-        suffix=".dylib",
-        triple="x86_64-macos",
-        cross=(),
-        package="the Xcode command line tools",
-    ),
-    "aarch64-linux": Target(
-        folders=("aarch64-linux", "aarch64-linux"),
-        suffix=".so",
-        triple="aarch64-linux-gnu",
-        cross=(),
-        package="gcc",
-    ),
+    "darwin64": Target(("darwin64", "x86_64-darwin"), ".dylib", "x86_64-macos", _XCODE),
+    "aarch64-linux": Target(("aarch64-linux", "aarch64-linux"), ".so", "aarch64-linux-gnu", "gcc"),
     "aarch64-darwin": Target(
-        folders=("aarch64-darwin", "aarch64-darwin"),
-        suffix=".dylib",
-        triple="aarch64-macos",
-        cross=(),
-        package="the Xcode command line tools",
+        ("aarch64-darwin", "aarch64-darwin"), ".dylib", "aarch64-macos", _XCODE
     ),
 }
 """Platforms by their names in FMI 2.0; where that has none, by those of FMI 3.0."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from klack.errors import InputError
-from klack.exchange.results.naming import identifiers
+from klack.exchange.results.naming import identifiers, octave_text
 from klack.exchange.results.table import ResultRun, ResultTable
 from klack.whole_file import whole_file
 
@@ -100,9 +100,6 @@ def _run(run: ResultRun, path: Path) -> dict[str, Any]:
 
 
 def _padded(value: Any) -> Any:
-    """Give Octave the whole of a text: it takes as many bytes of UTF-8 as there are characters."""
     if isinstance(value, dict):
         return {name: _padded(member) for name, member in value.items()}
-    if isinstance(value, str):
-        return value + " " * (len(value.encode()) - len(value))
-    return value
+    return octave_text(value) if isinstance(value, str) else value

@@ -1,10 +1,10 @@
-"""Names of channels and runs as other formats allow them, each one different."""
+"""Names and texts as other formats allow them, names each one different."""
 
 from collections.abc import Collection, Sequence
 
 from klack.exchange.modal_model import identifier
 
-__all__ = ["file_stems", "identifiers"]
+__all__ = ["file_stems", "identifiers", "octave_text"]
 
 LONGEST = 63
 """Characters of a name in MATLAB."""
@@ -37,6 +37,14 @@ def file_stems(names: Sequence[str]) -> tuple[str, ...]:
     """
     plain = ["".join(c if c.isalnum() or c in "_-" else "_" for c in name) for name in names]
     return _distinct([name or "run" for name in plain], ())
+
+
+def octave_text(words: str) -> str:
+    """Text with a blank for each further byte of its letters.
+
+    scipy counts letters where Octave reads bytes: without them the end of "Stäbe" is lost.
+    """
+    return words + " " * (len(words.encode()) - len(words))
 
 
 def _distinct(names: Sequence[str], taken: Collection[str]) -> tuple[str, ...]:
