@@ -66,7 +66,7 @@ def _target(file: str, page: str) -> str:
     here = os.path.dirname(page)
     if file in _PAGE_OF:
         return os.path.relpath(_PAGE_OF[file], here)
-    inside = file.startswith("docs/") and file.endswith((".md", ".svg", ".png"))
+    inside = file.startswith("docs/") and file.endswith((".md", ".ipynb", ".svg", ".png"))
     if inside or not (ROOT / file).is_file():
         return os.path.relpath(file, here)  # an unknown file: sphinx says so
     return f"<path:{os.path.relpath(file, here)}>"
