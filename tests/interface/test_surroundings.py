@@ -215,7 +215,7 @@ def test_streams_that_are_closed_or_full(result: Path, tmp_path: Path):
     assert (tmp_path / "a" / "about.json").is_file()
     full = shell("klack schema > /dev/full", tmp_path)
     assert full.returncode == 2
-    assert full.stderr.startswith("klack schema: no space is left")
+    assert full.stderr.startswith("klack schema: the disk is full")
     assert "Traceback" not in full.stderr
     assert "Exception ignored" not in full.stderr
 

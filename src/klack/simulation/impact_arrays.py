@@ -27,7 +27,7 @@ class StepMatrices(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Gaps ``gap + rows . q`` and one law per contact as flat numbers."""
+    """Gaps, ``gap + rows q``, and one law per contact as flat numbers."""
 
     rows: Matrix  # (c, m) the modal force of contact c is ``rows[c] F[c]``
     gap: Vector  # (c,) [m]
