@@ -1,6 +1,7 @@
 """Texts use the vocabulary of the page of style; truth: the table of that page."""
 
 import ast
+import json
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -38,11 +39,15 @@ def pattern() -> re.Pattern[str]:
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """Pages of the documentation, without the table of the page of style."""
+    """Pages and notebooks of the documentation, without the table of the page of style."""
     for path in [*ROOT.glob("*.md"), *ROOT.glob("*/README.md"), *(ROOT / "docs").rglob("*.md")]:
         text = path.read_text(encoding="utf-8")
         if path != STYLE and "_build" not in path.parts:
             yield str(path.relative_to(ROOT)), text
+    for path in (ROOT / "docs" / "notebooks").glob("*.ipynb"):
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+            if cell["cell_type"] == "markdown":
+                yield str(path.relative_to(ROOT)), "".join(cell["source"])
 
 
 def strings() -> Iterator[tuple[str, str]]:
