@@ -100,3 +100,18 @@ def test_what_does_not_exist_is_null_and_a_dash():
     for nothing in (None, float("nan"), float("inf")):
         assert json_of([made(nothing)], None) == {"peak_force_N": None}
         assert made(nothing).cell(None) == "–"
+
+
+def test_a_second_line_stands_in_reports_only():
+    steps = Measure[dict](
+        key="wall_time",
+        unit="s",
+        definition="Time.",
+        column=Column("s", 1.0, ".3g"),
+        page=True,
+        remark=lambda _: ", cut off\n5 × real time",
+    )
+    of = {"wall_time": 2.0}
+    assert steps.cell(of) == "2, cut off"
+    assert steps.told(of) == "2 s, cut off"
+    assert steps.on_page(of).endswith(", cut off\n5 × real time")

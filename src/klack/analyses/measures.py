@@ -129,7 +129,8 @@ class Measure(Generic[Of]):
     given : callable
         Whether a record stands for it as defined; elsewhere it is left out of JSON.
     remark : callable
-        Behind the value in tables, for example that it was cut off.
+        Behind the value in tables, for example that it was cut off; a second line of it, after a
+        line break, stands in reports only.
     deviation : str
         How two runs are compared: by their ``"relative"`` or plain ``"difference"``, by the
         ``"factor"`` between them, or by its level in dB, of an ``"amplitude"`` or an ``"energy"``.
@@ -200,7 +201,7 @@ class Measure(Generic[Of]):
             return self.absent
         # whole numbers stay whole
         scaled = value if self.kind == "whole" else self.column.factor * value
-        return f"{scaled:{self.column.form}}{self.remark(of)}"
+        return f"{scaled:{self.column.form}}{self._short_remark(of)}"
 
     def told(self, of: Of) -> str:
         """Value with its unit, for a sentence on a terminal."""
@@ -208,7 +209,10 @@ class Measure(Generic[Of]):
         if self.column is None or value is None or not isfinite(value):
             return self.absent
         number = f"{self.column.factor * value:{self.column.form}}"
-        return f"{number} {self.column.unit}".rstrip() + self.remark(of)
+        return f"{number} {self.column.unit}".rstrip() + self._short_remark(of)
+
+    def _short_remark(self, of: Of) -> str:
+        return self.remark(of).partition("\n")[0]
 
     def on_page(self, of: Of) -> str:
         """Value in a report."""
