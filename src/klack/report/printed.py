@@ -96,7 +96,7 @@ def _curves(chart: Chart, width: float) -> Figure:
 
 def _bars(chart: BarChart) -> Figure:
     """Lying stacked bars; shares that are wide enough carry their number."""
-    with rc_context(STYLE | {"axes.grid.axis": "x"}):
+    with rc_context({"axes.grid.axis": "x"}):
         figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
         axes = figure.subplots()
         left = [0.0] * len(chart.rows)

@@ -47,14 +47,14 @@ def _compared(
             name=f"{key.replace('_', ' ')}, {head}",
             symbol=symbol,
             unit=unit,
-            definition=f"{definition} {words}".strip(),
-            source=_THEORY,
+            definition=f"{definition} {words}",
             read=lambda item: of(read(item)),
             column=Column("", column.factor, sign + column.form, head),
             page=part in ("", "measured"),
         )
 
-    return (
+    return described_in(
+        _THEORY,
         measure("", "computed", "Read off the computed lift.", attrgetter("computed")),
         measure("measured", "measured", "Median of the strokes.", attrgetter("measured")),
         measure(
@@ -73,23 +73,17 @@ def _compared(
             key=f"{key}_strokes",
             name=f"{key.replace('_', ' ')}, strokes",
             symbol="n",
-            unit="1",
             definition="Strokes that have this number.",
-            source=_THEORY,
             read=lambda item: read(item).count,
             kind="whole",
-            form="count",
             column=Column("", 1.0, "d", "strokes"),
         ),
         measure("difference", "difference", "Computed minus measured.", _difference, "+"),
         Measure(
             key=f"{key}_difference_in_scatter",
             name=f"{key.replace('_', ' ')}, difference in standard deviations",
-            symbol="",
-            unit="1",
             definition="Difference over the scatter, or over the reading error where that is larger"
             " or there is no scatter.",
-            source=_THEORY,
             read=lambda item: read(item).in_scatter,
             form="signed",
             digits=1,
@@ -144,7 +138,8 @@ def _curve(
 ) -> tuple[Measure[ComparedVariant], ...]:
     """How far a computed curve is from the measured ones over the whole record."""
     of_all, of_one = attrgetter(rms), attrgetter(scatter)
-    return (
+    return described_in(
+        _THEORY,
         Measure(
             key=f"{key}_rms",
             name=f"{key}, root mean square difference",
@@ -152,7 +147,6 @@ def _curve(
             unit=unit,
             definition=f"Root mean square of computed minus median measured {key}, over the whole "
             "record.",
-            source=_THEORY,
             read=of_all,
             column=Column("", column.factor, column.form, "difference, rms"),
         ),
@@ -163,7 +157,6 @@ def _curve(
             unit=unit,
             definition="Root mean square of the single strokes about the median, noise included; "
             "missing for one stroke.",
-            source=_THEORY,
             read=of_one,
             column=Column("", column.factor, column.form, "scatter, rms"),
         ),
@@ -171,9 +164,7 @@ def _curve(
             key=f"{key}_rms_in_scatter",
             name=f"{key}, difference in standard deviations",
             symbol=f"d{symbol}/s_{symbol}",
-            unit="1",
             definition="Root mean square difference over root mean square scatter.",
-            source=_THEORY,
             read=lambda variant: of_all(variant) / of_one(variant),
             form="fixed",
             digits=1,
@@ -316,7 +307,6 @@ def _in_its_unit(
         symbol=symbol,
         unit="",
         definition=definition,
-        source=_THEORY,
         read=attrgetter(field or key),
         digits=3,
         unit_of=attrgetter("unit"),

@@ -5,6 +5,7 @@ from typing import Any
 
 from klack.analyses.analysis import Measured
 from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.measures import json_of
 from klack.analyses.noise.record import NoiseStudy
 from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
@@ -66,8 +67,9 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
         variables, coordinates = noise_variables(design)
         for _, of, measures in measured:
             if of is design:
+                values = json_of(measures, of)
                 variables |= {
-                    item.key: Variable((), _number(item.read(of)), about_measure(item))
+                    item.key: Variable((), _number(values[item.json_key]), about_measure(item))
                     for item in measures
                 }
         about = about_study(record, {"run": design.name, "label": design.label})
