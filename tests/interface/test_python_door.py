@@ -124,6 +124,23 @@ class TestResults:
         with pytest.raises(InputError, match=f"one of: {design.name}"):
             heard.to_xarray("loud")
 
+    def test_designs_of_one_name_are_all_there(self, rods: klack.Result):
+        twice = klack.noise_of(rods, rods)
+        first, second = (design.name for design in twice.record.designs)
+        assert second == f"{first} 2"
+        assert {first, second} <= set(twice.measures)
+        with pytest.raises(InputError, match="2 different names"):
+            klack.noise_of(rods, rods, names=["a", "a"])
+        with pytest.raises(InputError, match="2 different names"):
+            klack.noise_of(rods, rods, names=["a"])
+
+    def test_nothing_to_compute_is_one_error(self):
+        with pytest.raises(InputError, match="at least one impact or stroke"):
+            klack.noise_of()
+        case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
+        with pytest.raises(InputError, match="shots: count"):
+            klack.run_shots(case, count=0)
+
     def test_a_notebook_shows_numbers_warnings_and_a_figure(self, rods: klack.Result):
         page = rods._repr_html_()
         assert "<table>" in page

@@ -56,16 +56,22 @@ def run_noise(
     sources : sequence of NoiseSource
         One per design; the first one is the one to compare with.
     names : sequence of str
-        Of the designs; case and run of each source without.
+        Of the designs, each different; by default case and run of each source, and a number
+        where they repeat.
     progress : callable
         Called with stage and fraction.
 
     Returns
     -------
     NoiseStudy
+
+    Raises
+    ------
+    InputError
+        Without a source, and for names that are not one for each, all different.
     """
     begin = perf_counter()
-    names = tuple(names) or tuple(f"{source.case} {source.run}" for source in sources)
+    names = _design_names(sources, names)
     clock = StageClock(progress)
     with collected_warnings() as caught:
         designs = tuple(
@@ -80,6 +86,30 @@ def run_noise(
         designs=designs,
         warnings=tuple(notes),
     )
+
+
+def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple[str, ...]:
+    if not sources:
+        raise InputError(
+            "noise",
+            got="no result",
+            expected="at least one impact or stroke",
+            hint="run one first, for example klack.run_stroke(case).",
+        )
+    if not names:
+        plain = [f"{source.case} {source.run}" for source in sources]
+        before = [plain[:i].count(name) for i, name in enumerate(plain)]
+        return tuple(
+            f"{name} {n + 1}" if n else name for name, n in zip(plain, before, strict=True)
+        )
+    if len(names) != len(sources) or len(set(names)) != len(names):
+        raise InputError(
+            "noise: names",
+            got=", ".join(names),
+            expected=f"{len(sources)} different names, one for each design",
+            hint="a result with several variants or levels counts once for each of them.",
+        )
+    return tuple(names)
 
 
 def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock) -> NoiseDesign:

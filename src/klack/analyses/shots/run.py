@@ -25,7 +25,7 @@ from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.cores import available_cores
-from klack.errors import ConvergenceError
+from klack.errors import ConvergenceError, require_positive
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
@@ -78,6 +78,7 @@ def run_shots(
     begin = perf_counter()
     stated = shots_of(case)
     count = stated.count if count is None else count
+    require_positive("shots: count", count, "shots")
     seed = stated.seed if seed is None else seed
     workers = available_cores() if workers is None else workers
     clock = StageClock(progress, result_cache())
