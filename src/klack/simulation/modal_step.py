@@ -37,6 +37,7 @@ __all__ = [
     "ROW_V",
     "advance",
     "apply_forces",
+    "kick",
     "watch",
 ]
 
@@ -200,3 +201,21 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         f = W[10 * _N + i]
         W[i] += W[8 * _N + i] * f
         W[_N + i] += W[9 * _N + i] * f
+
+
+@njit(cache=True, fastmath=FAST)
+def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> None:
+    """Add the response to forces that acted over a whole step of another size, with its matrices.
+
+    Parameters
+    ----------
+    W, of : pointers
+        Block whose state changes, and the same block for the step of these forces.
+    n, F, port0, port1
+        As of :func:`advance`.
+    """
+    _modal_force(of, n, F, port0, port1)
+    for i in range(n):
+        f = of[10 * _N + i]
+        W[i] += of[8 * _N + i] * f
+        W[_N + i] += of[9 * _N + i] * f

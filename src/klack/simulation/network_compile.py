@@ -24,7 +24,10 @@ from klack.simulation.modal_step import (
     ROW_V,
 )
 from klack.simulation.network_arrays import (
+    COARSE,
+    FINE,
     LOSS,
+    MIDDLE,
     PORTS,
     ROWS_AT,
     STORE,
@@ -114,8 +117,8 @@ class CompiledNetwork:
         return NetworkArrays(*(getattr(self, name) for name in NetworkArrays._fields))
 
 
-def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
-    """Lay out a network for steps of ``step`` and of ``coarse * step`` seconds."""
+def compile_network(rows: Rows, *, step: float, coarse: int, middle: int = 1) -> CompiledNetwork:
+    """Lay out a network for steps of ``step``, ``coarse * step`` and ``middle * step`` seconds."""
     if not rows.bodies:
         raise InputError(
             "network",
@@ -124,7 +127,7 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
             hint="add a rigid-mass or a flexible-body component.",
         )
     port_of, names = _number_ports(rows.bodies)
-    bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
+    bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step, middle * step))
     accounts = _Accounts()
     elements = _step_rows(rows.elements, 0, accounts, port_of, {})
     node_order = _order_nodes(rows)
@@ -187,9 +190,11 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
     return port_of, names
 
 
-def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple[Bodies, Index]:
-    """Lay out the modes in blocks for two step sizes; also the first block of each body."""
-    fine, coarse = list[Vector](), list[Vector]()
+def compile_bodies(
+    rows: Sequence[BodyRow], steps: tuple[float, float, float]
+) -> tuple[Bodies, Index]:
+    """Lay out the modes in blocks for three step sizes; also the first block of each body."""
+    blocks_at = (list[Vector](), list[Vector](), list[Vector]())
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
     blocks = [0]
     first_port = 0
@@ -203,7 +208,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
             expected=f"fewer than {PORTS}",
             hint="leave out unconnected ports of bodies.",
         )
-    G = np.zeros((2, PORTS, PORTS))
+    G = np.zeros((3, PORTS, PORTS))
     for row in rows:
         body, own = row.body, len(row.ports)
         height = FIXED_ROWS + own + 1
@@ -218,7 +223,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         for begin in range(0, max(modes, 1), ROW):
             part = slice(begin, min(begin + ROW, modes))
             used = part.stop - part.start
-            for level, (h, target) in enumerate(zip(steps, (fine, coarse), strict=True)):
+            for level, (h, target) in enumerate(zip(steps, blocks_at, strict=True)):
                 W = np.zeros((height, ROW))
                 P = modal_propagator(body.omega[part], body.damping[part], h)
                 W[ROW_V, :used] = v0[part]
@@ -242,8 +247,9 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
     bodies = Bodies(
         ports=ports,
         blocks=len(count),
-        fine=np.concatenate(fine),
-        coarse=np.concatenate(coarse),
+        fine=np.concatenate(blocks_at[FINE]),
+        coarse=np.concatenate(blocks_at[COARSE]),
+        middle=np.concatenate(blocks_at[MIDDLE]),
         start=np.array(start, dtype=np.int64),
         modes=np.array(count, dtype=np.int64),
         port0=np.array(port0, dtype=np.int64),
@@ -354,11 +360,11 @@ def _nodes(
     volume = np.array([node.volume for node in given[:volumes]], dtype=float)
     gamma = np.zeros((2, max(volumes, 1)))
     walls = [(node_of[w.node], port_of[w.port], w.area) for w in rows.walls]
-    G = bodies.G.reshape(2, PORTS, PORTS)
+    G = bodies.G.reshape(3, PORTS, PORTS)
     for i, a, area_a in walls:
         for j, b, area_b in walls:
             if i == j and i < volumes:
-                gamma[:, i] += area_a * G[:, a, b] * area_b
+                gamma[0, i] += area_a * G[FINE, a, b] * area_b
     nodes = Nodes(
         nodes=count,
         volumes=volumes,
@@ -404,7 +410,7 @@ def _interfaces(
     lower = np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64)
     stroke = float(np.max(np.maximum(gap, film[2]), initial=0.0))
     film_time = stroke / _FLIGHT_SPEED or 1.0  # nothing to fly, no film to judge
-    moved, _ = compile_bodies(rows.bodies, (film_time, film_time))
+    moved, _ = compile_bodies(rows.bodies, (film_time, film_time, film_time))
     force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
     rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
     interfaces = Interfaces(
@@ -437,16 +443,17 @@ def _interfaces(
         deepest=np.zeros(count),
         since=np.full(count, np.inf),
         film_before=np.zeros(count),
+        force_before=np.zeros(count),
     )
     return interfaces, state
 
 
 def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
-    """Opening of each gap per unit force during a fine and during a coarse step, flat (2 n,)."""
+    """Opening of each gap per unit force during a step of each size, flat (3 n,)."""
     jump = np.zeros((len(upper), PORTS))
     jump[np.arange(len(upper)), upper] += 1.0
     jump[np.arange(len(lower)), lower] -= 1.0
-    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(2, PORTS, PORTS), jump).ravel()
+    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(3, PORTS, PORTS), jump).ravel()
 
 
 def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:

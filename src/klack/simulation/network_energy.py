@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
 from klack.simulation.network_arrays import (
-    ELEMENTS_BEFORE,
+    BEFORE,
     PORTS,
     SEEN,
     STORE,
@@ -37,7 +37,7 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     the whole force counts, and of a preloaded needle that is far more than what moves it.
     """
     at = network.bodies.at
-    force, end, seen = (at[row : row + PORTS] for row in (ELEMENTS_BEFORE, Y0, SEEN))
+    force, end, seen = (at[row : row + PORTS] for row in (BEFORE, Y0, SEEN))
     return np.asarray(force * (end - seen), dtype=float)
 
 

@@ -7,7 +7,7 @@ from numba import njit
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import FORCE, SEEN, STORE, USED, Step
+from klack.simulation.network_arrays import ANSWER, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
 from klack.simulation.step_status import (
@@ -136,7 +136,7 @@ def _place_walls(fluid: Any, S: Any) -> None:
     for w in range(nodes.walls):
         i = nodes.wall_node[w]
         if i < nodes.volumes:
-            trial.V_used[i] += nodes.wall_area[w] * S[USED + nodes.wall_port[w]]
+            trial.V_used[i] += nodes.wall_area[w] * S[Y1 + nodes.wall_port[w]]
 
 
 @phase
@@ -169,9 +169,9 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     volumes, H = fluid.nodes.volumes, step.H
     A, own, r = trial.matrix, trial.own, trial.r
-    seen, used = shift(S, SEEN), shift(S, USED)
+    seen, end = shift(S, SEEN), shift(S, Y1)
     for k in range(branches.rows):
-        status = ask_branch(branches, k, step.t, H, seen, used, trial.p, trial.rho)
+        status = ask_branch(branches, k, step.t, H, seen, end, trial.p, trial.rho)
         if status != 0:
             return k, status
         a, b, o0 = branches.a[k], branches.b[k], branches.output0[k]
@@ -311,7 +311,7 @@ def _finish_flows(fluid: Any) -> tuple[int, int]:
 @phase
 def push_by_fluid(fluid: Any, S: Any) -> None:
     """Add the forces of pressures on walls and those of branches to those of the ports."""
-    force = shift(S, FORCE)
+    force = shift(S, ANSWER)
     push_walls(fluid.nodes, fluid.trial.p, force)
     for k in range(fluid.branches.rows):
         push_ports(fluid.branches, k, force)
@@ -336,7 +336,7 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
         o0, q0 = branches.output0[k] + branches.head, branches.port0[k]
         for j in range(q0, branches.port0[k + 1]):
             port = branches.ports[j]
-            power -= branches.outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
+            power -= branches.outputs[o0 + j - q0] * (S[Y1 + port] - S[SEEN + port])
         o0 = take_states(branches, k)
         for j in range(branches.accounts[k]):
             account, value = branches.account0[k] + j, branches.outputs[o0 + j]

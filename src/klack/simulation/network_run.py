@@ -32,7 +32,7 @@ from klack.simulation.network_compile import (
     modal_state,
 )
 from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
-from klack.simulation.network_kernel import run_network
+from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
@@ -121,7 +121,8 @@ def simulate_network(
             expected="1 or more",
             hint="1 switches coarse steps off, 16 is usual.",
         )
-    network = compile_network(rows, step=step, coarse=coarse)
+    middle = 4 if coarse % 4 == 0 else 1
+    network = compile_network(rows, step=step, coarse=coarse, middle=middle)
     grid = _grid(duration, step, coarse, record)
     chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
     recorder = Recorder(
@@ -131,7 +132,8 @@ def simulate_network(
         chunk=min(max(1, chunk // grid.look_steps), grid.records * grid.looks),
         fine=max(chunk, grid.look_steps),
     )
-    clock = np.array([0, -1, 0, 0], dtype=np.int64)
+    clock = np.zeros(CLOCK, dtype=np.int64)
+    clock[1] = -1
     begun = None
     if state is not None:
         _restore(network, clock, state)
@@ -379,6 +381,7 @@ def _advance(
         per_record,
         clock,
         block,
+        4 if block % 4 == 0 and allow_coarse else 1,
         step,
         allow_coarse,
         network.arrays,
