@@ -77,6 +77,8 @@ class Lines(NamedTuple):
         Fine step.
     coarse : int
         Fine steps of a coarse step.
+    near : int
+        Fine steps of a step between both.
     node : array of int, shape (2 n,)
         Hydraulic node of each end.
     impedance : array, shape (n,) [Pa s/m^3]
@@ -97,20 +99,21 @@ class Lines(NamedTuple):
         Terms of frequency-dependent friction of each line.
     first_memory : array of int, shape (n,)
         Where the memories of a line start; ordered by lump, then by term.
-    impedance_of_term : array, shape (2, k) [Pa s/m^3]
-        Mean ``dp / (q - i)`` of one whole lump over a fine step (0) and a coarse step (1).
-    decay : array, shape (2, k) [-]
-        Share of ``q - i`` left after a fine step (0) and a coarse step (1).
-    heat : array, shape (2, k) [Pa s^2/m^3]
+    impedance_of_term : array, shape (3, k) [Pa s/m^3]
+        Mean ``dp / (q - i)`` of one whole lump over a fine (0), a coarse (1) and a near step (2).
+    decay : array, shape (3, k) [-]
+        Share of ``q - i`` left after such a step.
+    heat : array, shape (3, k) [Pa s^2/m^3]
         Loss of one whole lump in a step over ``(q - i)^2``.
     inductance : array, shape (k,) [Pa s^2/m^3]
         Of one whole lump, ``gain / rate``.
-    lump : array, shape (2, n) [Pa s/m^3]
+    lump : array, shape (3, n) [Pa s/m^3]
         ``dp / q`` of one whole lump without memory: its resistance and all its terms.
     """
 
     step: float
     coarse: int
+    near: int
     node: Integers
     impedance: Vector
     resistance: Vector
@@ -156,9 +159,9 @@ class LineState(NamedTuple):
 
 
 def compile_lines(
-    rows: Sequence[LineRow], *, step: float, coarse: int, ambient_pressure: float
+    rows: Sequence[LineRow], *, step: float, coarse: int, near: int = 1, ambient_pressure: float
 ) -> tuple[Lines, LineState]:
-    """Lay out lines for steps of 1 and of ``coarse`` fine steps; at rest and at ambient pressure.
+    """Lay out lines for steps of 1, ``near`` and ``coarse`` fine steps, at rest.
 
     Segments have equal delays up to ``coarse`` steps, so that coarse steps find their own samples
     again and lose nothing; only the last segment of a line has a fraction of a step.
@@ -170,6 +173,8 @@ def compile_lines(
         Fine step.
     coarse : int
         Fine steps of a coarse step; 1 without coarse steps.
+    near : int
+        Fine steps of a step between both.
     ambient_pressure : float [Pa]
         From which ``P`` counts.
 
@@ -193,16 +198,17 @@ def compile_lines(
     memories = terms * (segments + 1)
     gain = _concatenate([row.unsteady_gain / row.segments for row in rows])
     rate = _concatenate([row.unsteady_rate for row in rows])
-    durations = rate * np.array([[step], [coarse * step]])
+    durations = rate * step * np.array([[1], [coarse], [near]])
     impedance_of_term = gain * -np.expm1(-durations) / durations
     resistance = np.array([row.resistance / row.segments for row in rows], dtype=float)
     line_of_term = np.repeat(np.arange(len(rows)), terms)
-    lump = np.tile(resistance, (2, 1))
-    for level in range(2):
+    lump = np.tile(resistance, (3, 1))
+    for level in range(3):
         np.add.at(lump[level], line_of_term, impedance_of_term[level])
     lines = Lines(
         step=float(step),
         coarse=int(coarse),
+        near=int(near),
         node=np.array([node for row in rows for node in (row.a, row.b)], dtype=np.int64),
         impedance=np.array([row.impedance for row in rows], dtype=float),
         resistance=resistance,
@@ -315,6 +321,13 @@ def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
     return total
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _level(lines: Lines, m: int) -> int:
+    if m == 1:
+        return 0
+    return 1 if m == lines.coarse else 2
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
     """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
@@ -326,11 +339,11 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
     Parameters
     ----------
     m : int
-        Fine steps of this step: 1 or ``lines.coarse``.
+        Fine steps of this step: 1, ``lines.near`` or ``lines.coarse``.
     c, Z : array, shape (2 n,)
         Written.
     """
-    level = 0 if m == 1 else 1
+    level = _level(lines, m)
     z = lines.impedance_of_term[level]
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
@@ -387,7 +400,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
     books : array, shape (n, 3) [J]
         Losses of each line since the start, see :data:`LINE_LOSSES`; added to.
     """
-    level = 0 if m == 1 else 1
+    level = _level(lines, m)
     duration = m * lines.step
     decay, heating = lines.decay[level], lines.heat[level]
     z = lines.impedance_of_term[level]

@@ -31,6 +31,7 @@ __all__ = [
     "ROW_B1",
     "ROW_B2",
     "ROW_F",
+    "ROW_K",
     "ROW_P1",
     "ROW_P2",
     "ROW_Q",
@@ -48,8 +49,8 @@ ROW = 128
 
 ROW_Q, ROW_V = 0, 1
 ROW_A11, ROW_A12, ROW_A21, ROW_A22 = 2, 3, 4, 5
-ROW_P1, ROW_P2, ROW_B1, ROW_B2, ROW_F = 6, 7, 8, 9, 10
-FIXED_ROWS = 11
+ROW_P1, ROW_P2, ROW_B1, ROW_B2, ROW_F, ROW_K = 6, 7, 8, 9, 10, 11
+FIXED_ROWS = 12
 """Rows before the port shapes."""
 
 _N = ROW
@@ -204,7 +205,7 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
 
 
 @njit(cache=True, fastmath=FAST)
-def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> None:
+def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
     """Add the response to forces that acted over a whole step of another size, with its matrices.
 
     Parameters
@@ -213,9 +214,19 @@ def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> None:
         Block whose state changes, and the same block for the step of these forces.
     n, F, port0, port1
         As of :func:`advance`.
+
+    Returns
+    -------
+    float [J]
+        Kinetic and strain energy that it adds.
     """
     _modal_force(of, n, F, port0, port1)
+    energy = 0.0
     for i in range(n):
         f = of[10 * _N + i]
-        W[i] += of[8 * _N + i] * f
-        W[_N + i] += of[9 * _N + i] * f
+        q, v = W[i], W[_N + i]
+        dq, dv = of[8 * _N + i] * f, of[9 * _N + i] * f
+        energy += of[11 * _N + i] * dq * (q + 0.5 * dq) + dv * (v + 0.5 * dv)
+        W[i] = q + dq
+        W[_N + i] = v + dv
+    return energy

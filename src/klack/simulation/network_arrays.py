@@ -14,6 +14,7 @@ __all__ = [
     "BEFORE_2",
     "BEFORE_3",
     "BEGIN",
+    "EXCESS",
     "COARSE",
     "FINE",
     "FORCE",
@@ -23,11 +24,13 @@ __all__ = [
     "LOSS",
     "MIDDLE",
     "MISSED",
+    "NEAR",
     "PENDING",
     "PENDING_BEGIN",
     "PORTS",
     "ROWS_AT",
     "SEEN",
+    "SIZES",
     "STORE",
     "SUPPLY",
     "WORK",
@@ -63,9 +66,11 @@ STORE, SUPPLY, LOSS = 0, 1, 2
 PORTS = 64
 """Length of a row of port numbers; one less is the most a network can have."""
 
-FINE, COARSE, MIDDLE = 0, 1, 2
-"""Steps that bodies and interfaces are laid out for: the fine one; a macro step of many of them;
-and a few of them for a smooth contact."""
+FINE, COARSE, NEAR, MIDDLE = 0, 1, 2, 3
+"""Sizes of step: the fine one; macro steps of many of them, in flight and about a touch; and
+sub-steps of a few of them, for smooth contact forces."""
+
+SIZES = 4
 
 # Rows at constant distances: the compiler knows that none overlaps another.
 Y0 = 0 * PORTS  # displacements at the start of the step
@@ -85,7 +90,8 @@ AHEAD = 13 * PORTS  # displacements that it makes, which elements and fluid see 
 BEGIN = 14 * PORTS  # displacements at the start of the macro step
 WORK_BEGIN = 15 * PORTS
 PENDING_BEGIN = 16 * PORTS
-ROWS_AT = 17
+EXCESS = 17 * PORTS  # one number: energy [J] that bodies got beyond what was given to them
+ROWS_AT = 18
 
 
 class Bodies(NamedTuple):
@@ -93,17 +99,16 @@ class Bodies(NamedTuple):
 
     ports: int
     blocks: int
-    fine: Vector  # blocks at the fine step
-    coarse: Vector  # the same at the coarse step
-    middle: Vector  # the same at the middle step
+    size: int  # numbers of all blocks
+    laid_out: Vector  # (SIZES, size) all blocks, for each size of step
     start: Index  # (blocks + 1,) first number of each block
     modes: Index  # (blocks,) in use, a multiple of four
     port0: Index  # (blocks,) ports of the body of the block
     port1: Index
     first: Index  # (ports,) first port of the body of each port
     last: Index
-    G: Vector  # (3, PORTS, PORTS) displacement at the end of a step per unit force during it
-    at: Vector  # (17, PORTS) what the ports do, row by row: see ``Y0`` and the following names
+    G: Vector  # (SIZES, PORTS, PORTS) displacement at the end of a step per unit force during it
+    at: Vector  # (ROWS_AT, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 
 class StepRows(NamedTuple):
@@ -169,7 +174,7 @@ class Interfaces(NamedTuple):
     interfaces: int
     upper: Index
     lower: Index
-    G: Vector  # (3 n,) opening of the gap per unit force during a fine, coarse, middle step
+    G: Vector  # (SIZES n,) opening of the gap per unit force during a step
     dry: Index  # 1 without a film: no force while open
     gap0: Vector
     kind: Index
@@ -271,7 +276,7 @@ class InterfaceTrial(NamedTuple):
     far: Vector  # 1 of an interface that the sub-steps of this macro step leave out
     least: Vector  # force in this macro step and at its start
     most: Vector
-    lagging: Vector  # sum of force (2 j + 1) over sub-steps j
+    first: Vector  # force in the first sub-step
     kept: Vector  # state at the start of the macro step
 
 
@@ -307,7 +312,7 @@ def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sum
 class Step(NamedTuple):
     """One step that is tried."""
 
-    level: int  # ``FINE``, ``COARSE`` or ``MIDDLE``
+    level: int  # ``FINE`` or another size
     steps: int  # fine steps in it
     t: float  # start [s]
     H: float  # length [s]

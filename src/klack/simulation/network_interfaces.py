@@ -8,12 +8,12 @@ from klack.contact.step_constants import SEPARATED, SLOWEST
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.network_arrays import (
     AHEAD,
+    BEGIN,
     COARSE,
     FORCE,
     GUESS,
     KEPT,
     PORTS,
-    WORK,
     Y1,
     Recording,
     Step,
@@ -246,7 +246,7 @@ def begin_attempt(contacts: Any, c: int) -> None:
     """Nothing has acted yet; the last force is the first guess."""
     trial, force = contacts.trial, contacts.state.force[c]
     trial.force[c] = trial.least[c] = trial.most[c] = force
-    trial.lagging[c] = 0.0
+    trial.first[c] = 0.0
     if trial.far[c] != 0.0:
         trial.force[c] = trial.contact[c] = trial.film[c] = 0.0
         trial.contact_loss[c] = trial.film_loss[c] = 0.0
@@ -347,22 +347,27 @@ def cost_of_catching_up(contacts: Any, S: Any) -> tuple[float, float]:
 
 
 @phase
-def end_macro_interfaces(contacts: Any, S: Any, sub_steps: int, H: float) -> None:
-    """Work of the interfaces on what was missed, which grows with the square of the time.
+def end_macro_interfaces(contacts: Any, S: Any, H: float) -> float:
+    """End a macro step of interfaces; far ones learn where they are.
 
-    Far interfaces learn where they are.
+    Returns
+    -------
+    float [J]
+        Energy that bodies got before beyond what the interfaces give: each was behind by what had
+        been missed, until its first sub-step.
     """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    excess = 0.0
     for c in range(rows.interfaces):
-        u, low = rows.upper[c], rows.lower[c]
-        state.force_before[c] = trial.kept[KEPT * c + 3]
-        force = trial.lagging[c] / (sub_steps * sub_steps)
-        S[WORK + u] += force * S[AHEAD + u]
-        S[WORK + low] -= force * S[AHEAD + low]
+        begin = trial.kept[KEPT * c + 3]
+        state.force_before[c] = begin
+        behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
+        excess += (begin - trial.first[c]) * (behind - trial.kept[KEPT * c + 1])
         if trial.far[c] != 0.0:
             gap = _gap(rows, S, c)
             state.rate[c] = (gap - state.gap[c]) / H
             state.gap[c] = gap
+    return excess
 
 
 @phase
@@ -394,7 +399,8 @@ def end_interfaces(
             sums[2 * c] += step.H * trial.contact[c]
             sums[2 * c + 1] += step.H * trial.film[c]
             peaks[c] = max(peaks[c], force)
-            trial.lagging[c] += force * (2 * place + 1)
+            if place == 0:
+                trial.first[c] = force
             trial.least[c] = min(trial.least[c], force)
             trial.most[c] = max(trial.most[c], force)
             felt = step.level != COARSE and abs(trial.film[c]) > rows.film_felt[c]

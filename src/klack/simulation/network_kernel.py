@@ -29,8 +29,10 @@ from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_in
 from klack.simulation.network_arrays import (
     ANSWER,
     COARSE,
+    EXCESS,
     FINE,
     MIDDLE,
+    NEAR,
     PORTS,
     Accounts,
     Bodies,
@@ -61,7 +63,6 @@ from klack.simulation.network_interfaces import (
     take_back_interfaces,
 )
 from klack.simulation.network_ports import (
-    add_missed_force,
     begin_macro_step,
     begin_ports,
     bring,
@@ -69,7 +70,6 @@ from klack.simulation.network_ports import (
     end_ports,
     end_sub_step,
     finite,
-    forget_forces,
     guess_answer,
     guess_forces,
     keep_modes,
@@ -78,6 +78,8 @@ from klack.simulation.network_ports import (
     miss,
     move_free,
     move_ports_by_guess,
+    repay,
+    respace_forces,
     row_length,
     take_back_ports,
 )
@@ -144,6 +146,7 @@ def run_network(
     per_record: int,
     clock: Index,
     M: int,
+    near: int,
     R: int,
     h: float,
     allow_macro: bool,
@@ -154,12 +157,17 @@ def run_network(
 ) -> int:
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
-    ``R`` fine steps are a middle one.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row
+    ``near`` fine steps are a macro step about a touch, ``R`` of them a middle one.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row
     of a failure, its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
     now, last_level, at = clock[0], clock[1], FINE
+    last_steps = 1
+    if last_level == COARSE:
+        last_steps = M
+    elif last_level == NEAR:
+        last_steps = near
     in_record, record, record_time = 0, 0, 0.0
     for _macro in range(macros):
         together = allow_macro
@@ -170,16 +178,19 @@ def run_network(
             # what acts: one step, or sub-steps
             level, of_sub, parts = FINE, FINE, 1
             if together:
-                level = COARSE
-                if flight:
-                    of_sub = COARSE
-                else:
-                    smooth = smooth and smooth_contacts(contacts, now * h, M * h, R * h)
+                level = of_sub = COARSE
+                if not flight:
+                    level = NEAR
+                    smooth = smooth and smooth_contacts(contacts, now * h, near * h, R * h)
                     of_sub = MIDDLE if smooth else FINE
-                    parts = M // R if smooth else M
-            if not smooth or level == FINE or flight:
+                    parts = near // R if smooth else near
+            if of_sub != MIDDLE:
                 none_far(contacts)
-            steps = M if level == COARSE else 1
+            steps = 1
+            if level == COARSE:
+                steps = M
+            elif level == NEAR:
+                steps = near
             step = Step(level, steps, now * h, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, now * h, steps // parts * h, parts / (steps * h))
             if at != of_sub:
@@ -193,7 +204,7 @@ def run_network(
                 keep_modes(bodies, of_sub)
             straight = level == last_level
             if not straight:
-                forget_forces(bodies)
+                respace_forces(bodies, steps / last_steps)
             guess_forces(bodies)
             guess_pressures(loop.fluid, step.t + step.H, straight)
             if loop.fluid.nodes.ends > 0:
@@ -213,19 +224,21 @@ def run_network(
                     flight = False
                 else:
                     smooth = False
-                last_level = level  # the history of forces is as it was
+                last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
             _end_step(step, of_sub, parts, loop)
-            last_level = level
+            last_level, last_steps = level, steps
             done += steps
             now += steps
-            clock[2] += 1 - level
-            if parts > 1:
+            if level == FINE:
+                clock[2] += 1
+            elif level == COARSE:
+                clock[3] += 1
+            else:
                 clock[4] += 1
                 clock[5] += parts
-                clock[6] += M if of_sub == FINE else 0
-            else:
-                clock[3] += level
+                clock[6] += parts if of_sub == FINE else 0
+                smooth = R > 1
         in_record += 1
         record_time += M * h
         if in_record == per_record:
@@ -387,9 +400,9 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
         end_nodes(fluid, accounts)
-    add_missed_force(bodies, level, parts == 1)
-    catch_up(bodies)
-    end_macro_interfaces(loop.contacts, bodies.at, parts, H)
+    repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
+    catch_up(bodies, level, step.level, parts == 1)
+    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, H)
     end_ports(bodies)
 
 

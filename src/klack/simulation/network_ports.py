@@ -13,6 +13,7 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     BEGIN,
+    EXCESS,
     COARSE,
     FINE,
     FORCE,
@@ -31,7 +32,6 @@ from klack.simulation.network_arrays import (
 from klack.simulation.phase import phase
 
 __all__ = [
-    "add_missed_force",
     "begin_macro_step",
     "begin_ports",
     "bring",
@@ -39,7 +39,6 @@ __all__ = [
     "end_ports",
     "end_sub_step",
     "finite",
-    "forget_forces",
     "guess_answer",
     "guess_forces",
     "keep_modes",
@@ -48,10 +47,14 @@ __all__ = [
     "miss",
     "move_free",
     "move_ports_by_guess",
+    "respace_forces",
+    "repay",
     "row_length",
     "take_back_ports",
 ]
 
+_LONGER = 4.0  # times the steps before
+_OWED = 1e-6  # of the largest force of elements and fluid: most that repays
 _UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
 _ROUND_OFF = 4e-16  # of the displacements themselves
 
@@ -72,12 +75,7 @@ def begin_ports(bodies: Any) -> None:
 
 @phase
 def _block(bodies: Any, k: int, level: int) -> Any:
-    start = bodies.fine
-    if level == COARSE:
-        start = bodies.coarse
-    elif level > COARSE:
-        start = bodies.middle
-    return shift(start, bodies.start[k])
+    return shift(bodies.laid_out, level * bodies.size + bodies.start[k])
 
 
 @phase
@@ -159,12 +157,23 @@ def guess_forces(bodies: Any) -> None:
 
 
 @phase
-def forget_forces(bodies: Any) -> None:
-    """Forces of the last step, after one of another length."""
+def respace_forces(bodies: Any, ratio: float) -> None:
+    """Forces of the last three steps as if they had been longer by ``ratio``.
+
+    They are means, so on the same parabola in the middle of such steps.  Longer ones that reach far
+    beyond what is known begin with the last force.
+    """
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[BEFORE_2 + i] = S[BEFORE + i]
-        S[BEFORE_3 + i] = S[BEFORE + i]
+        a, b, c = S[BEFORE + i], S[BEFORE_2 + i], S[BEFORE_3 + i]
+        first, second = b - a, 0.5 * (c - 2.0 * b + a)
+        if ratio > _LONGER:
+            first, second = 0.0, 0.0
+        # x steps before the last one: a + first x + second x (x - 1)
+        x1, x2, x3 = 0.5 * ratio - 0.5, 1.5 * ratio - 0.5, 2.5 * ratio - 0.5
+        S[BEFORE + i] = a + x1 * (first + second * (x1 - 1.0))
+        S[BEFORE_2 + i] = a + x2 * (first + second * (x2 - 1.0))
+        S[BEFORE_3 + i] = a + x3 * (first + second * (x3 - 1.0))
 
 
 @phase
@@ -268,31 +277,67 @@ def finite(bodies: Any) -> bool:
 
 
 @phase
-def add_missed_force(bodies: Any, level: int, pending: bool) -> None:
-    """Let what the guess missed act as if it had acted all the time.
+def repay(bodies: Any, G: Any) -> None:
+    """Take the energy that bodies got beyond what was given to them back, by a minute force.
 
-    Its modal response is that of one macro step; where the last sub-step is the whole macro step it
-    only joins the ``pending`` forces.
+    Elements, fluid and interfaces see what was missed a step late, at the forces of that step.  The
+    force acts where the way is longest, and is limited: then the rest is left for the next step.
     """
     S = bodies.at
-    if pending:
-        for p in range(bodies.ports):
-            S[PENDING + p] += S[MISSED + p]
-    else:
-        for k in range(bodies.blocks):
-            block, of_macro = _block(bodies, k, level), _block(bodies, k, COARSE)
-            port0, port1 = bodies.port0[k], bodies.port1[k]
-            kick(block, of_macro, bodies.modes[k], shift(S, MISSED), port0, port1)
+    port, longest, largest = 0, 0.0, 0.0
+    for p in range(bodies.ports):
+        way = abs(S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p])
+        if way > longest:
+            port, longest = p, way
+        largest = max(largest, abs(S[ANSWER + p]))
+    excess = abs(S[EXCESS])
+    if excess > _OWED * largest * longest:
+        excess = _OWED * largest * longest
+    if excess > 0.0:
+        way = S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port]
+        force = excess / way
+        if S[EXCESS] > 0.0:
+            force = -force
+        S[MISSED + port] += force
+        for i in range(bodies.first[port], bodies.last[port]):
+            S[AHEAD + i] += G[i * PORTS + port] * force
+        S[EXCESS] += force * (S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port])
 
 
 @phase
-def catch_up(bodies: Any) -> None:
-    """Displacements with what the guess missed, and the work of elements and fluid on bodies."""
+def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
+    """Let what the guess missed act as if it had acted all the time, in the macro step ``macro``.
+
+    Its modal response is that of a constant force over the macro step; where this was ``one_step``
+    it only joins the forces that are pending.  Counted are the work on the bodies, and the energy
+    that they got beyond what is given to them: elements and fluid are behind by what was missed
+    before, interfaces will be by what is missed now.
+    """
     S = bodies.at
+    excess = 0.0
+    if one_step:
+        for p in range(bodies.ports):
+            S[PENDING + p] += S[MISSED + p]
+            way = S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p]
+            S[WORK + p] += (S[GUESS + p] + S[MISSED + p]) * way
+            S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * S[AHEAD + p]
+    else:
+        bring(bodies, level, level)
+        for k in range(bodies.blocks):
+            block, of_macro = _block(bodies, k, level), _block(bodies, k, macro)
+            port0, port1 = bodies.port0[k], bodies.port1[k]
+            energy = kick(block, of_macro, bodies.modes[k], shift(S, MISSED), port0, port1)
+            S[WORK + port0] += energy
+            excess += energy
+        for p in range(bodies.ports):
+            way, d = S[Y1 + p] - S[BEGIN + p], S[AHEAD + p]
+            S[WORK + p] += S[GUESS + p] * way
+            excess -= S[MISSED + p] * (way + d) + S[FORCE + p] * d
     for p in range(bodies.ports):
+        excess += (S[BEFORE + p] - S[ANSWER + p]) * (S[BEGIN + p] - S[SEEN + p])
         S[SEEN + p] = S[Y1 + p]
         S[Y1 + p] += S[AHEAD + p]
-        S[WORK + p] += S[ANSWER + p] * (S[Y1 + p] - S[BEGIN + p])
+    S[EXCESS] += excess
 
 
 @phase

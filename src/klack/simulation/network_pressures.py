@@ -7,7 +7,7 @@ from numba import njit
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import ANSWER, SEEN, STORE, Y1, Step
+from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
 from klack.simulation.step_status import (
@@ -87,7 +87,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     """All pressures and flows at the end of the step, with ports where the last sweep left them."""
     nodes, trial = fluid.nodes, fluid.trial
     p, r = trial.p, trial.r
-    gamma = shift(nodes.gamma, step.level * max(nodes.volumes, 1))
+    gamma = shift(nodes.gamma, min(step.level, 1) * max(nodes.volumes, 1))
     _place_walls(fluid, S)
     for iteration in range(_MOST_NEWTON):
         _look_up(fluid)
@@ -113,7 +113,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             p[i] += share * r[i]
         # at once, while it can be seen which branch is to blame
         if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
-            if step.level == 1:  # fine steps may do
+            if step.level != FINE:  # fine steps may do
                 return STATUS_REFUSED
             report[0], report[2] = _worst_volume(fluid, worst), step.t
             return STATUS_PRESSURES

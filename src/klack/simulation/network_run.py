@@ -37,6 +37,7 @@ from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
+from klack.simulation.step_sizes import StepSizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -121,8 +122,8 @@ def simulate_network(
             expected="1 or more",
             hint="1 switches coarse steps off, 16 is usual.",
         )
-    middle = 4 if coarse % 4 == 0 else 1
-    network = compile_network(rows, step=step, coarse=coarse, middle=middle)
+    sizes = _sizes(step, coarse)
+    network = compile_network(rows, sizes)
     grid = _grid(duration, step, coarse, record)
     chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
     recorder = Recorder(
@@ -229,6 +230,14 @@ def _grid(duration: float, step: float, coarse: int, record: float) -> _Grid:
         records=max(1, int(np.ceil(duration / (of_record * block * step) - 1e-9))),
         coarse=coarse > 1,
     )
+
+
+NEAR_MOST = 32
+
+
+def _sizes(step: float, coarse: int) -> StepSizes:
+    near = _largest_divisor(coarse, min(coarse, NEAR_MOST))
+    return StepSizes(step=step, coarse=coarse, near=near, middle=4 if near % 4 == 0 else 1)
 
 
 def _largest_divisor(number: int, most: int) -> int:
@@ -381,7 +390,8 @@ def _advance(
         per_record,
         clock,
         block,
-        4 if block % 4 == 0 and allow_coarse else 1,
+        _sizes(step, block).near,
+        _sizes(step, block).middle,
         step,
         allow_coarse,
         network.arrays,
@@ -529,7 +539,7 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
     """All arrays that a step changes and the next one begins with, as a stored state calls them."""
     line = network.line_state
     groups = {
-        "bodies": {"fine": network.bodies.fine, "at": network.bodies.at},
+        "bodies": {"fine": network.bodies.laid_out[: network.bodies.size], "at": network.bodies.at},
         "elements": {"state": network.elements.state},
         "branches": {"state": network.branches.state},
         "nodes": network.node_state._asdict(),

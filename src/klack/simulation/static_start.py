@@ -632,7 +632,7 @@ class _Balance:
             for k in range(network.body_blocks[b], network.body_blocks[b + 1]):
                 part = q[ROW * (k - network.body_blocks[b]) :][:ROW]
                 place = bodies.start[k] + ROW * ROW_Q
-                bodies.fine[place : place + part.size] = part
+                bodies.laid_out[place : place + part.size] = part
             begin, mode = here.stop, mode + r
 
     def _put_fluid(self, state: _State) -> None:
