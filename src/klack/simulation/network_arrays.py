@@ -16,6 +16,7 @@ __all__ = [
     "BEGIN",
     "EXCESS",
     "COARSE",
+    "CUT",
     "FINE",
     "FORCE",
     "FREE",
@@ -25,6 +26,7 @@ __all__ = [
     "MIDDLE",
     "MISSED",
     "NEAR",
+    "PARTS",
     "PENDING",
     "PENDING_BEGIN",
     "PORTS",
@@ -66,11 +68,15 @@ STORE, SUPPLY, LOSS = 0, 1, 2
 PORTS = 64
 """Length of a row of port numbers; one less is the most a network can have."""
 
-FINE, COARSE, NEAR, MIDDLE = 0, 1, 2, 3
-"""Sizes of step: the fine one; macro steps of many of them, in flight and about a touch; and
-sub-steps of a few of them, for smooth contact forces."""
+FINE, COARSE, NEAR, MIDDLE, CUT = 0, 1, 2, 3, 4
+"""Sizes of step: the fine one; macro steps of many of them, in flight and about a touch; sub-steps
+of a few of them, for smooth contact forces; and parts of a fine step in which a contact closes or
+opens."""
 
-SIZES = 4
+SIZES = 5
+
+PARTS = 8
+"""Parts of a fine step that is cut."""
 
 # Rows at constant distances: the compiler knows that none overlaps another.
 Y0 = 0 * PORTS  # displacements at the start of the step
@@ -203,6 +209,7 @@ class InterfaceState(NamedTuple):
     deepest: Vector  # indentation since a damped contact was touched
     since: Vector  # closed since; infinity while open
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
+    pulled: Vector  # 1 of a film that pulls as much as it can
     force_before: Vector  # force at the end of the macro step before the last
 
 
@@ -276,6 +283,7 @@ class InterfaceTrial(NamedTuple):
     far: Vector  # 1 of an interface that the sub-steps of this macro step leave out
     least: Vector  # force in this macro step and at its start
     most: Vector
+    chi: Vector  # dissipation factor at the start of the step
     first: Vector  # force in the first sub-step
     kept: Vector  # state at the start of the macro step
 

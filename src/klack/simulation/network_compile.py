@@ -447,6 +447,7 @@ def _interfaces(
         deepest=np.zeros(count),
         since=np.full(count, np.inf),
         film_before=np.zeros(count),
+        pulled=np.zeros(count),
         force_before=np.zeros(count),
     )
     return interfaces, state

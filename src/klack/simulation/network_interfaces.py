@@ -21,6 +21,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.phase import phase
 
 __all__ = [
+    "begin_cut_contacts",
     "begin_interfaces",
     "begin_macro_interfaces",
     "coarse_step_holds",
@@ -30,6 +31,7 @@ __all__ = [
     "end_macro_interfaces",
     "far_ones_stay",
     "forget_interfaces",
+    "keep_dissipation",
     "level_of_step",
     "none_far",
     "push_by_guess",
@@ -238,6 +240,7 @@ def begin_macro_interfaces(
         trial.kept[k + 12] = sums[2 * c + 1]
         trial.kept[k + 13] = peaks[c]
         trial.kept[k + 14] = float(recording.filled[c])
+        trial.kept[k + 15] = state.pulled[c]
         begin_attempt(contacts, c)
 
 
@@ -275,6 +278,7 @@ def take_back_interfaces(
         sums[2 * c + 1] = kept[k + 12]
         peaks[c] = kept[k + 13]
         recording.filled[c] = int(kept[k + 14])
+        state.pulled[c] = kept[k + 15]
         begin_attempt(contacts, c)
 
 
@@ -325,13 +329,36 @@ def none_far(contacts: Any) -> None:
 
 @phase
 def contacts_hold(contacts: Any) -> bool:
-    """Whether no contact closed or opened in this step."""
+    """Whether no contact closed or opened in this step, and no film began or ceased to cavitate."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     holds = True
     for c in range(rows.interfaces):
         if (state.since[c] < np.inf) != (trial.contact[c] > 0.0):
             holds = False
+        if (state.pulled[c] != 0.0) != _pulls(contacts, c):
+            holds = False
     return holds
+
+
+@phase
+def _pulls(contacts: Any, c: int) -> bool:
+    film = contacts.trial.film[c]
+    return film < 0.0 and film <= -contacts.rows.suction[c]
+
+
+@phase
+def keep_dissipation(contacts: Any) -> None:
+    """Keep what the first solution of a step may change."""
+    for c in range(contacts.rows.interfaces):
+        contacts.trial.chi[c] = contacts.state.chi[c]
+
+
+@phase
+def begin_cut_contacts(contacts: Any) -> None:
+    """Begin a step once more."""
+    for c in range(contacts.rows.interfaces):
+        contacts.state.chi[c] = contacts.trial.chi[c]
+        contacts.trial.force[c] = contacts.state.force[c]
 
 
 @phase
@@ -375,7 +402,7 @@ def end_interfaces(
     contacts: Any,
     S: Any,
     step: Step,
-    place: int,
+    first: bool,
     accounts: Any,
     recording: Recording,
     sums: Any,
@@ -383,7 +410,7 @@ def end_interfaces(
 ) -> None:
     """Take over gaps, forces and compressions of all interfaces, and record what acted.
 
-    ``place`` is that of the step in its macro step.
+    ``first`` is for the first step of a macro step.
     """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
@@ -399,13 +426,14 @@ def end_interfaces(
             sums[2 * c] += step.H * trial.contact[c]
             sums[2 * c + 1] += step.H * trial.film[c]
             peaks[c] = max(peaks[c], force)
-            if place == 0:
+            if first:
                 trial.first[c] = force
             trial.least[c] = min(trial.least[c], force)
             trial.most[c] = max(trial.most[c], force)
             felt = step.level != COARSE and abs(trial.film[c]) > rows.film_felt[c]
             if felt or was_closed or trial.contact[c] > 0.0:
                 _record_step(recording, c, step, trial.contact[c], trial.film[c], gap)
+        state.pulled[c] = 1.0 if _pulls(contacts, c) else 0.0
         state.rate[c] = (gap - state.gap[c]) * step.rate
         state.gap[c] = gap
         if state.chi[c] != 0.0:

@@ -29,10 +29,12 @@ from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_in
 from klack.simulation.network_arrays import (
     ANSWER,
     COARSE,
+    CUT,
     EXCESS,
     FINE,
     MIDDLE,
     NEAR,
+    PARTS,
     PORTS,
     Accounts,
     Bodies,
@@ -47,6 +49,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_elements import end_elements, push_by_elements
 from klack.simulation.network_interfaces import (
+    begin_cut_contacts,
     begin_interfaces,
     begin_macro_interfaces,
     coarse_step_holds,
@@ -55,6 +58,7 @@ from klack.simulation.network_interfaces import (
     end_interfaces,
     end_macro_interfaces,
     far_ones_stay,
+    keep_dissipation,
     level_of_step,
     none_far,
     push_by_guess,
@@ -63,6 +67,7 @@ from klack.simulation.network_interfaces import (
     take_back_interfaces,
 )
 from klack.simulation.network_ports import (
+    begin_cut,
     begin_macro_step,
     begin_ports,
     bring,
@@ -72,6 +77,7 @@ from klack.simulation.network_ports import (
     finite,
     guess_answer,
     guess_forces,
+    keep_for_cut,
     keep_modes,
     largest_missed,
     matters,
@@ -114,7 +120,7 @@ ones among them, repeats."""
 _SETTLED = 5e-5  # displacement by what the guess missed over the longest way of a port, fine steps
 _SETTLED_MACRO = 1e-3  # the same of macro steps
 _ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
-_ENERGY_MACRO = 5e-9  # the same of macro steps
+_ENERGY_MACRO = 3e-7  # the same of macro steps
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
 _FEW_REPEATS = 8  # are enough, unless what still changes is round-off
 _MOST_REPEATS = 200
@@ -358,30 +364,50 @@ def _act(sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any)
         settle in a fine step.
     """
     bodies, contacts = loop.bodies, loop.contacts
-    G = shift(bodies.G, sub.level * PORTS * PORTS)
-    for place in range(parts):
-        now = Step(sub.level, sub.steps, sub.t + place * sub.H, sub.H, sub.rate)
+    done, cut = 0, 0
+    while done < parts:
+        now = Step(sub.level, sub.steps, sub.t + done * sub.H, sub.H, sub.rate)
+        if cut > 0:
+            H = sub.H / PARTS
+            now = Step(CUT, 0, now.t + (PARTS - cut) * H, H, sub.rate * PARTS)
+        elif move:
+            keep_dissipation(contacts)
+            if now.level == FINE and parts > 1:
+                keep_for_cut(bodies)
+        G = shift(bodies.G, now.level * PORTS * PORTS)
         if move:
-            move_free(bodies, sub.level)
+            move_free(bodies, now.level)
         push_by_guess(contacts, bodies)
         move_ports_by_guess(bodies, G)
         if not solve_interfaces(contacts, bodies, G, now):
             return STATUS_FORCES if fine else STATUS_REFUSED
         if flight and not coarse_step_holds(contacts):
             return STATUS_MET
-        if sub.level == MIDDLE and not contacts_hold(contacts):
-            return STATUS_MET
+        if parts > 1 and cut == 0 and not contacts_hold(contacts):
+            if now.level == MIDDLE:
+                return STATUS_MET
+            begin_cut(bodies)
+            begin_cut_contacts(contacts)
+            cut = PARTS
+            continue
         end_interfaces(
             contacts,
             bodies.at,
             now,
-            place,
+            done == 0 and (cut == 0 or cut == PARTS),
             loop.accounts,
             loop.recording,
             _interface_sums(loop),
             loop.peaks,
         )
         end_sub_step(bodies)
+        if cut == 0:
+            done += 1
+        else:
+            cut -= 1
+            if cut == 0:
+                bring(bodies, CUT, FINE)
+                done += 1
     if sub.level == MIDDLE and not far_ones_stay(contacts, bodies.at):
         return STATUS_MET
     return STATUS_DONE

@@ -15,6 +15,7 @@ from klack.simulation.network_arrays import (
     BEGIN,
     EXCESS,
     COARSE,
+    CUT,
     FINE,
     FORCE,
     FREE,
@@ -32,6 +33,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.phase import phase
 
 __all__ = [
+    "begin_cut",
     "begin_macro_step",
     "begin_ports",
     "bring",
@@ -41,6 +43,7 @@ __all__ = [
     "finite",
     "guess_answer",
     "guess_forces",
+    "keep_for_cut",
     "keep_modes",
     "largest_missed",
     "matters",
@@ -111,6 +114,24 @@ def keep_modes(bodies: Any, level: int) -> None:
 @phase
 def _kept_at(level: int) -> int:
     return FINE if level == COARSE else COARSE
+
+
+@phase
+def keep_for_cut(bodies: Any) -> None:
+    """Keep the state of the modes where a fine step begins, for the parts it may be cut into."""
+    _copy_state(bodies, FINE, CUT)
+
+
+@phase
+def begin_cut(bodies: Any) -> None:
+    """Begin a fine step once more, in parts, with the forces that were pending."""
+    S = bodies.at
+    for k in range(bodies.blocks):
+        block, of_fine = _block(bodies, k, CUT), _block(bodies, k, FINE)
+        port0, port1 = bodies.port0[k], bodies.port1[k]
+        kick(block, of_fine, bodies.modes[k], shift(S, PENDING), port0, port1)
+    for i in range(row_length(bodies)):
+        S[PENDING + i] = 0.0
 
 
 @phase

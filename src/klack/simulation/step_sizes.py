@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from klack.simulation.network_arrays import PARTS
+
 __all__ = ["StepSizes"]
 
 
@@ -27,7 +29,7 @@ class StepSizes:
     middle: int
 
     @property
-    def seconds(self) -> tuple[float, float, float, float]:
+    def seconds(self) -> tuple[float, ...]:
         """Lengths [s] in the order of the sizes of the time loop."""
-        many = (1, self.coarse, self.near, self.middle)
-        return (self.step, *(count * self.step for count in many[1:]))  # type: ignore[return-value]
+        whole = (1, self.coarse, self.near, self.middle)
+        return (*(count * self.step for count in whole), self.step / PARTS)
