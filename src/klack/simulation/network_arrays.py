@@ -171,6 +171,7 @@ class NodeState(NamedTuple):
     p: Vector
     before: Vector
     g: Vector
+    rate: Vector  # at which flows balance the pressure of a volume [1/s]
     hint: Index
 
 
@@ -243,10 +244,14 @@ class NetworkArrays(NamedTuple):
 class NodeTrial(NamedTuple):
     """Nodes in the step that is tried."""
 
-    rho: Vector
-    slope: Vector  # of the density over the pressure
+    rho: Vector  # what flows and walls feel in the step, between both ends
     g: Vector
     p: Vector
+    theta: Vector  # share of the end in it
+    rho_end: Vector
+    g_end: Vector
+    end: Vector  # pressure at the end
+    slope: Vector  # of the density over the pressure there
     p_used: Vector  # pressure and volume that the compliance of the walls counts from
     V: Vector
     V_used: Vector
@@ -256,6 +261,8 @@ class NodeTrial(NamedTuple):
     lower: Vector  # interval that holds the density
     upper: Vector
     own: Vector
+    stored: Vector  # of ``own``: in the volume itself
+    balanced: Vector  # what the pressure changes in flows
     matrix: Vector
 
 

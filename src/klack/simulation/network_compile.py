@@ -388,7 +388,15 @@ def _nodes(
         end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
     )
     mass = volume * rho[:volumes]
-    state = NodeState(mass=mass, held=volume.copy(), p=p, before=p.copy(), g=g, hint=hint)
+    state = NodeState(
+        mass=mass,
+        held=volume.copy(),
+        p=p,
+        before=p.copy(),
+        g=g,
+        rate=np.full(count, np.inf),
+        hint=hint,
+    )
     return nodes, state
 
 

@@ -212,7 +212,7 @@ def run_network(
             if not straight:
                 respace_forces(bodies, steps / last_steps)
             guess_forces(bodies)
-            guess_pressures(loop.fluid, step.t + step.H, straight)
+            guess_pressures(loop.fluid, step.t + step.H, step.H, straight)
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
             status = _settle(step, sub, parts, flight, loop, first(clock), first(report))
@@ -425,7 +425,7 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         end_ends(fluid, H)
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
-        end_nodes(fluid, accounts)
+        end_nodes(fluid, H, accounts)
     repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
     catch_up(bodies, level, step.level, parts == 1)
     bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, H)
