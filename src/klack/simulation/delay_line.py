@@ -62,6 +62,8 @@ LINE_MEMORY = ("samples", "head", "memory", "cavity")
 """Arrays of :class:`LineState` that one step hands on to the next."""
 
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over friction terms use registers
+_ROOM = 8  # windows of samples under way that a memory has room for
+_MOST_ROOM = 20_000  # samples, unless the window itself is longer
 _A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as whole
 
 
@@ -94,7 +96,10 @@ class Lines(NamedTuple):
         Rest of the delay, in steps.
     start : array of int, shape (s, 2)
         Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
-        twice as long as needed, the window of samples under way moves up, then back to its start.
+        several times as long as needed, the window of samples under way moves up, then back to its
+        start.
+    room : array of int, shape (s,)
+        Samples that this window may move up.
     first_term : array of int, shape (n + 1,)
         Terms of frequency-dependent friction of each line.
     first_memory : array of int, shape (n,)
@@ -122,6 +127,7 @@ class Lines(NamedTuple):
     depth: Integers
     fraction: Vector
     start: Integers
+    room: Integers
     first_term: Integers
     first_memory: Integers
     impedance_of_term: Matrix
@@ -192,7 +198,8 @@ def compile_lines(
             whole.append(int(steps))
             fraction.append(steps - int(steps))
     depth = np.array(whole, dtype=np.int64) + 1
-    start = _offsets(np.repeat(2 * depth + coarse, 2))
+    room = np.minimum(_ROOM * depth, np.maximum(depth, _MOST_ROOM))
+    start = _offsets(np.repeat(depth + room + coarse, 2))
     segments = np.array([row.segments for row in rows], dtype=np.int64)
     terms = np.array([len(row.unsteady_gain) for row in rows], dtype=np.int64)
     memories = terms * (segments + 1)
@@ -217,6 +224,7 @@ def compile_lines(
         depth=depth,
         fraction=np.array(fraction, dtype=float),
         start=np.ascontiguousarray(start[:-1].reshape(-1, 2)),
+        room=room,
         first_term=_offsets(terms),
         first_memory=_offsets(memories)[:-1],
         impedance_of_term=impedance_of_term,
@@ -321,6 +329,37 @@ def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
     return total
 
 
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _mean_of(window: Any, m: int, f: float) -> tuple[float, float]:
+    """Mean of ``m`` interpolated samples, and the sum of squares that reading it so takes; pointer.
+
+    The sums count from one of the samples, so that small differences keep their digits.
+    """
+    base = window[1]
+    total, spread, jumps = 0.0, 0.0, 0.0
+    for i in range(m):
+        x = window[i + 1]
+        jump = window[i] - x
+        y = x - base + f * jump
+        total += y
+        spread += y * y
+        jumps += jump * jump
+    mean = total / m
+    return base + mean, f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(window: Any, m: int, value: float) -> None:
+    for i in range(m):
+        window[i] = value
+
+
+@njit(cache=True, error_model="numpy")
+def _move_back(window: Any, by: int, count: int) -> None:
+    for i in range(count):
+        window[i] = window[i + by]
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _level(lines: Lines, m: int) -> int:
     if m == 1:
@@ -357,20 +396,10 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
                     state.incoming[s, wave] = x + f * (before - x)
                     lost += f * (1.0 - f) * (x - before) ** 2
                 else:
-                    # sums about one of the samples; not a function of its own, since numba then
-                    # counts references to every array in each call, ten times the work itself
-                    base = state.samples[oldest + 1]
-                    total, spread, jumps = 0.0, 0.0, 0.0
-                    for i in range(oldest, oldest + m):
-                        x = state.samples[i + 1]
-                        jump = state.samples[i] - x
-                        y = x - base + f * jump
-                        total += y
-                        spread += y * y
-                        jumps += jump * jump
-                    mean = total / m
-                    state.incoming[s, wave] = base + mean
-                    lost += f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
+                    window = shift(first(state.samples), oldest)
+                    mean, spread = _mean_of(window, m, f)
+                    state.incoming[s, wave] = mean
+                    lost += spread
         impedance = lines.impedance[line]
         state.scatter[line] = lines.step / (4.0 * impedance) * lost
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
@@ -423,8 +452,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         for s in range(s0, s1):
             depth, head = lines.depth[s], state.head[s]
             newest = lines.start[s, 0] + head + depth
-            for i in range(newest, newest + m):
-                state.samples[i] = out
+            _fill(shift(first(state.samples), newest), m, out)
             if s + 1 == s1:
                 back = state.incoming[s, 0] + 2.0 * Z * q_b
             else:
@@ -446,14 +474,12 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
                 back = left - 2.0 * Z * (Q + dQ)
                 out = right + 2.0 * Z * (Q - dQ)
             newest = lines.start[s, 1] + head + depth
-            for i in range(newest, newest + m):
-                state.samples[i] = back
+            _fill(shift(first(state.samples), newest), m, back)
             state.head[s] = head + m
-            if head + m > depth:
+            if head + m > lines.room[s]:
                 for wave in range(2):
-                    start = lines.start[s, wave]
-                    for i in range(start, start + depth):
-                        state.samples[i] = state.samples[i + head + m]
+                    window = shift(first(state.samples), lines.start[s, wave])
+                    _move_back(window, head + m, depth)
                 state.head[s] = 0
         books[line, 0] += heat
         books[line, 1] += state.scatter[line]

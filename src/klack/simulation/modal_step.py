@@ -38,6 +38,7 @@ __all__ = [
     "ROW_V",
     "advance",
     "apply_forces",
+    "copy_state",
     "kick",
     "watch",
 ]
@@ -192,6 +193,15 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
         _advance_forced(W, n)
         for p in range(port0, port1):
             y[p] += watch(W, n, 0, _R + p - port0)
+
+
+@njit(cache=True, fastmath=FAST)
+def copy_state(source: Any, target: Any, n: int) -> None:
+    """Copy the state of ``n`` modes from one block to another."""
+    for i in range(n):
+        target[i] = source[i]
+    for i in range(_N, _N + n):
+        target[i] = source[i]
 
 
 @njit(cache=True, fastmath=FAST)

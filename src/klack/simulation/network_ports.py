@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from klack.network.step_function import shift
-from klack.simulation.modal_step import ROW, advance, apply_forces, kick
+from klack.simulation.modal_step import advance, apply_forces, copy_state, kick
 from klack.simulation.network_arrays import (
     AHEAD,
     ANSWER,
@@ -85,9 +85,7 @@ def _block(bodies: Any, k: int, level: int) -> Any:
 def _copy_state(bodies: Any, source: int, target: int) -> None:
     for k in range(bodies.blocks):
         a, b = _block(bodies, k, source), _block(bodies, k, target)
-        for i in range(bodies.modes[k]):
-            b[i] = a[i]
-            b[ROW + i] = a[ROW + i]
+        copy_state(a, b, bodies.modes[k])
 
 
 @phase
