@@ -17,6 +17,7 @@ from klack.case.noise import CaseNoise
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.network.declaration import NetworkSection
+from klack.simulation.step_sizes import Accuracy, fine_step
 from klack.units import Force, Length, Speed, Time, format_si
 
 __all__ = [
@@ -90,9 +91,19 @@ class StrokeRun(Section):
     duration: Time = Field(
         examples=["5 ms"], gt=0, description="Time to compute, from the start of the drivers."
     )
-    step: Time = Field(default=20e-9, gt=0, description="Fine time step.")
-    coarse: Count = Field(
-        default=16, le=256, description="Fine steps in a coarse one, taken far from the stops."
+    accuracy: Accuracy = Field(
+        default="normal",
+        description="normal: first impacts to 0.05 % and 0.05 us, in steps of 20 ns and, where "
+        "they are enough, longer ones; fine: steps a quarter to half as long.",
+    )
+    step: Time | None = Field(
+        default=None, gt=0, description="Fine time step, in place of that of the accuracy."
+    )
+    coarse: Count | None = Field(
+        default=None,
+        le=256,
+        description="Fine steps in a macro step, taken far from the stops; 1 for none; by default "
+        "as many as the accuracy and the parts of the network allow.",
     )
     record: Time = Field(default=1e-6, gt=0, description="Spacing of the recorded channels.")
     variants: tuple[Variant, ...] = Field(
@@ -110,7 +121,7 @@ class StrokeRun(Section):
     @model_validator(mode="after")
     def _sizes(self) -> Self:
         for key, spacing, most, what in (
-            ("step", self.step, _MOST_STEPS, "steps"),
+            ("step", self.fine_step, _MOST_STEPS, "steps"),
             ("record", self.record, _MOST_RECORDS, "records"),
         ):
             if not 10 * spacing <= self.duration <= most * spacing:
@@ -121,6 +132,11 @@ class StrokeRun(Section):
                     hint="strokes of small valves last 2 to 20 ms; a step of 20 ns is usual.",
                 )
         return self
+
+    @property
+    def fine_step(self) -> float:
+        """Fine time step [s]."""
+        return fine_step(self.accuracy, self.step)
 
 
 class ValveSections(CaseFile):

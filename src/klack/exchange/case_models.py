@@ -165,7 +165,7 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
         contact_names=names,
         films=films,
         speed=0.0,
-        step=case.run.step,
+        step=case.run.fine_step,
         duration=case.run.duration,
         provenance=provenance,
     )
@@ -173,7 +173,7 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
         bodies=tuple(valve.reduced.values()),
         pair=pair,
         provenance=provenance,
-        step=case.run.step,
+        step=case.run.fine_step,
     )
 
 

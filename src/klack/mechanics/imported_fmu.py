@@ -167,6 +167,7 @@ class ImportedFmu(Component):
             state=(0.0,) * STATES,
             books=(Book("work", "supply"), Book("coupling error", "loss")),
             channels=(Channel("force of the FMU", "N", 3, derived=True),),
+            interval=self.coupling_step,
         )
 
 

@@ -104,7 +104,8 @@ class ElementRow:
 
     ``names`` are what the component calls its ports.  ``at_rest`` gives the first states that the
     element has at the start once its ports rest at given displacements [m]; without it the states
-    at the start are ``state`` wherever the ports are.
+    at the start are ``state`` wherever the ports are.  ``interval`` [s] is that of its exchange
+    with something outside: no step is longer.
     """
 
     component: str
@@ -118,6 +119,7 @@ class ElementRow:
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    interval: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -354,6 +356,7 @@ class Rows:
         failures: Mapping[int, str] | None = None,
         label: str = "",
         at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        interval: float | None = None,
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
         self.elements.append(
@@ -369,6 +372,7 @@ class Rows:
                 channels=tuple(channels),
                 failures=failures or {},
                 at_rest=at_rest,
+                interval=interval,
             )
         )
 

@@ -14,14 +14,15 @@ __all__ = [
     "BEFORE_2",
     "BEFORE_3",
     "BEGIN",
-    "EXCESS",
     "COARSE",
     "CUT",
+    "EXCESS",
     "FINE",
     "FORCE",
     "FREE",
     "GUESS",
     "KEPT",
+    "LAST",
     "LOSS",
     "MIDDLE",
     "MISSED",
@@ -87,7 +88,7 @@ FORCE = 4 * PORTS  # forces of this step
 PENDING = 5 * PORTS  # ... of the last step, not yet in the modes
 WORK = 6 * PORTS  # work done by the forces so far
 ANSWER = 7 * PORTS  # forces of elements and fluid in this macro step
-BEFORE = 8 * PORTS  # ... in the last three
+BEFORE = 8 * PORTS  # ... in the last three, as if these had been as long as this one
 BEFORE_2 = 9 * PORTS
 BEFORE_3 = 10 * PORTS
 GUESS = 11 * PORTS  # ... as the bodies feel them before elements and fluid are asked
@@ -97,7 +98,8 @@ BEGIN = 14 * PORTS  # displacements at the start of the macro step
 WORK_BEGIN = 15 * PORTS
 PENDING_BEGIN = 16 * PORTS
 EXCESS = 17 * PORTS  # one number: energy [J] that bodies got beyond what was given to them
-ROWS_AT = 18
+LAST = 18 * PORTS  # forces of elements and fluid in the last macro step
+ROWS_AT = 19
 
 
 class Bodies(NamedTuple):
@@ -312,13 +314,12 @@ class Scratch(NamedTuple):
 def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
     """Memory for a network of these sizes."""
     vectors = np.zeros((len(NodeTrial._fields) - 1, nodes))
+    of_interfaces = [*np.zeros((len(InterfaceTrial._fields) - 1, interfaces))]
+    of_interfaces.append(np.zeros(KEPT * interfaces))
     return Scratch(
         nodes=NodeTrial(*[*vectors, np.zeros(nodes * nodes)]),
         flows=FlowTrial(*np.zeros((3, branches)), *np.zeros((3, ends))),
-        interfaces=InterfaceTrial(
-            *np.zeros((len(InterfaceTrial._fields) - 1, interfaces)),
-            np.zeros(KEPT * interfaces),
-        ),
+        interfaces=InterfaceTrial(**dict(zip(InterfaceTrial._fields, of_interfaces, strict=True))),
         sums=np.zeros(sums),
         peaks=np.zeros(interfaces),
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
 from klack.simulation.network_arrays import (
-    BEFORE,
+    LAST,
     PORTS,
     SEEN,
     STORE,
@@ -37,7 +37,7 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     preloaded needle that is far more than what moves it.  Contacts and films, too.
     """
     at, rows, state = network.bodies.at, network.interfaces, network.interface_state
-    force, end, seen = (at[row : row + PORTS] for row in (BEFORE, Y0, SEEN))
+    force, end, seen = (at[row : row + PORTS] for row in (LAST, Y0, SEEN))
     unseen = np.asarray(force * (end - seen), dtype=float)
     ground = len(network.ports)
     for c in range(rows.interfaces):

@@ -61,11 +61,20 @@ _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay t
 _ROUND_OFF = 4e-16  # of a displacement
 _MOST_SWEEPS = 200
 _YOUNG = 0.5e-6  # [s] a contact just closed
-_FALLS = 1.5  # times the force at the end of the macro step: it had so much before, and releases soon
+_FALLS = (
+    1.5  # times the force at the end of the macro step: it had so much before, and releases soon
+)
+_SHAKEN = 0.01  # of the force of a contact at rest: its change in a macro step
 _SMOOTH = 0.05  # of a gap and its cut-off: way in a middle step that the film follows
 _FAR = 1e-4  # of a small film force, even if the gap closed at
 _FASTEST = 5.0  # [m/s]
 _NEAR = 0.5  # of the gap at the start: far ones do not come so near
+
+
+@phase
+def _steady(before: float, now: float) -> bool:
+    """Whether a contact at rest carries a force that macro steps follow."""
+    return abs(now - before) <= _SHAKEN * max(abs(now), abs(before))
 
 
 @phase
@@ -77,6 +86,8 @@ def level_of_step(contacts: Any, now: float, length: float) -> int:
         rate = abs(state.rate[c])
         if state.since[c] < np.inf:
             if now - state.since[c] < rows.rest[c]:
+                level = 0
+            if not _steady(state.force_before[c], state.force[c]):
                 level = 0
             continue
         x = state.gap[c] - 3.0 * rate * length
@@ -212,6 +223,8 @@ def coarse_step_holds(contacts: Any) -> bool:
         closed = state.since[c] < np.inf
         if closed != (trial.contact[c] > 0.0):
             holds = False
+        if closed and not _steady(state.force[c], trial.force[c]):
+            holds = False
         if abs(trial.film[c]) > 2.0 * rows.film_small[c]:
             holds = False
     return holds
@@ -315,7 +328,10 @@ def far_ones_stay(contacts: Any, S: Any) -> bool:
     """Whether interfaces that were left out are still far apart."""
     stay = True
     for c in range(contacts.rows.interfaces):
-        if contacts.trial.far[c] != 0.0 and _gap(contacts.rows, S, c) <= _NEAR * contacts.state.gap[c]:
+        if (
+            contacts.trial.far[c] != 0.0
+            and _gap(contacts.rows, S, c) <= _NEAR * contacts.state.gap[c]
+        ):
             stay = False
     return stay
 

@@ -114,11 +114,11 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 CLOCK = 8
-"""Time in fine steps, size of the last step; steps done: fine, coarse, of sub-steps; sub-steps, fine
-ones among them, repeats."""
+"""Time in fine steps, size of the last step, then
+:class:`klack.simulation.network_result.StepCounts`."""
 
 _SETTLED = 5e-5  # displacement by what the guess missed over the longest way of a port, fine steps
-_SETTLED_MACRO = 1e-3  # the same of macro steps
+_SETTLED_MACRO = 2e-4  # the same of macro steps
 _ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
 _ENERGY_MACRO = 3e-7  # the same of macro steps
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
@@ -163,8 +163,9 @@ def run_network(
 ) -> int:
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
-    ``near`` fine steps are a macro step about a touch, ``R`` of them a middle one.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row
-    of a failure, its status and its time.
+    ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while contact
+    forces are smooth.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row of a failure,
+    its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
@@ -329,11 +330,13 @@ def _settle(
             )
             guess_answer(bodies)
             clock[7] += 1
-        status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop)
+        status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop, report)
         if status == STATUS_DONE:
             status = _push_by_rows(step, bodies, loop.elements, loop.fluid, report)
         if status != STATUS_DONE:
-            report[0], report[2] = (0.0, step.t) if status == STATUS_FORCES else (report[0], report[2])
+            report[0], report[2] = (
+                (0.0, step.t) if status == STATUS_FORCES else (report[0], report[2])
+            )
             return status
         miss(bodies, G)
         left, work = cost_of_catching_up(contacts, bodies.at)
@@ -354,7 +357,9 @@ def _settle(
 
 
 @unfolded
-def _act(sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any) -> int:
+def _act(
+    sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any, report: Any
+) -> int:
     """Modes, contacts and films over one step, or over all sub-steps of a macro step.
 
     Returns
@@ -380,6 +385,7 @@ def _act(sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any)
         push_by_guess(contacts, bodies)
         move_ports_by_guess(bodies, G)
         if not solve_interfaces(contacts, bodies, G, now):
+            report[0], report[2] = 0.0, now.t
             return STATUS_FORCES if fine else STATUS_REFUSED
         if flight and not coarse_step_holds(contacts):
             return STATUS_MET

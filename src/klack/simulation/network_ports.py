@@ -13,13 +13,14 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     BEGIN,
-    EXCESS,
     COARSE,
     CUT,
+    EXCESS,
     FINE,
     FORCE,
     FREE,
     GUESS,
+    LAST,
     MISSED,
     PENDING,
     PENDING_BEGIN,
@@ -50,14 +51,14 @@ __all__ = [
     "miss",
     "move_free",
     "move_ports_by_guess",
-    "respace_forces",
     "repay",
+    "respace_forces",
     "row_length",
     "take_back_ports",
 ]
 
 _LONGER = 4.0  # times the steps before
-_OWED = 1e-6  # of the largest force of elements and fluid: most that repays
+_OWED = 1e-4  # of the largest force of elements and fluid: most that repays
 _UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
 _ROUND_OFF = 4e-16  # of the displacements themselves
 
@@ -94,9 +95,7 @@ def bring(bodies: Any, source: int, target: int) -> None:
     S = bodies.at
     for k in range(bodies.blocks):
         block = _block(bodies, k, source)
-        apply_forces(
-            block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k]
-        )
+        apply_forces(block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k])
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
     if target != source:
@@ -248,9 +247,7 @@ def miss(bodies: Any, G: Any) -> None:
 
 
 @phase
-def matters(
-    bodies: Any, level: int, share: float, energy: float, left: float, work: float
-) -> bool:
+def matters(bodies: Any, level: int, share: float, energy: float, left: float, work: float) -> bool:
     """Whether what the guess missed matters: then the step is repeated with a better one.
 
     ``left`` and ``work`` are what the interfaces add to both sums.  Elements and fluid live
@@ -264,7 +261,7 @@ def matters(
         here = abs(S[Y1 + p] - S[BEGIN + p])
         way = max(way, here)
         moved = max(moved, d)
-        left += abs(force - S[BEFORE + p]) * d
+        left += abs(force - S[LAST + p]) * d
         work += abs(force) * here
     if moved <= share * way and left <= energy * work and work < np.inf:
         return False
@@ -353,7 +350,7 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
             S[WORK + p] += S[GUESS + p] * way
             excess -= S[MISSED + p] * (way + d) + S[FORCE + p] * d
     for p in range(bodies.ports):
-        excess += (S[BEFORE + p] - S[ANSWER + p]) * (S[BEGIN + p] - S[SEEN + p])
+        excess += (S[LAST + p] - S[ANSWER + p]) * (S[BEGIN + p] - S[SEEN + p])
         S[SEEN + p] = S[Y1 + p]
         S[Y1 + p] += S[AHEAD + p]
     S[EXCESS] += excess
@@ -367,4 +364,4 @@ def end_ports(bodies: Any) -> None:
         S[Y0 + i] = S[Y1 + i]
         S[BEFORE_3 + i] = S[BEFORE_2 + i]
         S[BEFORE_2 + i] = S[BEFORE + i]
-        S[BEFORE + i] = S[ANSWER + i]
+        S[BEFORE + i] = S[LAST + i] = S[ANSWER + i]

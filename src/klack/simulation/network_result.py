@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
+from klack.simulation.step_sizes import StepSizes
 
 __all__ = [
     "ChannelData",
@@ -16,6 +17,7 @@ __all__ = [
     "InterfaceRecord",
     "NetworkResult",
     "StaticStart",
+    "StepCounts",
 ]
 
 BODY_STORE = "kinetic and strain"  # what a body holds; its component stands before it
@@ -192,6 +194,34 @@ class StaticStart:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class StepCounts:
+    """Steps of a run.
+
+    Parameters
+    ----------
+    fine : int
+        Fine steps that bodies, elements and fluid took together.
+    flight : int
+        Macro steps in flight or at rest.
+    near : int
+        Macro steps about a touch, in sub-steps of the bodies.
+    sub : int
+        These sub-steps.
+    sub_fine : int
+        Those of them that were fine ones.
+    repeats : int
+        Steps done again, since their guess of the forces of elements and fluid had missed too much.
+    """
+
+    fine: int = 0
+    flight: int = 0
+    near: int = 0
+    sub: int = 0
+    sub_fine: int = 0
+    repeats: int = 0
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:
     """Everything that a run of a network leaves behind.
@@ -209,9 +239,10 @@ class NetworkResult:
     events : tuple of ImpactEvent
         In order of time.
     books : EnergyBooks
-    step : float [s]
-        Fine step.
-    fine_steps, coarse_steps : int
+    sizes : StepSizes
+        Lengths of the steps.
+    steps : StepCounts
+        How many of them.
     wall_time : float [s]
         Of the time loop.
     state : mapping of str to array
@@ -228,13 +259,27 @@ class NetworkResult:
     interfaces: Mapping[str, InterfaceRecord]
     events: tuple[ImpactEvent, ...]
     books: EnergyBooks
-    step: float
-    fine_steps: int
-    coarse_steps: int
+    sizes: StepSizes
+    steps: StepCounts
     wall_time: float
     state: Mapping[str, NDArray[np.generic]]
     failure: str = ""
     start: StaticStart | None = None
+
+    @property
+    def step(self) -> float:
+        """Fine step [s]."""
+        return self.sizes.step
+
+    @property
+    def fine_steps(self) -> int:
+        """Fine steps of the bodies, with elements and fluid or without."""
+        return self.steps.fine + self.steps.sub_fine
+
+    @property
+    def coarse_steps(self) -> int:
+        """Macro steps: those after which elements and fluid answer once."""
+        return self.steps.flight + self.steps.near
 
 
 class IncompleteRunError(ConvergenceError):

@@ -34,10 +34,10 @@ from klack.simulation.network_compile import (
 from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
 from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder
-from klack.simulation.network_result import IncompleteRunError, NetworkResult
+from klack.simulation.network_result import IncompleteRunError, NetworkResult, StepCounts
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
-from klack.simulation.step_sizes import StepSizes
+from klack.simulation.step_sizes import Accuracy, StepSizes, step_sizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -53,7 +53,7 @@ State = Mapping[str, NDArray[np.generic]]
 Changing = NDArray[np.generic]
 Kept = Sequence[tuple[Changing, Changing]]
 
-_BLOCK = 16  # most fine steps between two looks at the record, without coarse steps
+_BLOCK = 16  # most fine steps between two looks at the record, without macro steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
 _CHUNK = 250_000  # fine steps of a chunk: about 0.1 s
 _PYTHON_CHUNK = 2_500  # the same with step functions in Python, some of which cannot step back
@@ -64,8 +64,9 @@ def simulate_network(
     rows: Rows,
     *,
     duration: float,
-    step: float = 20e-9,
-    coarse: int = 16,
+    accuracy: Accuracy = "normal",
+    step: float | None = None,
+    coarse: int | None = None,
     record: float = 0.5e-6,
     start: Literal["rest", "free"] = "rest",
     state: State | None = None,
@@ -79,13 +80,18 @@ def simulate_network(
         From :meth:`klack.network.network.Network.rows`.
     duration : float [s]
         Rounded up to whole records.
-    step : float [s]
-        Fine step: 20 ns resolves first impacts to 0.1 %, 50 ns is enough for sweeps.
-    coarse : int
-        Fine steps of a coarse step, taken while nothing touches; 1 switches them off.
+    accuracy : "normal" or "fine"
+        Chooses the steps.  ``"normal"``: first impacts to 0.05 % and 0.05 us; ``"fine"`` takes
+        about four times as long.
+    step : float [s], optional
+        Fine step, in place of that of the accuracy (20 ns or 5 ns).
+    coarse : int, optional
+        Fine steps of a macro step in flight, in place of what
+        :func:`klack.simulation.step_sizes.step_sizes` chooses; 1 switches macro steps off: bodies,
+        elements and fluid take every fine step together.
     record : float [s]
-        Spacing of the records; rounded to whole coarse steps.  Impacts do not depend on it: they
-        are found during the run, at most 1.5 us (or a coarse step) apart.  The memory of a
+        Spacing of the records; rounded to whole macro steps.  Impacts do not depend on it: they
+        are found during the run, at most 1.5 us (or a macro step) apart.  The memory of a
         run is that of its records, eight bytes per channel, and 50 MB.
     start : "rest" or "free"
         ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
@@ -114,17 +120,12 @@ def simulate_network(
         (:mod:`klack.energy_balance`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):
-        require_positive(f"simulate_network: {name}", value, "s")
-    if coarse < 1:
-        raise InputError(
-            "simulate_network: coarse",
-            got=str(coarse),
-            expected="1 or more",
-            hint="1 switches coarse steps off, 16 is usual.",
-        )
-    sizes = _sizes(step, coarse)
+        if value is not None:
+            require_positive(f"simulate_network: {name}", value, "s")
+    sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
     network = compile_network(rows, sizes)
-    grid = _grid(duration, step, coarse, record)
+    grid = _grid(duration, sizes, record)
+    step = sizes.step
     chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
     recorder = Recorder(
         network,
@@ -140,7 +141,7 @@ def simulate_network(
         _restore(network, clock, state)
     elif start == "rest":
         begun = start_at_rest(network, step)
-    first_step, done_before = int(clock[0]), clock[2:4].copy()
+    first_step, done_before = int(clock[0]), clock[2:].copy()
     finder = ImpactFinder(rows, step * first_step)
     fresh = state is None or _IMPACTS not in state  # of an earlier version
     if state is not None and not fresh:
@@ -178,9 +179,8 @@ def simulate_network(
         interfaces=recorder.interfaces(),
         events=events,
         books=books,
-        step=step,
-        fine_steps=int(clock[2] - done_before[0]),
-        coarse_steps=int(clock[3] - done_before[1]),
+        sizes=sizes,
+        steps=StepCounts(*(int(count) for count in clock[2:] - done_before)),
         wall_time=wall_time,
         state=_save(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
         failure="" if failure is None else str(failure),
@@ -203,12 +203,16 @@ def simulate_network(
 class _Grid:
     """How fine steps make blocks, blocks looks, and looks records."""
 
-    step: float  # [s]
+    sizes: StepSizes
     block: int  # fine steps
     look: int  # blocks
     looks: int  # of a record
     records: int
-    coarse: bool
+
+    @property
+    def step(self) -> float:
+        """Fine step [s]."""
+        return self.sizes.step
 
     @property
     def look_steps(self) -> int:
@@ -216,28 +220,19 @@ class _Grid:
         return self.look * self.block
 
 
-def _grid(duration: float, step: float, coarse: int, record: float) -> _Grid:
-    block = coarse
-    if coarse == 1:  # no coarse steps: as many fine ones at a time as divide a record
+def _grid(duration: float, sizes: StepSizes, record: float) -> _Grid:
+    step, block = sizes.step, sizes.coarse
+    if block == 1:  # no macro steps: as many fine ones at a time as divide a record
         block = _largest_divisor(max(1, round(record / step)), _BLOCK)
     of_record = max(1, round(record / (block * step)))
     look = _largest_divisor(of_record, int(_LOOK / (block * step)))
     return _Grid(
-        step=step,
+        sizes=sizes,
         block=block,
         look=look,
         looks=of_record // look,
         records=max(1, int(np.ceil(duration / (of_record * block * step) - 1e-9))),
-        coarse=coarse > 1,
     )
-
-
-NEAR_MOST = 32
-
-
-def _sizes(step: float, coarse: int) -> StepSizes:
-    near = _largest_divisor(coarse, min(coarse, NEAR_MOST))
-    return StepSizes(step=step, coarse=coarse, near=near, middle=4 if near % 4 == 0 else 1)
 
 
 def _largest_divisor(number: int, most: int) -> int:
@@ -340,11 +335,8 @@ def _try_chunk(
             network,
             recorder.recording,
             clock,
+            grid,
             count * grid.look,
-            grid.look,
-            grid.step,
-            grid.block,
-            grid.coarse,
             report=report,
         )
     except ConvergenceError as error:
@@ -368,32 +360,27 @@ def _compile(
     network: CompiledNetwork, recording: Recording, clock: NDArray[np.int64], grid: _Grid
 ) -> None:
     """Compile the time loop, or load it, by a run of no steps: not a part of its wall time."""
-    _advance(
-        network, recording, clock, 0, 1, grid.step, grid.block, grid.coarse, report=np.zeros(3)
-    )
+    _advance(network, recording, clock, grid, 0, report=np.zeros(3))
 
 
 def _advance(
     network: CompiledNetwork,
     recording: Recording,
     clock: NDArray[np.int64],
+    grid: _Grid,
     macros: int,
-    per_record: int,
-    step: float,
-    block: int,
-    allow_coarse: bool,
     *,
     report: Vector,
 ) -> None:
     status = run_network(
         macros,
-        per_record,
+        grid.look,
         clock,
-        block,
-        _sizes(step, block).near,
-        _sizes(step, block).middle,
-        step,
-        allow_coarse,
+        grid.block,
+        grid.sizes.near,
+        grid.sizes.middle,
+        grid.step,
+        grid.sizes.coarse > 1,
         network.arrays,
         recording,
         _scratch(network, recording),

@@ -7,7 +7,7 @@ import numpy as np
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import BodyRow, InterfaceRow
 
-__all__ = ["effective_mass", "longest_period", "rest_time", "resting_dissipation"]
+__all__ = ["bounce_time", "effective_mass", "longest_period", "rest_time", "resting_dissipation"]
 
 _PERIODS = 3.0
 _BOUNCES = 4.0
@@ -37,12 +37,30 @@ def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
     """
     if row.law is None:
         return 0.0
-    mass = effective_mass(bodies)
-    bounce = 0.0
-    if np.isfinite(mass):
-        depth = _depth(row.law, 0.5 * mass * _SPEED**2)
-        bounce = np.hypot(3.0 * depth / _SPEED, np.pi * np.sqrt(mass * row.series_compliance))
+    bounce = bounce_time(row, bodies) if np.isfinite(effective_mass(bodies)) else 0.0
     return float(max(_PERIODS * longest_period(bodies), _BOUNCES * bounce))
+
+
+def bounce_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
+    """Time of contact in a bounce at 1 m/s [s]: see :func:`rest_time`.
+
+    Parameters
+    ----------
+    row : InterfaceRow
+        With a law.
+    bodies : sequence of BodyRow or None
+        Upper and lower one; None is the ground.
+
+    Returns
+    -------
+    float
+        Infinite where neither body can fly.
+    """
+    mass = effective_mass(bodies)
+    if row.law is None or not np.isfinite(mass):
+        return np.inf
+    depth = _depth(row.law, 0.5 * mass * _SPEED**2)
+    return float(np.hypot(3.0 * depth / _SPEED, np.pi * np.sqrt(mass * row.series_compliance)))
 
 
 def resting_dissipation(

@@ -43,6 +43,7 @@ from klack.simulation.network_arrays import (
     BEFORE,
     BEFORE_2,
     BEFORE_3,
+    LAST,
     SEEN,
     Y0,
 )
@@ -620,7 +621,7 @@ class _Balance:
         at, ports = bodies.at, self.ports
         for row in (Y0, SEEN):
             at[row : row + ports] = state.y[:-1]
-        for row in (BEFORE, BEFORE_2, BEFORE_3):
+        for row in (LAST, BEFORE, BEFORE_2, BEFORE_3):
             at[row : row + ports] = self.elements[:-1]
         begin, mode = 0, 0
         for b, body_row in enumerate(network.rows.bodies):

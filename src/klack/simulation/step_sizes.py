@@ -1,10 +1,28 @@
-"""Sizes of the steps of a network: from what bodies, contacts and lines follow."""
+"""Sizes of the steps of a network, from the accuracy that is wanted and what its parts allow."""
 
 from dataclasses import dataclass
+from math import inf
+from typing import Literal
 
+from klack.errors import InputError
+from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
+from klack.simulation.rest import bounce_time
 
-__all__ = ["StepSizes"]
+__all__ = ["ACCURACIES", "Accuracy", "StepSizes", "fine_step", "step_sizes"]
+
+Accuracy = Literal["normal", "fine"]
+
+ACCURACIES: dict[Accuracy, tuple[float, float]] = {
+    "normal": (20e-9, 0.64e-6),
+    "fine": (5e-9, 0.32e-6),
+}
+"""Fine step and macro step in flight [s]."""
+
+_MOST_COARSE = 256
+_MIDDLE = 4  # fine steps of a sub-step while contact forces are smooth
+_OF_BOUNCE = 0.01  # such a sub-step over the time of an impact: 4e-5 of the peak force
+_WHOLE = 1e-6  # of a step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,9 +32,9 @@ class StepSizes:
     Parameters
     ----------
     step : float [s]
-        Fine step, at first touch and release.
+        Fine step of bodies, contacts and films, about first touch and release.
     coarse : int
-        Fine steps of a macro step in flight; 1 for no macro steps.
+        Fine steps of a macro step in flight, after which elements and fluid answer; 1 for none.
     near : int
         Fine steps of a macro step about a touch; divides ``coarse``.
     middle : int
@@ -33,3 +51,87 @@ class StepSizes:
         """Lengths [s] in the order of the sizes of the time loop."""
         whole = (1, self.coarse, self.near, self.middle)
         return (*(count * self.step for count in whole), self.step / PARTS)
+
+
+def fine_step(accuracy: Accuracy, step: float | None = None) -> float:
+    """Fine step [s]: the one that is stated, or that of the accuracy."""
+    return ACCURACIES[accuracy][0] if step is None else step
+
+
+def step_sizes(
+    rows: Rows, accuracy: Accuracy, *, step: float | None = None, coarse: int | None = None
+) -> StepSizes:
+    """Choose the steps for a network.
+
+    Macro steps are as long as the accuracy has them, but no longer than any segment of a line, nor
+    than what the rows say of themselves; and a whole number of them makes the exchange interval of
+    a row that has one, if there is such a number.
+
+    Parameters
+    ----------
+    rows : Rows
+    accuracy : "normal" or "fine"
+    step : float [s], optional
+        Fine step, in place of that of the accuracy.
+    coarse : int, optional
+        Fine steps of a macro step in flight, in place of that of the accuracy.
+
+    Raises
+    ------
+    InputError
+        For an unknown accuracy, or fewer than one fine step in a macro step.
+    """
+    if accuracy not in ACCURACIES:
+        raise InputError(
+            "accuracy",
+            got=repr(accuracy),
+            expected="one of: " + ", ".join(ACCURACIES),
+            hint="normal is right for most; fine takes about four times as long.",
+        )
+    if coarse is not None and coarse < 1:
+        raise InputError(
+            "coarse",
+            got=str(coarse),
+            expected="1 or more",
+            hint="1 switches macro steps off; left out, klack chooses.",
+        )
+    h = fine_step(accuracy, step)
+    chosen = _chosen(rows, ACCURACIES[accuracy][1], h) if coarse is None else coarse
+    near = _largest_divisor(chosen, max(1, chosen // 2))
+    return StepSizes(step=h, coarse=chosen, near=near, middle=_middle(rows, h, near))
+
+
+def _chosen(rows: Rows, macro: float, h: float) -> int:
+    """Fine steps of a macro step: a power of two, unless an exchange interval asks for another."""
+    longest = min([macro, *(_segment(line) for line in rows.lines)])
+    intervals = [row.interval for row in rows.elements if row.interval is not None]
+    longest = min([longest, *intervals])
+    most = min(int(longest / h * (1.0 + _WHOLE)), _MOST_COARSE)
+    if most < 2:
+        return 1
+    for count in range(most, 1, -1):
+        if intervals and all(_is_whole(interval / (count * h)) for interval in intervals):
+            return count
+    return 1 << (most.bit_length() - 1)
+
+
+def _segment(line: LineRow) -> float:
+    return line.delay / line.segments
+
+
+def _is_whole(number: float) -> bool:
+    return abs(number - round(number)) <= _WHOLE * number
+
+
+def _middle(rows: Rows, h: float, near: int) -> int:
+    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    shortest = inf
+    for row in rows.interfaces:
+        if row.law is not None:
+            shortest = min(shortest, bounce_time(row, (owner.get(row.upper), owner.get(row.lower))))
+    most = min(_MIDDLE, near // 2, int(_OF_BOUNCE * min(shortest, 1.0) / h))
+    return _largest_divisor(near, max(1, most))
+
+
+def _largest_divisor(number: int, most: int) -> int:
+    return next((size for size in range(most, 1, -1) if number % size == 0), 1)

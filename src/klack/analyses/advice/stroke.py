@@ -233,7 +233,7 @@ def step_ladder(
         First impacts with the step of the case.
     measures : sequence of Measure
     """
-    step = valve.case.run.step
+    step = valve.case.run.fine_step
     runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in _NEAR]
     value = SettingValue(key=("run", "step"), value=step, unit="s")
     return Measured(

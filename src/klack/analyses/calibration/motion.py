@@ -109,8 +109,9 @@ class MotionModel:
         result = simulate_network(
             network.rows(),
             duration=duration,
-            step=run.step / _FINER,
-            coarse=min(run.coarse * _FINER, _MOST_COARSE),
+            accuracy=run.accuracy,
+            step=run.fine_step / _FINER,
+            coarse=None if run.coarse is None else min(run.coarse * _FINER, _MOST_COARSE),
             record=min(self.record, run.record),
         )
         names = {"opening": self.roles.opening_stop, "seat": self.roles.seat}

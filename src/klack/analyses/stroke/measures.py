@@ -7,6 +7,7 @@ from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.stroke.record import StrokeVariant
 from klack.report.wording import count
 from klack.simulation.network_result import ImpactEvent
+from klack.units import format_si
 
 __all__ = ["EVENT_MEASURES", "NOT_REACHED", "VARIANT_MEASURES", "real_time_factor"]
 
@@ -21,8 +22,15 @@ def real_time_factor(variant: StrokeVariant) -> float:
 
 
 def _steps(variant: StrokeVariant) -> str:
-    result = variant.result
-    return f"\n{count(result.fine_steps)} fine, {count(result.coarse_steps)} coarse"
+    done, sizes = variant.result.steps, variant.result.sizes
+    fine = format_si(sizes.step, "s", 3)
+    if sizes.coarse == 1:
+        return f"\n{count(done.fine)} of {fine}"
+    flight, near = (format_si(sizes.step * steps, "s", 3) for steps in (sizes.coarse, sizes.near))
+    return (
+        f"\n{count(done.flight)} of {flight}, {count(done.near)} of {near} about touches in "
+        f"{count(done.sub)} sub-steps, {count(done.fine)} of {fine}"
+    )
 
 
 EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
@@ -202,22 +210,22 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
     Measure(
         key="steps",
         symbol="n_t",
-        definition="Time steps of the run, fine and coarse ones.",
-        read=lambda variant: variant.result.fine_steps + variant.result.coarse_steps,
+        definition="Time steps of the run for elements and fluid, macro steps and fine ones.",
+        read=lambda variant: variant.result.coarse_steps + variant.result.steps.fine,
         column=Column("", 1.0, "d"),
         kind="whole",
     ),
     Measure(
         key="fine_steps",
         symbol="n_f",
-        definition="Fine time steps.",
+        definition="Fine time steps of the bodies.",
         read=lambda variant: variant.result.fine_steps,
         kind="whole",
     ),
     Measure(
         key="coarse_steps",
         symbol="n_c",
-        definition="Coarse time steps, in flight.",
+        definition="Macro steps: elements and fluid answer once in each.",
         read=lambda variant: variant.result.coarse_steps,
         kind="whole",
     ),

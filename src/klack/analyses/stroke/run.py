@@ -101,7 +101,7 @@ def run_stroke(
         lift=_lift(rows[0], roles.needle),
         switch_off=_switch_off(valve.network),
         duration=case.run.duration,
-        step=case.run.step,
+        step=case.run.fine_step,
         variants=results,
         channels=_channels(valve.network, roles, [run.result for run in results.values()]),
         bodies=_body_summaries(valve),
@@ -149,6 +149,7 @@ def run_variant(
     return simulate_network(
         rows,
         duration=case.run.duration,
+        accuracy=case.run.accuracy,
         step=case.run.step,
         coarse=case.run.coarse,
         record=case.run.record,
@@ -161,10 +162,10 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
     """State in which a variant of a former study ended; None to start from rest."""
     if after is None:
         return None
-    if after.step != case.run.step:  # the clock counts steps
+    if after.step != case.run.fine_step:  # the clock counts steps
         raise InputError(
             "step",
-            got=format_si(case.run.step, "s"),
+            got=format_si(case.run.fine_step, "s"),
             expected=f"{format_si(after.step, 's')}, the step of the result to continue from",
             hint="keep the step, or run from the start.",
         )
