@@ -1,6 +1,7 @@
 """The solenoid of a valve: coil, pole gaps, iron, leakage, eddy currents."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
@@ -163,20 +164,9 @@ class Solenoid(Component):
         )
 
     def _gap_law(self) -> GapReluctance:
-        """All poles in series, over the whole range of gaps; finest around the working gap."""
-
-        def reluctance(x: Any) -> tuple[Any, Any]:
-            parts = [pole.reluctance(x + self.residual_gap) for pole in self.poles]
-            return sum(R for R, _ in parts), sum(dR for _, dR in parts)
-
         known = self.gap_range()
         ends = (known.usable[0], 2.0 * self.gap + self.residual_gap, known.valid[1])
-        grids = [
-            hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
-            for start, end in pairwise(ends)
-            if end > start
-        ]
-        return GapReluctance.of(reluctance, np.unique(np.concatenate(grids)))
+        return _gap_law(self.poles, self.residual_gap, ends)
 
     def _remanence(self, gap: GapReluctance, parasitic: float) -> float:
         """Constant mmf [A] that drives the residual flux through the closed circuit."""
@@ -184,6 +174,27 @@ class Solenoid(Component):
         laws = [part.material.curve().law(part.length, part.area) for part in self.iron]
         iron = sum(float(law.mmf(flux, 0.0)) for law in laws)
         return (float(gap.reluctance_at(0.0)) + parasitic) * flux + iron
+
+
+@lru_cache(maxsize=100)
+def _gap_law(
+    poles: tuple[PoleGap, ...], residual_gap: float, ends: tuple[float, ...]
+) -> GapReluctance:
+    """All poles in series, over the whole range of gaps; finest around the working gap.
+
+    Kept, because strokes of one valve mostly differ in other numbers.
+    """
+
+    def reluctance(x: Any) -> tuple[Any, Any]:
+        parts = [pole.reluctance(x + residual_gap) for pole in poles]
+        return sum(R for R, _ in parts), sum(dR for _, dR in parts)
+
+    grids = [
+        hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
+        for start, end in pairwise(ends)
+        if end > start
+    ]
+    return GapReluctance.of(reluctance, np.unique(np.concatenate(grids)))
 
 
 def _add_ladders(
