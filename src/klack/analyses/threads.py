@@ -26,7 +26,8 @@ def on_threads(
     items: Sequence[Item],
     compute: Callable[[Item, Callable[[], None]], Result],
     threads: int,
-    done: Callable[[Item, Result], None],
+    keep: Callable[[Item, Result], None],
+    tell: Callable[[], None],
 ) -> None:
     """Compute something for every item on threads.
 
@@ -38,13 +39,15 @@ def on_threads(
         Gets an item and a function to call now and then, which raises :class:`Stopped` once the
         work has been given up.  Must not raise anything else.
     threads : int
-    done : callable
+    keep : callable
         Called in this thread with an item and its result, in the order of their end.
+    tell : callable
+        Called after it.
 
     Raises
     ------
     BaseException
-        Of ``done``, or Ctrl-C: after all threads have ended and ``done`` has got what they had
+        Of ``tell``, or Ctrl-C: after all threads have ended and ``keep`` has got what they had
         finished.
     """
     left, answers = iter(items), SimpleQueue[tuple[Item, Result]]()
@@ -72,27 +75,29 @@ def on_threads(
         for thread in crew:
             thread.start()
         while open_items and any(thread.is_alive() for thread in crew):
-            open_items -= _taken(answers, done, _LOOK)
+            if _taken(answers, keep, _LOOK):
+                open_items -= 1
+                tell()
     finally:
         stop.set()
         for thread in crew:
             if thread.ident is not None:
                 thread.join()
-        while _taken(answers, done, 0.0):
+        while _taken(answers, keep, 0.0):
             pass
 
 
 def _taken(
     answers: "SimpleQueue[tuple[Item, Result]]",
-    done: Callable[[Item, Result], None],
+    keep: Callable[[Item, Result], None],
     patience: float,
-) -> int:
+) -> bool:
     try:
         item, result = answers.get(timeout=patience) if patience else answers.get_nowait()
     except Empty:
-        return 0
-    done(item, result)
-    return 1
+        return False
+    keep(item, result)
+    return True
 
 
 @contextmanager

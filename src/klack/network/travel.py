@@ -89,12 +89,14 @@ class Travel:
         return self._of_a_chain(wanted) if found is None else found
 
     def _of_one_body(self, wanted: Mapping[str, float]) -> tuple[float, tuple[str, ...]] | None:
-        """Answer for one body between stops that do not move: the nearest stop.
+        """Answer for one body: the nearest of its stops if they do not move, infinity without any.
 
         None for several bodies, and where two stops are equally near.  The scaling is that of the
         linear programme, so that both give the same number.
         """
         ((body, factor), *others) = wanted.items()
+        if not others and all(body not in (bound.upper, bound.lower) for bound in self.bounds):
+            return inf, ()
         if others or any({bound.upper, bound.lower} != {body, None} for bound in self.bounds):
             return None
         gaps = [

@@ -30,13 +30,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
 from klack.network.rows import LimitRow
 from klack.network.travel import Travel
-from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
@@ -50,7 +48,8 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
-from klack.simulation.static_rows import at_rest, slopes_at_rest
+from klack.simulation.static_contacts import contacts_at_rest
+from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.units import format_si
 
 __all__ = ["start_at_rest"]
@@ -261,6 +260,12 @@ class _Balance:
                 self.column_line.append(k)
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
         self.friction = np.array(friction, dtype=float)
+        self.joined = [
+            (k, sign, int(j))
+            for k, pair in enumerate(ends)
+            for sign, i in zip((1.0, -1.0), pair, strict=True)
+            for j in np.flatnonzero(self.free == i)
+        ]
 
     def can_enclose(self, bodies: list[int]) -> bool:
         """Whether fluid in a volume may hold one of these bodies like a spring."""
@@ -400,11 +405,10 @@ class _Balance:
         """Force of every contact [N] and its change with the gap [N/m]."""
         interfaces = self.network.interfaces
         gap = interfaces.gap0 + y[interfaces.upper] - y[interfaces.lower]
-        kinds = zip(interfaces.kind, interfaces.law0, interfaces.series, gap, strict=True)
-        return [
-            _contact(int(kind), interfaces.law, int(first), float(series), float(g))
-            for kind, first, series, g in kinds
-        ]
+        forces, slopes = contacts_at_rest(
+            interfaces.kind, interfaces.law, interfaces.law0, interfaces.series, gap
+        )
+        return list(zip(forces.tolist(), slopes.tolist(), strict=True))
 
     def _in_range(self, y: Vector) -> bool:
         """Whether no armature is beyond its pole, and none far outside its map."""
@@ -432,6 +436,8 @@ class _Balance:
     def _slopes_of_kept_states(self, state: _State) -> None:
         """Repeat the slopes with those ports whose motion changes such a state."""
         elements = self.network.elements
+        if not self.kept:
+            return
         force, inflow = self.force.copy(), self.inflow.copy()
         for k, _ in self.kept:
             for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
@@ -442,8 +448,7 @@ class _Balance:
                 if self.answers(moved):
                     self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
                     self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
-        if self.kept:  # what the rows gave out last belongs to the state itself
-            self.answers(state)
+        self.answers(state)  # what the rows gave out last belongs to the state itself
 
     def _moved(self, state: _State, change: Vector) -> _State:
         n, r, f = self.ports, self.of_body.size, self.free.size
@@ -472,19 +477,19 @@ class _Balance:
         pressure the energy itself is small, its round-off is that of the pressure.
         """
         at_ends = state.p[self.ends]
-        fluid = np.array([self._fluid(p) for p in at_ends.ravel()]).reshape(-1, 2, 3)
+        fluid = self._fluid(at_ends.ravel()).reshape(-1, 2, 3)
         g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
         drop = self.friction * state.m
         return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
-    def _fluid(self, p: float) -> tuple[float, float, float]:
-        rho, slope, g, _ = fluid_at(self.network.nodes.fluid, p, 0)
-        return rho, slope, g
+    def _fluid(self, p: Vector) -> Matrix:
+        """Density, slope and pressure energy at each pressure, shape (n, 3)."""
+        return np.asarray(fluids_at(self.network.nodes.fluid, p))
 
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
         """Mass in each free volume [kg], its change with the pressure, and the density."""
         volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
-        fluid = np.array([self._fluid(state.p[i])[:2] for i in self.free]).reshape(-1, 2)
+        fluid = self._fluid(state.p[self.free])
         return volume * fluid[:, 0], volume * fluid[:, 1], fluid[:, 0]
 
     def volumes(self, y: Vector) -> Vector:
@@ -526,12 +531,10 @@ class _Balance:
                         A[n + r + j, port] += area * density[j]
         A[P, P] = np.diag(by_p) - through * flow_p
         left[P] = now - mass - through[:, 0] * self._net(state)
-        for k, pair in enumerate(self.ends):
-            for sign, i in zip((1.0, -1.0), pair, strict=True):
-                for j in np.flatnonzero(self.free == i):
-                    A[n + r + j, M.start + k] += sign * through[j, 0]
-                    A[M.start + k, n + r + j] -= sign / self._fluid(state.p[i])[0]
-            A[M.start + k, M.start + k] = self.friction[k]
+        for k, sign, at in self.joined:
+            A[n + r + at, M.start + k] += sign * through[at, 0]
+            A[M.start + k, n + r + at] -= sign / density[at]
+        A[M, M][np.diag_indices(c)] = self.friction
         left[M] = self._columns_left(state)[0]
         A *= self.units
         scale = np.max(np.abs(A), axis=1)
@@ -719,29 +722,6 @@ class _Balance:
                     "pressure; give its 'pressure' if that differs."
                 )
         return tuple(told)
-
-
-def _contact(kind: int, law: Vector, first: int, series: float, gap: float) -> tuple[float, float]:
-    """Force of a contact at rest [N] and its change with the gap [N/m]."""
-    if kind == NO_LAW or gap >= 0.0:
-        return 0.0, 0.0
-    low, high, d = 0.0, -gap, -gap
-    force = stiffness = 0.0
-    for _ in range(_MOST_NEWTON):
-        force, half, _interval = mean_force(kind, law, first, d, d, 0)
-        stiffness = 2.0 * half
-        excess = d + series * force + gap
-        if excess > 0.0:
-            high = d
-        else:
-            low = d
-        after = d - excess / (1.0 + series * stiffness)
-        if not low <= after <= high:
-            after = 0.5 * (low + high)
-        if after == d or series == 0.0:
-            break
-        d = after
-    return force, -stiffness / (1.0 + series * stiffness)
 
 
 def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:

@@ -73,9 +73,9 @@ def chosen_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
 
 
 def _chosen(name: object, stops: list[str]) -> ChosenMeasure:
-    if isinstance(name, str):
-        if name in _OF_VARIANTS:
-            return ChosenMeasure(name, _OF_VARIANTS[name])
+    if isinstance(name, str) and name in _OF_VARIANTS:
+        return ChosenMeasure(name, _OF_VARIANTS[name])
+    if isinstance(name, str) and "." in name:
         stop, *number, key = name.split(".")
         if stop in stops and key in _OF_IMPACTS and len(number) < 2:
             if not number:

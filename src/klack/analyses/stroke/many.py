@@ -232,10 +232,6 @@ def _run_group(
     def tell() -> None:
         progress(_STAGE, sum(row is not None for row in rows) / len(rows))
 
-    def done(i: int, row: _Row) -> None:
-        rows[i] = row
-        tell()
-
     tell()
     built = _build(asked, group, rows, progress)
     if built is None:
@@ -244,7 +240,9 @@ def _run_group(
     with warnings_of_threads() as taken:
         crew = _crew(asked, built, left, threads)
         taken()
-        on_threads(left, lambda i, check: _row(asked, built, i, check, taken), crew, done)
+        on_threads(
+            left, lambda i, check: _row(asked, built, i, check, taken), crew, rows.__setitem__, tell
+        )
 
 
 def _build(
