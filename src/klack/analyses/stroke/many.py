@@ -41,6 +41,7 @@ from klack.stages import FAILURES, collected_warnings, show
 __all__ = ["run_strokes"]
 
 _AROUND = 50e6  # [byte] of a run beside its records
+_FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
 _STAGE = "points"
 _ASIDE = ("run", "lumped", "measurement", "calibration", "title", "description")
 """Sections that bodies, contact laws and their stops do not depend on."""
@@ -348,9 +349,10 @@ def _crew(asked: _Asked, built: _Built, places: Sequence[int], threads: int | No
             return 1
         run = valve.case.run
         records = run.duration / run.record
+        steps = min(run.duration / run.step, _MOST_FINE) * len(rows.interfaces)
         require_memory(
             "run_many: threads",
-            crew * (8.0 * records * recorded_columns(rows) + _AROUND),
+            crew * (8.0 * records * recorded_columns(rows) + _FINE * steps + _AROUND),
             what=f"{crew} strokes at a time, each of {records:.4g} records of "
             f"{recorded_columns(rows)} channels,",
             hint="use fewer threads, a longer record interval (run.record), or a shorter duration.",
