@@ -104,34 +104,7 @@ class Solenoid(Component):
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
-        turns = float(self.turns)
-        gap = self._gap_law()
-        parasitic = sum(part.reluctance for part in self.parasitic)
-        leakage = self.leakage
-        if leakage is None:
-            leakage = self.leakage_share / (float(gap.reluctance_at(self.gap)) + parasitic)
-        branches = [
-            MagneticBranch(
-                name="gap", law=gap, turns=turns, remanence=self._remanence(gap, parasitic)
-            )
-        ]
-        if parasitic > 0.0:
-            branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
-        branches += [
-            MagneticBranch(
-                name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area)
-            )
-            for k, part in enumerate(self.iron)
-        ]
-        loops = [[1, 0] for _ in branches]
-        branches.append(
-            MagneticBranch(name="leakage", law=LinearReluctance(1.0 / leakage), turns=turns)
-        )
-        loops.append([0, 1])
-        _add_ladders(branches, loops, self.eddy)
-        width = max(len(row) for row in loops)
-        matrix = np.array([row + [0] * (width - len(row)) for row in loops])
-        return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
+        return _kept_circuit(self) if type(self) is Solenoid else _circuit(self)
 
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
@@ -174,6 +147,41 @@ class Solenoid(Component):
         laws = [part.material.curve().law(part.length, part.area) for part in self.iron]
         iron = sum(float(law.mmf(flux, 0.0)) for law in laws)
         return (float(gap.reluctance_at(0.0)) + parasitic) * flux + iron
+
+
+@lru_cache(maxsize=100)
+def _kept_circuit(solenoid: Solenoid) -> MagneticCircuit:
+    """Circuit that strokes of one valve share as long as they keep its solenoid."""
+    return _circuit(solenoid)
+
+
+def _circuit(solenoid: Solenoid) -> MagneticCircuit:
+    turns = float(solenoid.turns)
+    gap = solenoid._gap_law()
+    parasitic = sum(part.reluctance for part in solenoid.parasitic)
+    leakage = solenoid.leakage
+    if leakage is None:
+        leakage = solenoid.leakage_share / (float(gap.reluctance_at(solenoid.gap)) + parasitic)
+    branches = [
+        MagneticBranch(
+            name="gap", law=gap, turns=turns, remanence=solenoid._remanence(gap, parasitic)
+        )
+    ]
+    if parasitic > 0.0:
+        branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
+    branches += [
+        MagneticBranch(name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area))
+        for k, part in enumerate(solenoid.iron)
+    ]
+    loops = [[1, 0] for _ in branches]
+    branches.append(
+        MagneticBranch(name="leakage", law=LinearReluctance(1.0 / leakage), turns=turns)
+    )
+    loops.append([0, 1])
+    _add_ladders(branches, loops, solenoid.eddy)
+    width = max(len(row) for row in loops)
+    matrix = np.array([row + [0] * (width - len(row)) for row in loops])
+    return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
 
 
 @lru_cache(maxsize=100)

@@ -305,7 +305,7 @@ def _row(
     """Compute one point, in whichever thread."""
     try:
         valve = _valve_at(asked, built, i)
-        roles = find_roles(valve.case)
+        roles = find_roles(valve.case, valve.network)
         run = one_variant(valve, roles, asked.variant, None, lambda stage, fraction: check())
         if run.failure is not None:
             raise run.failure
