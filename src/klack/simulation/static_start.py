@@ -49,6 +49,13 @@ from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_contacts import contacts_at_rest
+from klack.simulation.static_newton import (
+    Balance,
+    Couplings,
+    last_change,
+    least_share,
+    newton_system,
+)
 from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.units import format_si
 
@@ -221,7 +228,7 @@ class _Balance:
         self.contact_force = np.zeros(len(rows.interfaces))
         length = _LENGTH * step  # in these units no unknown has a size of its own
         largest = np.max(np.abs(self.shapes), axis=1, initial=0.0)
-        self.units = np.concatenate(
+        units = np.concatenate(
             [
                 np.full(count, length),
                 length / np.where(largest > 0.0, largest, 1.0),
@@ -229,6 +236,7 @@ class _Balance:
                 np.full(len(self.ends), nodes.density * length**2),
             ]
         )
+        self.couplings = self._couplings(units)
         self.code = np.zeros(3, np.int64)
         self.ranges = [limit for limit in rows.limits if limit.ports]
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
@@ -260,12 +268,34 @@ class _Balance:
                 self.column_line.append(k)
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
         self.friction = np.array(friction, dtype=float)
-        self.joined = [
-            (k, sign, int(j))
-            for k, pair in enumerate(ends)
+
+    def _couplings(self, units: Vector) -> Couplings:
+        nodes = self.network.nodes
+        place = {int(i): j for j, i in enumerate(self.free)}
+        joined = [
+            (k, sign, place[int(i)])
+            for k, pair in enumerate(self.ends)
             for sign, i in zip((1.0, -1.0), pair, strict=True)
-            for j in np.flatnonzero(self.free == i)
+            if int(i) in place
         ]
+        walls = [
+            (place[int(i)], port, area)
+            for i, port, area in zip(nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True)
+            if self.enclosed and int(i) in place and port < self.ports
+        ]
+        return Couplings(
+            shapes=self.shapes,
+            units=units,
+            free=self.free,
+            shut=self.shut,
+            friction=self.friction,
+            column=np.array([k for k, _, _ in joined], dtype=np.int64),
+            sign=np.array([sign for _, sign, _ in joined], dtype=float),
+            volume=np.array([j for _, _, j in joined], dtype=np.int64),
+            wall_volume=np.array([j for j, _, _ in walls], dtype=np.int64),
+            wall_port=np.array([port for _, port, _ in walls], dtype=np.int64),
+            wall_area=np.array([area for _, _, area in walls], dtype=float),
+        )
 
     def can_enclose(self, bodies: list[int]) -> bool:
         """Whether fluid in a volume may hold one of these bodies like a spring."""
@@ -313,12 +343,9 @@ class _Balance:
             if not self.evaluate(state):
                 return None
             change = self._newton(state, start, creep, mass, tau)
-            if not np.all(np.isfinite(change)):
+            share, fall = 1.0, least_share(self.couplings, change, state.p)
+            if np.isnan(fall):
                 return None
-            n, r, f = self.ports, self.of_body.size, self.free.size
-            dy, dp = change[:n], change[n + r : n + r + f]
-            share = 1.0
-            fall = np.min((1.0 + dp / state.p[self.free]), initial=1.0)
             if fall < _FALL:
                 share = (1.0 - _FALL) / (1.0 - fall)
             for _halving in range(_HALVINGS):
@@ -329,9 +356,7 @@ class _Balance:
             else:
                 return None
             state = tried
-            longest = max(float(np.max(np.abs(state.y))), _LENGTH * self.step)
-            last = float(np.max(np.abs(dy), initial=0.0)) / longest
-            last = max(last, float(np.max(np.abs(dp) / state.p[self.free], initial=0.0)))
+            last = last_change(self.couplings, change, state.y, state.p, _LENGTH * self.step)
             if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
                 return state
             if np.any(state.p[self.free] < _EMPTY):
@@ -504,47 +529,30 @@ class _Balance:
         self, state: _State, start: _State, creep: Vector, mass: Vector, tau: float
     ) -> Vector:
         """Change of all unknowns by one Newton step."""
-        n, r, f, c = self.ports, self.of_body.size, self.free.size, len(self.ends)
-        force_y, flow_y = self.by_port[:n], self.by_port[n + 1 :][self.free]
-        force_p, flow_p = self.by_pressure[:n, :f], self.by_pressure[n + 1 :, :f][self.free]
-        through = np.where(self.shut, 0.0, tau)[:, None]
-        A, left = np.zeros((n + r + f + c, n + r + f + c)), np.zeros(n + r + f + c)
-        Y, Z, P = slice(0, n), slice(n, n + r), slice(n + r, n + r + f)
-        M = slice(n + r + f, n + r + f + c)
-        A[Y, Y] = np.eye(n) - self.compliance @ force_y
-        A[Y, Z] = -self.shapes.T
-        A[Y, P] = -self.compliance @ force_p
-        left[Y] = self._bent(state)
-        A[Z, Y] = -creep[:, None] * (self.shapes @ force_y)
-        A[Z, Z] = np.eye(r)
-        A[Z, P] = -creep[:, None] * (self.shapes @ force_p)
-        left[Z] = state.z - start.z - creep * (self.shapes @ self.force[:-1])
+        n, f = self.ports, self.free.size
+        force_y, force_p = self.by_port[:n], self.by_pressure[:n, :f]
         now, by_p, density = self._masses(state)
-        A[P, Y] = -through * flow_y
-        if self.enclosed:
-            nodes = self.network.nodes
-            for i, port, area in zip(
-                nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True
-            ):
-                for j in np.flatnonzero(self.free == i):
-                    if port < n:
-                        A[n + r + j, port] += area * density[j]
-        A[P, P] = np.diag(by_p) - through * flow_p
-        left[P] = now - mass - through[:, 0] * self._net(state)
-        for k, sign, at in self.joined:
-            A[n + r + at, M.start + k] += sign * through[at, 0]
-            A[M.start + k, n + r + at] -= sign / density[at]
-        A[M, M][np.diag_indices(c)] = self.friction
-        left[M] = self._columns_left(state)[0]
-        A *= self.units
-        scale = np.max(np.abs(A), axis=1)
-        scale[scale == 0.0] = 1.0
-        A /= scale[:, None]
+        balance = Balance(
+            by_port=self.by_port,
+            by_pressure=self.by_pressure,
+            bent_y=self.compliance @ force_y,
+            bent_p=self.compliance @ force_p,
+            push_y=self.shapes @ force_y,
+            push_p=self.shapes @ force_p,
+            bent=self._bent(state),
+            lag=state.z - start.z - creep * (self.shapes @ self.force[:-1]),
+            filled=now - mass,
+            by_p=by_p,
+            density=density,
+            net=self._net(state),
+            rest=self._columns_left(state)[0],
+        )
+        A, right = newton_system(self.couplings, balance, creep, tau)
         try:
-            change = np.linalg.solve(A, -left / scale)
+            change = np.linalg.solve(A, right)
         except np.linalg.LinAlgError:
-            change = np.linalg.lstsq(A, -left / scale, rcond=None)[0]
-        return np.asarray(change * self.units)
+            change = np.linalg.lstsq(A, right, rcond=None)[0]
+        return np.asarray(change * self.couplings.units)
 
     def failed(self) -> ConvergenceError:
         """Error of the part that knows no answer at the start."""
