@@ -5,8 +5,10 @@ Truth: single strokes of the changed cases, ``klack.run_stroke(case.with_value(.
 
 import csv
 import json
+import signal
+import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -208,6 +210,26 @@ class TestSameBits:
         assert PlainSpring.inside == [0, 1]
         sys.modules.pop("plain_spring_of_many")
 
+    def test_every_point_has_an_fmu_of_its_own(
+        self, tmp_path: Path, spring_damper_fmu: Callable[..., Path]
+    ):
+        """An FMU fails when a step is forgotten or done twice."""
+        text = SMALL.read_text().replace("duration: 2 ms, step: 20 ns", "duration: 0.1 ms")
+        text = text.replace(
+            "    magnet:",
+            f"    own: {{type: fmu, file: '{spring_damper_fmu(2)}', coupling_step: 1 us,\n"
+            "          displacement: x, velocity: v, force: F, parameters: {k: 1000, c: 1}}\n"
+            "    magnet:",
+        ).replace("spring.end,", "spring.end, own.end,")
+        (tmp_path / "own.yaml").write_text(text.replace("variants: [dry, wet]", "variants: [dry]"))
+        case = klack.load_case(tmp_path / "own.yaml")
+        points: list[Point] = [{PRELOAD: "10 N"}, {PRELOAD: "12 N"}, {PRELOAD: "14 N"}]
+        measures = ["opening_time_at_50_percent", "energy_throughput"]
+        table = klack.run_many(case, points, measures, threads=3)
+        truth = [single(case, point, "dry", measures) for point in points]
+        np.testing.assert_array_equal(matrix(table), truth)
+        assert not table.failed.any()
+
     def test_parts_that_are_kept_make_the_same_case(self, small: klack.CaseOnHand):
         """Truth: the case read as a whole."""
         tree = small.tree
@@ -262,6 +284,15 @@ class TestFailures:
             ([{"network.fluid.gas_fraction": "1 %"}], ["impacts"], "'network.fluid: n-heptane'"),
             ([{"network.components.spring": "none", PRELOAD: "1 N"}], ["impacts"], "contain"),
             ([{"": "1"}], ["impacts"], "keys joined"),
+            ([{"run.variants.0": "wet"}], ["impacts"], "one variant"),
+            (
+                [
+                    {"network.components.magnet.force.1": "4 N"},
+                    {"network.components.magnet.force.01": "5 N"},
+                ],
+                ["impacts"],
+                "in two ways",
+            ),
             ([], ["opening_tim"], "mean 'opening_time'"),
             ([], ["seat.peak_forse"], "mean 'seat.peak_force'"),
             ([], ["seat.0.peak_force"], "one of"),
@@ -322,6 +353,30 @@ class TestInterruption:
         assert {table.failures[i] for i in np.flatnonzero(table.failed)} == {NOT_COMPUTED}
         for i in np.flatnonzero(done):
             assert matrix(table)[i].tolist() == single(small, points[i], "wet", MEASURES)
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="signals")
+    def test_ctrl_c_ends_all_threads_soon(self):
+        """Of a process with thousands of points left."""
+        script = f"""
+import time, klack
+points = {{{PRELOAD!r}: ["12 N", "13 N"] * 5000}}
+def progress(stage, fraction):
+    if stage == "points" and fraction > 0.0:
+        print("runs", flush=True)
+try:
+    klack.run_many({str(SMALL)!r}, points, ["impacts"], threads=2, progress=progress)
+except klack.RunsInterrupted as stop:
+    print("done", int((~stop.table.failed).sum()), len(stop.table), flush=True)
+"""
+        command = [sys.executable, "-c", script]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "runs\n"
+            process.send_signal(signal.SIGINT)
+            last = process.stdout.read().splitlines()[-1].split()
+            assert process.wait(60) == 0
+        assert last[0] == "done"
+        assert 0 < int(last[1]) < int(last[2]) == 10_000
 
     def test_an_error_of_the_progress_ends_all_threads(self, small: klack.CaseOnHand):
         import threading

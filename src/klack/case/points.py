@@ -264,8 +264,17 @@ def _key(case: ValveCase, tree: CaseTree, name: object) -> PointKey:
 
 
 def _require_apart(keys: Iterable[PointKey]) -> None:
-    """Refuse a key below another one: which of them counts would depend on their order."""
-    places = {key.place: key.name for key in keys}
+    """Refuse one key twice or below another one: which counts would depend on their order."""
+    places: dict[Key, str] = {}
+    for key in keys:
+        if key.place in places:
+            raise InputError(
+                f"{_WHERE}: {key.name}",
+                got=f"the key '{places[key.place]}', written in two ways",
+                expected="one name for each key",
+                hint="leave one of them out.",
+            )
+        places[key.place] = key.name
     for place, name in places.items():
         for depth in range(1, len(place)):
             if place[:depth] in places:

@@ -153,6 +153,14 @@ def run_strokes(
     """
     chosen = chosen_measures(case, measures)
     asked = points_of(case, tree, points)
+    for key in asked.keys:
+        if key.place[:2] == ("run", "variants"):
+            raise InputError(
+                f"points: {key.name}",
+                got="a variant as a part of a point",
+                expected="one variant for all points",
+                hint='write variant="dry", and compute two tables.',
+            )
     name = case.require_variants((variant,) if variant is not None else case.run.variants)[0]
     if threads is not None and (isinstance(threads, bool) or threads < 1):
         raise InputError(
