@@ -39,6 +39,7 @@ PARTS = {
     "calculix": "CalculiX: an impact in 3-D on the same mesh",
     "growth": "every stage over degrees of freedom",
     "stroke": "a whole valve in time; CVODE beside a small one",
+    "many_strokes": "strokes per hour at many points, on threads",
     "accuracy": "reduced against full order on the shipped cases",
     "reduction": "from a case to two reduced bodies",
     "full_order": "the impact with every degree of freedom",

@@ -19,13 +19,16 @@ if TYPE_CHECKING:
     from klack.api import (
         CaseOnHand,
         Number,
+        PointTable,
         Result,
+        RunsInterrupted,
         calibrate,
         compare,
         load_case,
         load_result,
         noise_of,
         run_impact,
+        run_many,
         run_shots,
         run_stroke,
     )
@@ -33,7 +36,9 @@ if TYPE_CHECKING:
 __all__ = [
     "CaseOnHand",
     "Number",
+    "PointTable",
     "Result",
+    "RunsInterrupted",
     "__version__",
     "calibrate",
     "compare",
@@ -41,6 +46,7 @@ __all__ = [
     "load_result",
     "noise_of",
     "run_impact",
+    "run_many",
     "run_shots",
     "run_stroke",
 ]

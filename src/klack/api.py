@@ -16,9 +16,11 @@ from typing import Any, TypeVar
 from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
+from klack.analyses.point_table import PointTable, RunsInterrupted
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
 from klack.case.inserting import with_values
 from klack.case.key_path import kind_at, node_at, quantity_at, split_path
+from klack.case.points import GivenPoints
 from klack.case.schema import Case
 from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
@@ -31,13 +33,16 @@ from klack.progress import Progress, silent
 __all__ = [
     "CaseOnHand",
     "Number",
+    "PointTable",
     "Result",
+    "RunsInterrupted",
     "calibrate",
     "compare",
     "load_case",
     "load_result",
     "noise_of",
     "run_impact",
+    "run_many",
     "run_shots",
     "run_stroke",
 ]
@@ -350,6 +355,59 @@ def run_stroke(
     checked = _of_kind(case, ValveCase, "a whole valve")
     wanted = checked.require_variants(tuple(variants) if variants else checked.run.variants)
     return Result(run(checked, variants=wanted, progress=progress, threads=threads), STROKE)
+
+
+def run_many(
+    case: Given,
+    points: GivenPoints,
+    measures: Sequence[str],
+    *,
+    variant: str | None = None,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> PointTable:
+    """Compute measures of a stroke at many points of the parameter space of a case.
+
+    Every number is that of :func:`run_stroke` of the changed case, to the last bit, whatever the
+    number of threads and the order of the points.  A point that cannot be computed is a row with
+    its error.
+
+    Parameters
+    ----------
+    case : str, Path or CaseOnHand
+        Of a whole valve.
+    points : sequence of mappings, or mapping of sequences
+        Keys of the case to values with their units, for each point; or lists of values by key.
+    measures : sequence of str
+        ``"opening_time"``; of the first impact on the stop ``seat`` ``"seat.peak_force"``, of the
+        second one ``"seat.2.peak_force"``.
+    variant : str, optional
+        The first one of the case by default.
+    threads : int, optional
+        All available cores by default; always 1 with components in Python and FMUs.
+    progress : callable
+        Called with a stage and the share of the points that are done.
+
+    Raises
+    ------
+    InputError
+        For a key, unit or measure that does not exist, before the first run.
+    RunsInterrupted
+        On Ctrl-C: a :class:`KeyboardInterrupt` whose ``table`` holds what was computed.
+
+    Examples
+    --------
+    >>> run_many("demo-stroke", [], ["opening_time"])
+    demo-stroke, wet: 0 points
+    opening_time [s]
+    """
+    from klack.analyses.stroke.many import run_strokes
+
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    checked = _of_kind(given, ValveCase, "a whole valve")
+    return run_strokes(
+        checked, given.tree, points, measures, variant=variant, threads=threads, progress=progress
+    )
 
 
 def run_shots(

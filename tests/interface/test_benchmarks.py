@@ -18,7 +18,8 @@ import pytest
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 LONG = ("accuracy", "calculix", "demo", "full_order", "growth", "ngsolve_peer")
 PARTS = (
-    *("start_up", "kernel", "modes", "limit", "reduced_peers", "stroke", "reduction"),
+    *("start_up", "kernel", "modes", "limit", "reduced_peers", "stroke", "many_strokes"),
+    "reduction",
     *(pytest.param(name, marks=pytest.mark.slow) for name in LONG),
 )
 

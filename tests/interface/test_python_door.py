@@ -50,6 +50,18 @@ class TestValues:
         other = case.with_value("run.interface_step", "3 ns")
         assert other.value("run.interface_step") == 3e-9
 
+    def test_an_entry_of_a_list_is_exchanged(self):
+        case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml")
+        other = case.with_value("network.components.magnet.force.1", "40 N")
+        assert other.value("network.components.magnet.force") == (0.0, 40.0, 35.0, 0.0)
+        with pytest.raises(InputError, match="a length"):
+            case.with_value("network.components.magnet.force.1", "40 mm")
+
+    def test_a_key_below_a_name_is_one_error(self):
+        case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml")
+        with pytest.raises(InputError, match=r"network\.fluid: n-heptane"):
+            case.with_value("network.fluid.gas_fraction", "1 %")
+
     @pytest.mark.parametrize(
         ("key", "value", "words"),
         [

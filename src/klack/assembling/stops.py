@@ -7,6 +7,7 @@ meshed and factorised once and carries one port for each of its stops.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import pi, sqrt
 
 import numpy as np
@@ -119,6 +120,7 @@ def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> Lo
     return consistent_law(contact.static, compliance)
 
 
+@lru_cache(maxsize=100)
 def split_law(local: LocalLaw) -> tuple[TableLaw, float]:
     r"""Cut a local law into the faces and the bulk behind them.
 

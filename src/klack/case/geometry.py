@@ -1,6 +1,7 @@
 """Source of the shape of a body: a drawn outline, a STEP file, or a finished mesh."""
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from math import tau
 from typing import Annotated, Literal, Self
 
@@ -104,7 +105,13 @@ class Outline(Section):
                 edges.append(Arc(metres(edge.arc), metres(edge.centre), name, edge.clockwise))
             else:
                 edges.append(Line(metres(edge.line or self.start), name))
-        return Profile(metres(self.start), tuple(edges))
+        return _drawn(metres(self.start), tuple(edges))
+
+
+@lru_cache(maxsize=100)
+def _drawn(start: Point, edges: tuple[Line | Arc, ...]) -> Profile:
+    """Profile of an outline; a case asks for it at every surface that it names."""
+    return Profile(start, edges)
 
 
 class ProfileGeometry(Section):

@@ -12,7 +12,7 @@ from klack.case.key_path import written_at
 from klack.case.reader import parse
 from klack.case.rewriting import rewritten
 from klack.errors import InputError
-from klack.input.problem import Key
+from klack.input.problem import CaseProblem, Key
 
 __all__ = ["merged", "plain_data", "with_values"]
 
@@ -42,12 +42,28 @@ def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> 
     return text
 
 
-def merged(data: Any, key: Key, value: object) -> Any:
-    """Copy of plain data with a value at a key; missing mappings are created."""
+def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
+    """Copy of plain data with a value at a key; missing mappings are created.
+
+    Raises
+    ------
+    CaseProblem
+        Where a single value stands for a mapping, such as the name of a fluid.
+    """
     if not key:
         return value
-    copy = dict(data or {})
-    copy[key[0]] = merged(copy.get(key[0]), key[1:], value)
+    if data is not None and not isinstance(data, Mapping | list):
+        short, whole = (".".join(map(str, part)) for part in (above, (*above, *key)))
+        raise CaseProblem(
+            (),
+            got=f"'{whole}', but the case has '{short}: {data}'",
+            expected=f"a mapping at '{short}', in braces or indented",
+            hint="write it out in the case: {key: value, ...}.",
+        )
+    head, rest = key[0], key[1:]
+    copy: Any = list(data) if isinstance(data, list) else dict(data or {})
+    below = copy[head] if isinstance(data, list) else copy.get(head)
+    copy[head] = merged(below, rest, value, (*above, head))
     return copy
 
 

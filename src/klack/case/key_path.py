@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
-from klack.units import RATIO, Kind
+from klack.units import RATIO, Kind, parse_quantity
 
 __all__ = ["Quantity", "kind_at", "kind_in", "node_at", "quantity_at", "split_path", "written_at"]
 
@@ -38,6 +38,8 @@ class Quantity:
         InputError
             For another kind of quantity, a missing unit, a value out of its limits.
         """
+        if isinstance(self.key[-1], int):  # an entry: the limits of the list are those of the case
+            return parse_quantity(text, self.kind, str(self))
         info = self._field
         adapter = TypeAdapter[float](Annotated[info.annotation, *info.metadata])  # type: ignore[arg-type]
         try:

@@ -5,7 +5,9 @@ The case of a whole valve, with a section ``network``, is read by :mod:`klack.ca
 
 import re
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from io import StringIO
 from math import inf
 from pathlib import Path
@@ -156,6 +158,13 @@ def text_of(path: Path) -> str:
 
 def parse(text: str, path: Path) -> tuple[Any, Lines]:
     """Plain data of a YAML text, and the position of each key and value."""
+    data, lines = _parsed(text, path)
+    return deepcopy(data), lines
+
+
+@lru_cache(maxsize=4)
+def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
+    """The last texts are kept: a changed case is parsed where it is written, checked and read."""
     try:
         data = bounded_yaml().load(StringIO(text))
     except DuplicateKeyError as error:

@@ -19,7 +19,8 @@ def check_valve(case: ValveSections) -> None:
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_flexible_bodies(case)
-    meetings = find_meetings(case.network.network())
+    network = case.network.network()
+    meetings = find_meetings(network)
     for name in case.stops:
         _check_stop(case, name, meetings)
     _check_laws(case)
@@ -32,7 +33,7 @@ def check_valve(case: ValveSections) -> None:
                     expected="its stiffness",
                     hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the variant.",
                 )
-    find_roles(case)
+    find_roles(case, network)
 
 
 def _check_ports(case: ValveSections, name: str) -> None:

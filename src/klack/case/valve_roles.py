@@ -57,15 +57,21 @@ def find_meetings(network: Network) -> dict[str, Meeting]:
     }
 
 
-def find_roles(case: ValveSections) -> ValveRoles:
+def find_roles(case: ValveSections, network: Network | None = None) -> ValveRoles:
     """Find needle, seat and opening stop of a case.
+
+    Parameters
+    ----------
+    case : ValveSections
+    network : Network, optional
+        That of the case where it has been joined already.
 
     Raises
     ------
     CaseProblem
         When the needle is not plain and the case does not name the lift.
     """
-    network = case.network.network()
+    network = network or case.network.network()
     meetings = find_meetings(network)
     points = {
         name: tuple(port for port, kind in part.port_kinds().items() if kind.role is Role.MOTION)

@@ -1,10 +1,12 @@
 """Squeeze films between two faces that close: what stops a needle before metal touches metal."""
 
 from abc import abstractmethod
+from functools import cache
 from math import cos, exp, pi, sin, sinh
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
@@ -60,9 +62,14 @@ def mean_flow_factor(lowest: float) -> float:
     >>> round(mean_flow_factor(3.0), 4), round(mean_flow_factor(1e6), 4)
     (0.9158, 1.0)
     """
-    x, weight = np.polynomial.legendre.leggauss(40)
+    x, weight = _gauss_points()
     u = 0.5 * (x + 1.0)
     return float(1.0 / np.sum(weight * u / np.array([flow_factor(lowest / v) for v in u])))
+
+
+@cache
+def _gauss_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.polynomial.legendre.leggauss(40)
 
 
 class Film(Section):

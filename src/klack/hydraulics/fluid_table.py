@@ -15,6 +15,7 @@ Layout: number of pieces, seven zeros, then eight numbers per piece (one cache l
 A last row of the same form starts at the highest pressure.
 """
 
+from functools import lru_cache
 from math import log1p
 
 import numpy as np
@@ -22,7 +23,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, require_positive
-from klack.hydraulics.liquid import HIGHEST_PRESSURE
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.liquid import HIGHEST_PRESSURE, Murnaghan, Tait
 from klack.hydraulics.mixture import LOWEST_PRESSURE
 from klack.network.protocols import NetworkFluid
 
@@ -59,6 +61,18 @@ def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
         A few hundred pieces.
     """
     require_positive("fluid_table: ambient_pressure", ambient_pressure, "Pa")
+    if isinstance(fluid, Fluid) and isinstance(fluid.liquid, Murnaghan | Tait):
+        return _table_of(fluid, ambient_pressure).copy()
+    return _table(fluid, ambient_pressure)
+
+
+@lru_cache(maxsize=20)
+def _table_of(fluid: Fluid, ambient_pressure: float) -> Vector:
+    """Table of a fluid that cannot change; strokes of one valve share it."""
+    return _table(fluid, ambient_pressure)
+
+
+def _table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
     p, factors = _pieces(fluid, ambient_pressure)
     h = np.diff(p)
     powers = h[:, None] ** np.arange(1, 7)

@@ -1,6 +1,7 @@
 """The solenoid of a valve: coil, pole gaps, iron, leakage, eddy currents."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
@@ -103,34 +104,7 @@ class Solenoid(Component):
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
-        turns = float(self.turns)
-        gap = self._gap_law()
-        parasitic = sum(part.reluctance for part in self.parasitic)
-        leakage = self.leakage
-        if leakage is None:
-            leakage = self.leakage_share / (float(gap.reluctance_at(self.gap)) + parasitic)
-        branches = [
-            MagneticBranch(
-                name="gap", law=gap, turns=turns, remanence=self._remanence(gap, parasitic)
-            )
-        ]
-        if parasitic > 0.0:
-            branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
-        branches += [
-            MagneticBranch(
-                name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area)
-            )
-            for k, part in enumerate(self.iron)
-        ]
-        loops = [[1, 0] for _ in branches]
-        branches.append(
-            MagneticBranch(name="leakage", law=LinearReluctance(1.0 / leakage), turns=turns)
-        )
-        loops.append([0, 1])
-        _add_ladders(branches, loops, self.eddy)
-        width = max(len(row) for row in loops)
-        matrix = np.array([row + [0] * (width - len(row)) for row in loops])
-        return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
+        return _kept_circuit(self) if type(self) is Solenoid else _circuit(self)
 
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
@@ -163,20 +137,9 @@ class Solenoid(Component):
         )
 
     def _gap_law(self) -> GapReluctance:
-        """All poles in series, over the whole range of gaps; finest around the working gap."""
-
-        def reluctance(x: Any) -> tuple[Any, Any]:
-            parts = [pole.reluctance(x + self.residual_gap) for pole in self.poles]
-            return sum(R for R, _ in parts), sum(dR for _, dR in parts)
-
         known = self.gap_range()
         ends = (known.usable[0], 2.0 * self.gap + self.residual_gap, known.valid[1])
-        grids = [
-            hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
-            for start, end in pairwise(ends)
-            if end > start
-        ]
-        return GapReluctance.of(reluctance, np.unique(np.concatenate(grids)))
+        return _gap_law(self.poles, self.residual_gap, ends)
 
     def _remanence(self, gap: GapReluctance, parasitic: float) -> float:
         """Constant mmf [A] that drives the residual flux through the closed circuit."""
@@ -184,6 +147,62 @@ class Solenoid(Component):
         laws = [part.material.curve().law(part.length, part.area) for part in self.iron]
         iron = sum(float(law.mmf(flux, 0.0)) for law in laws)
         return (float(gap.reluctance_at(0.0)) + parasitic) * flux + iron
+
+
+@lru_cache(maxsize=100)
+def _kept_circuit(solenoid: Solenoid) -> MagneticCircuit:
+    """Circuit that strokes of one valve share as long as they keep its solenoid."""
+    return _circuit(solenoid)
+
+
+def _circuit(solenoid: Solenoid) -> MagneticCircuit:
+    turns = float(solenoid.turns)
+    gap = solenoid._gap_law()
+    parasitic = sum(part.reluctance for part in solenoid.parasitic)
+    leakage = solenoid.leakage
+    if leakage is None:
+        leakage = solenoid.leakage_share / (float(gap.reluctance_at(solenoid.gap)) + parasitic)
+    branches = [
+        MagneticBranch(
+            name="gap", law=gap, turns=turns, remanence=solenoid._remanence(gap, parasitic)
+        )
+    ]
+    if parasitic > 0.0:
+        branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
+    branches += [
+        MagneticBranch(name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area))
+        for k, part in enumerate(solenoid.iron)
+    ]
+    loops = [[1, 0] for _ in branches]
+    branches.append(
+        MagneticBranch(name="leakage", law=LinearReluctance(1.0 / leakage), turns=turns)
+    )
+    loops.append([0, 1])
+    _add_ladders(branches, loops, solenoid.eddy)
+    width = max(len(row) for row in loops)
+    matrix = np.array([row + [0] * (width - len(row)) for row in loops])
+    return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
+
+
+@lru_cache(maxsize=100)
+def _gap_law(
+    poles: tuple[PoleGap, ...], residual_gap: float, ends: tuple[float, ...]
+) -> GapReluctance:
+    """All poles in series, over the whole range of gaps; finest around the working gap.
+
+    Kept, because strokes of one valve mostly differ in other numbers.
+    """
+
+    def reluctance(x: Any) -> tuple[Any, Any]:
+        parts = [pole.reluctance(x + residual_gap) for pole in poles]
+        return sum(R for R, _ in parts), sum(dR for _, dR in parts)
+
+    grids = [
+        hermite_grid(reluctance, start, end, tolerance=_TABLE_TOLERANCE)
+        for start, end in pairwise(ends)
+        if end > start
+    ]
+    return GapReluctance.of(reluctance, np.unique(np.concatenate(grids)))
 
 
 def _add_ladders(

@@ -85,6 +85,33 @@ class Travel:
         wanted = {body: factor for body, factor in factors.items() if factor != 0.0}
         if not wanted:
             return 0.0, ()
+        found = self._of_one_body(wanted)
+        return self._of_a_chain(wanted) if found is None else found
+
+    def _of_one_body(self, wanted: Mapping[str, float]) -> tuple[float, tuple[str, ...]] | None:
+        """Answer for one body: the nearest of its stops if they do not move, infinity without any.
+
+        None for several bodies, and where two stops are equally near.  The scaling is that of the
+        linear programme, so that both give the same number.
+        """
+        ((body, factor), *others) = wanted.items()
+        if not others and all(body not in (bound.upper, bound.lower) for bound in self.bounds):
+            return inf, ()
+        if others or any({bound.upper, bound.lower} != {body, None} for bound in self.bounds):
+            return None
+        gaps = [
+            bound for bound in self.bounds if (bound.lower if factor > 0.0 else bound.upper) == body
+        ]
+        if not gaps:
+            return inf, ()
+        nearest, *further = sorted(gaps, key=lambda bound: bound.gap)
+        if further and further[0].gap == nearest.gap:
+            return None
+        length = max(_LEAST_LENGTH, *(bound.gap for bound in self.bounds))
+        return nearest.gap / length * length * abs(factor), (nearest.name,)
+
+    def _of_a_chain(self, wanted: Mapping[str, float]) -> tuple[float, tuple[str, ...]]:
+        """Answer of the linear programme."""
         sides = [side for bound in self.bounds for side in (bound.upper, bound.lower) if side]
         place = {body: i for i, body in enumerate(dict.fromkeys([*sides, *wanted]))}
         closing = np.zeros((len(self.bounds), len(place)))

@@ -5,6 +5,7 @@ missed, one that matters for a result is not.
 """
 
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,21 @@ __all__ = ["Limits"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Watched:
+    """A limit, and the columns of the records that its quantity is a sum of."""
+
+    limit: LimitRow
+    columns: NDArray[np.int64]
+    weights: Vector
+
+    def values(self, points: Matrix) -> Vector:
+        """Quantity in some records, shape (n,)."""
+        if self.columns.size == 1:
+            return self.limit.start + points[:, self.columns[0]] * self.weights[0]
+        return np.asarray(self.limit.start + points[:, self.columns] @ self.weights)
 
 
 class Limits:
@@ -36,7 +52,7 @@ class Limits:
         self._told: set[str] = set()
         ports = len(network.ports)
         pressures = 2 * ports + sum(row.body.rigid_count > 0 for row in network.rows.bodies)
-        self._watched: list[tuple[LimitRow, Vector]] = []
+        self._watched: list[_Watched] = []
         for limit in limits_of(network.rows):
             weights = np.zeros(len(columns))
             for handle, factor in limit.ports:
@@ -47,7 +63,8 @@ class Limits:
                 weights[pressures + network.node_order.index(limit.node)] = 1.0
             if limit.channel:
                 weights[columns.index(limit.channel)] = 1.0
-            self._watched.append((limit, weights))
+            used = np.flatnonzero(weights)
+            self._watched.append(_Watched(limit, used, weights[used]))
 
     def left(self, points: Matrix, time: Vector) -> tuple[int, ConvergenceError] | None:
         """First of some records in which a quantity has left what can be computed with.
@@ -63,8 +80,8 @@ class Limits:
             Its place, and what to say: component and time.
         """
         found: tuple[int, ConvergenceError] | None = None
-        for limit, weights in self._watched:
-            values = _values(limit, weights, points)
+        for watched in self._watched:
+            limit, values = watched.limit, watched.values(points)
             low, high = limit.usable
             gone = np.flatnonzero((values <= low) | (values > high))
             if gone.size and (found is None or gone[0] < found[0]):
@@ -80,18 +97,13 @@ class Limits:
         AccuracyWarning
             Once for each law.
         """
-        for limit, weights in self._watched:
-            values = _values(limit, weights, points)
+        for watched in self._watched:
+            limit, values = watched.limit, watched.values(points)
             low, high = limit.valid[0] - limit.slack, limit.valid[1] + limit.slack
             out = np.flatnonzero((values < low) | (values > high))
             if out.size and limit.law not in self._told:
                 self._told.add(limit.law)
                 warnings.warn(_warning(limit, values, time, int(out[0])), AccuracyWarning, 3)
-
-
-def _values(limit: LimitRow, weights: Vector, points: Matrix) -> Vector:
-    used = np.flatnonzero(weights)
-    return np.asarray(limit.start + points[:, used] @ weights[used])
 
 
 def _warning(limit: LimitRow, values: Vector, time: Vector, first: int) -> str:

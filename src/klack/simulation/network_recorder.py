@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.memory import require_memory
-from klack.network.rows import BranchRow, ElementRow
+from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
@@ -20,7 +20,7 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_record import record_points
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
-__all__ = ["Recorder"]
+__all__ = ["Recorder", "recorded_columns"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -248,6 +248,16 @@ class Recorder:
         self._peaks[:, here] = np.maximum(self._peaks[:, here], peaks.T)
         ends = np.flatnonzero(np.arange(first, first + count) % looks == 0)
         self._points[:, record[ends]] = recording.points[ends].T
+
+
+def recorded_columns(rows: Rows) -> int:
+    """Channels that a run of these rows records."""
+    ports = sum(len(row.ports) for row in rows.bodies)
+    free = sum(1 for row in rows.bodies if row.body.rigid_count > 0)
+    states = sum(len(row.channels) for row in rows.elements)
+    states += sum(len(row.channels) for row in rows.branches)
+    forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)
+    return 2 * ports + free + len(rows.nodes) + states + forces + 4 * len(rows.interfaces)
 
 
 def _require_memory(records: int, columns: int) -> None:

@@ -46,7 +46,7 @@ from klack.simulation.step_status import (
 )
 from klack.units import format_si
 
-__all__ = ["simulate_network"]
+__all__ = ["has_python_steps", "simulate_network"]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
@@ -126,7 +126,7 @@ def simulate_network(
     network = compile_network(rows, sizes)
     grid = _grid(duration, sizes, record)
     step = sizes.step
-    chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
+    chunk = _PYTHON_CHUNK if has_python_steps(rows) else _CHUNK
     recorder = Recorder(
         network,
         records=grid.records,
@@ -239,7 +239,8 @@ def _largest_divisor(number: int, most: int) -> int:
     return next((size for size in range(most, 1, -1) if number % size == 0), 1)
 
 
-def _has_python_steps(rows: Rows) -> bool:
+def has_python_steps(rows: Rows) -> bool:
+    """Whether the time loop calls back into Python, or into an FMU."""
     steps = [row.step for row in rows.elements] + [row.step for row in rows.branches]
     return any(hasattr(step, "errors") for step in steps)
 

@@ -11,6 +11,7 @@ all digits for small ``omega h`` when it is written like this; here it is summed
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,14 @@ def modal_propagator(
             expected="as many of both, none below zero",
             hint="give one damping ratio per mode.",
         )
-    h = float(step)
+    A11, A12, A21, A22, B1, B2 = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
+    return Propagator(step=float(step), A11=A11, A12=A12, A21=A21, A22=A22, B1=B1, B2=B2)
+
+
+@lru_cache(maxsize=100)
+def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
+    """Rows of :class:`Propagator`; kept, because strokes of one valve share them."""
+    w, z = np.frombuffer(omega), np.frombuffer(damping)
     A11, A12, A22 = np.ones(w.size), np.full(w.size, h), np.ones(w.size)
     B1 = np.full(w.size, 0.5 * h * h)
     over = z >= 1.0
@@ -93,7 +101,7 @@ def modal_propagator(
             A11[part], A12[part], A22[part], B1[part] = formula(w[part], z[part], h)
     small = (w > 0.0) & (np.maximum(z, 1.0) * w * h < TAYLOR_BELOW)
     B1[small] = _series_B1(w[small] * h, z[small]) * h * h
-    return Propagator(step=h, A11=A11, A12=A12, A21=-(w**2) * A12, A22=A22, B1=B1, B2=A12.copy())
+    return np.array([A11, A12, -(w**2) * A12, A22, B1, A12])
 
 
 def damping_loss(

@@ -11,13 +11,22 @@ from klack.network.step_function import first, pointers
 from klack.simulation.network_arrays import Nodes, StepRows
 from klack.simulation.row_calls import call_rows, push_ports, push_walls
 
-__all__ = ["at_rest", "slopes_at_rest"]
+__all__ = ["at_rest", "fluids_at", "slopes_at_rest"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _PRESS = 1e-9  # change of a pressure to see what follows from it, over the pressure
+
+
+@njit(cache=True)
+def fluids_at(table: Vector, p: Vector) -> Matrix:
+    """Density, its slope and pressure energy of :func:`fluid_at` at several pressures [Pa]."""
+    found = np.empty((p.size, 3))
+    for i in range(p.size):
+        found[i, 0], found[i, 1], found[i, 2], _ = fluid_at(table, p[i], 0)
+    return found
 
 
 @njit(cache=True)

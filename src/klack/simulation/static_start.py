@@ -30,13 +30,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
 from klack.network.rows import LimitRow
 from klack.network.travel import Travel
-from klack.simulation.contact_step import mean_force
 from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
@@ -51,7 +49,15 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
-from klack.simulation.static_rows import at_rest, slopes_at_rest
+from klack.simulation.static_contacts import contacts_at_rest
+from klack.simulation.static_newton import (
+    Balance,
+    Couplings,
+    last_change,
+    least_share,
+    newton_system,
+)
+from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.units import format_si
 
 __all__ = ["start_at_rest"]
@@ -223,7 +229,7 @@ class _Balance:
         self.contact_force = np.zeros(len(rows.interfaces))
         length = _LENGTH * step  # in these units no unknown has a size of its own
         largest = np.max(np.abs(self.shapes), axis=1, initial=0.0)
-        self.units = np.concatenate(
+        units = np.concatenate(
             [
                 np.full(count, length),
                 length / np.where(largest > 0.0, largest, 1.0),
@@ -231,6 +237,7 @@ class _Balance:
                 np.full(len(self.ends), nodes.density * length**2),
             ]
         )
+        self.couplings = self._couplings(units)
         self.code = np.zeros(3, np.int64)
         self.ranges = [limit for limit in rows.limits if limit.ports]
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
@@ -262,6 +269,34 @@ class _Balance:
                 self.column_line.append(k)
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
         self.friction = np.array(friction, dtype=float)
+
+    def _couplings(self, units: Vector) -> Couplings:
+        nodes = self.network.nodes
+        place = {int(i): j for j, i in enumerate(self.free)}
+        joined = [
+            (k, sign, place[int(i)])
+            for k, pair in enumerate(self.ends)
+            for sign, i in zip((1.0, -1.0), pair, strict=True)
+            if int(i) in place
+        ]
+        walls = [
+            (place[int(i)], port, area)
+            for i, port, area in zip(nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True)
+            if self.enclosed and int(i) in place and port < self.ports
+        ]
+        return Couplings(
+            shapes=self.shapes,
+            units=units,
+            free=self.free,
+            shut=self.shut,
+            friction=self.friction,
+            column=np.array([k for k, _, _ in joined], dtype=np.int64),
+            sign=np.array([sign for _, sign, _ in joined], dtype=float),
+            volume=np.array([j for _, _, j in joined], dtype=np.int64),
+            wall_volume=np.array([j for j, _, _ in walls], dtype=np.int64),
+            wall_port=np.array([port for _, port, _ in walls], dtype=np.int64),
+            wall_area=np.array([area for _, _, area in walls], dtype=float),
+        )
 
     def can_enclose(self, bodies: list[int]) -> bool:
         """Whether fluid in a volume may hold one of these bodies like a spring."""
@@ -309,12 +344,9 @@ class _Balance:
             if not self.evaluate(state):
                 return None
             change = self._newton(state, start, creep, mass, tau)
-            if not np.all(np.isfinite(change)):
+            share, fall = 1.0, least_share(self.couplings, change, state.p)
+            if np.isnan(fall):
                 return None
-            n, r, f = self.ports, self.of_body.size, self.free.size
-            dy, dp = change[:n], change[n + r : n + r + f]
-            share = 1.0
-            fall = np.min((1.0 + dp / state.p[self.free]), initial=1.0)
             if fall < _FALL:
                 share = (1.0 - _FALL) / (1.0 - fall)
             for _halving in range(_HALVINGS):
@@ -325,9 +357,7 @@ class _Balance:
             else:
                 return None
             state = tried
-            longest = max(float(np.max(np.abs(state.y))), _LENGTH * self.step)
-            last = float(np.max(np.abs(dy), initial=0.0)) / longest
-            last = max(last, float(np.max(np.abs(dp) / state.p[self.free], initial=0.0)))
+            last = last_change(self.couplings, change, state.y, state.p, _LENGTH * self.step)
             if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
                 return state
             if np.any(state.p[self.free] < _EMPTY):
@@ -401,11 +431,10 @@ class _Balance:
         """Force of every contact [N] and its change with the gap [N/m]."""
         interfaces = self.network.interfaces
         gap = interfaces.gap0 + y[interfaces.upper] - y[interfaces.lower]
-        kinds = zip(interfaces.kind, interfaces.law0, interfaces.series, gap, strict=True)
-        return [
-            _contact(int(kind), interfaces.law, int(first), float(series), float(g))
-            for kind, first, series, g in kinds
-        ]
+        forces, slopes = contacts_at_rest(
+            interfaces.kind, interfaces.law, interfaces.law0, interfaces.series, gap
+        )
+        return list(zip(forces.tolist(), slopes.tolist(), strict=True))
 
     def _in_range(self, y: Vector) -> bool:
         """Whether no armature is beyond its pole, and none far outside its map."""
@@ -433,6 +462,8 @@ class _Balance:
     def _slopes_of_kept_states(self, state: _State) -> None:
         """Repeat the slopes with those ports whose motion changes such a state."""
         elements = self.network.elements
+        if not self.kept:
+            return
         force, inflow = self.force.copy(), self.inflow.copy()
         for k, _ in self.kept:
             for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
@@ -443,8 +474,7 @@ class _Balance:
                 if self.answers(moved):
                     self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
                     self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
-        if self.kept:  # what the rows gave out last belongs to the state itself
-            self.answers(state)
+        self.answers(state)  # what the rows gave out last belongs to the state itself
 
     def _moved(self, state: _State, change: Vector) -> _State:
         n, r, f = self.ports, self.of_body.size, self.free.size
@@ -473,19 +503,19 @@ class _Balance:
         pressure the energy itself is small, its round-off is that of the pressure.
         """
         at_ends = state.p[self.ends]
-        fluid = np.array([self._fluid(p) for p in at_ends.ravel()]).reshape(-1, 2, 3)
+        fluid = self._fluid(at_ends.ravel()).reshape(-1, 2, 3)
         g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
         drop = self.friction * state.m
         return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
-    def _fluid(self, p: float) -> tuple[float, float, float]:
-        rho, slope, g, _ = fluid_at(self.network.nodes.fluid, p, 0)
-        return rho, slope, g
+    def _fluid(self, p: Vector) -> Matrix:
+        """Density, slope and pressure energy at each pressure, shape (n, 3)."""
+        return np.asarray(fluids_at(self.network.nodes.fluid, p))
 
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
         """Mass in each free volume [kg], its change with the pressure, and the density."""
         volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
-        fluid = np.array([self._fluid(state.p[i])[:2] for i in self.free]).reshape(-1, 2)
+        fluid = self._fluid(state.p[self.free])
         return volume * fluid[:, 0], volume * fluid[:, 1], fluid[:, 0]
 
     def volumes(self, y: Vector) -> Vector:
@@ -500,49 +530,30 @@ class _Balance:
         self, state: _State, start: _State, creep: Vector, mass: Vector, tau: float
     ) -> Vector:
         """Change of all unknowns by one Newton step."""
-        n, r, f, c = self.ports, self.of_body.size, self.free.size, len(self.ends)
-        force_y, flow_y = self.by_port[:n], self.by_port[n + 1 :][self.free]
-        force_p, flow_p = self.by_pressure[:n, :f], self.by_pressure[n + 1 :, :f][self.free]
-        through = np.where(self.shut, 0.0, tau)[:, None]
-        A, left = np.zeros((n + r + f + c, n + r + f + c)), np.zeros(n + r + f + c)
-        Y, Z, P = slice(0, n), slice(n, n + r), slice(n + r, n + r + f)
-        M = slice(n + r + f, n + r + f + c)
-        A[Y, Y] = np.eye(n) - self.compliance @ force_y
-        A[Y, Z] = -self.shapes.T
-        A[Y, P] = -self.compliance @ force_p
-        left[Y] = self._bent(state)
-        A[Z, Y] = -creep[:, None] * (self.shapes @ force_y)
-        A[Z, Z] = np.eye(r)
-        A[Z, P] = -creep[:, None] * (self.shapes @ force_p)
-        left[Z] = state.z - start.z - creep * (self.shapes @ self.force[:-1])
+        n, f = self.ports, self.free.size
+        force_y, force_p = self.by_port[:n], self.by_pressure[:n, :f]
         now, by_p, density = self._masses(state)
-        A[P, Y] = -through * flow_y
-        if self.enclosed:
-            nodes = self.network.nodes
-            for i, port, area in zip(
-                nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True
-            ):
-                for j in np.flatnonzero(self.free == i):
-                    if port < n:
-                        A[n + r + j, port] += area * density[j]
-        A[P, P] = np.diag(by_p) - through * flow_p
-        left[P] = now - mass - through[:, 0] * self._net(state)
-        for k, pair in enumerate(self.ends):
-            for sign, i in zip((1.0, -1.0), pair, strict=True):
-                for j in np.flatnonzero(self.free == i):
-                    A[n + r + j, M.start + k] += sign * through[j, 0]
-                    A[M.start + k, n + r + j] -= sign / self._fluid(state.p[i])[0]
-            A[M.start + k, M.start + k] = self.friction[k]
-        left[M] = self._columns_left(state)[0]
-        A *= self.units
-        scale = np.max(np.abs(A), axis=1)
-        scale[scale == 0.0] = 1.0
-        A /= scale[:, None]
+        balance = Balance(
+            by_port=self.by_port,
+            by_pressure=self.by_pressure,
+            bent_y=self.compliance @ force_y,
+            bent_p=self.compliance @ force_p,
+            push_y=self.shapes @ force_y,
+            push_p=self.shapes @ force_p,
+            bent=self._bent(state),
+            lag=state.z - start.z - creep * (self.shapes @ self.force[:-1]),
+            filled=now - mass,
+            by_p=by_p,
+            density=density,
+            net=self._net(state),
+            rest=self._columns_left(state)[0],
+        )
+        A, right = newton_system(self.couplings, balance, creep, tau)
         try:
-            change = np.linalg.solve(A, -left / scale)
+            change = np.linalg.solve(A, right)
         except np.linalg.LinAlgError:
-            change = np.linalg.lstsq(A, -left / scale, rcond=None)[0]
-        return np.asarray(change * self.units)
+            change = np.linalg.lstsq(A, right, rcond=None)[0]
+        return np.asarray(change * self.couplings.units)
 
     def failed(self) -> ConvergenceError:
         """Error of the part that knows no answer at the start."""
@@ -719,29 +730,6 @@ class _Balance:
                     "pressure; give its 'pressure' if that differs."
                 )
         return tuple(told)
-
-
-def _contact(kind: int, law: Vector, first: int, series: float, gap: float) -> tuple[float, float]:
-    """Force of a contact at rest [N] and its change with the gap [N/m]."""
-    if kind == NO_LAW or gap >= 0.0:
-        return 0.0, 0.0
-    low, high, d = 0.0, -gap, -gap
-    force = stiffness = 0.0
-    for _ in range(_MOST_NEWTON):
-        force, half, _interval = mean_force(kind, law, first, d, d, 0)
-        stiffness = 2.0 * half
-        excess = d + series * force + gap
-        if excess > 0.0:
-            high = d
-        else:
-            low = d
-        after = d - excess / (1.0 + series * stiffness)
-        if not low <= after <= high:
-            after = 0.5 * (low + high)
-        if after == d or series == 0.0:
-            break
-        d = after
-    return force, -stiffness / (1.0 + series * stiffness)
 
 
 def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:

@@ -40,7 +40,7 @@ from klack.simulation.network_run import State, simulate_network
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["run_stroke", "run_variant", "variant_network"]
+__all__ = ["VariantRun", "one_variant", "run_stroke", "run_variant", "variant_network"]
 
 
 def run_stroke(
@@ -132,7 +132,17 @@ def variant_network(valve: Valve, variant: Variant) -> Network:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Run:
+class VariantRun:
+    """One variant of a stroke, the rows that it ran on, and why it ended early.
+
+    Parameters
+    ----------
+    variant : StrokeVariant
+    rows : Rows
+    failure : ConvergenceError or None
+        With ``variant`` up to there.
+    """
+
     variant: StrokeVariant
     rows: Rows
     failure: ConvergenceError | None
@@ -181,12 +191,12 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
 
 def _runs(
     valve: Valve, roles: ValveRoles, states: Mapping[Variant, State | None], progress: Progress
-) -> tuple[dict[str, _Run], ConvergenceError | None]:
+) -> tuple[dict[str, VariantRun], ConvergenceError | None]:
     """Variants up to the first one that fails, with what there is of it, and its error."""
-    runs: dict[str, _Run] = {}
+    runs: dict[str, VariantRun] = {}
     for name, state in states.items():
         try:
-            runs[name] = _run(valve, roles, name, state, progress)
+            runs[name] = one_variant(valve, roles, name, state, progress)
         except ConvergenceError as error:
             if not runs:
                 raise
@@ -197,9 +207,18 @@ def _runs(
     return runs, None
 
 
-def _run(
+def one_variant(
     valve: Valve, roles: ValveRoles, name: Variant, state: State | None, progress: Progress
-) -> _Run:
+) -> VariantRun:
+    """Compute one variant of a valve, from rest or a state.
+
+    Raises
+    ------
+    InputError
+        For a network that cannot start.
+    ConvergenceError
+        Before the first record.
+    """
     begin = perf_counter()
     stage = f"run {name}"
     progress(stage, 0.0)
@@ -225,7 +244,7 @@ def _run(
         result=result,
         setup_time=perf_counter() - begin - result.wall_time,
     )
-    return _Run(variant=variant, rows=rows, failure=failure)
+    return VariantRun(variant=variant, rows=rows, failure=failure)
 
 
 def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:

@@ -1,0 +1,220 @@
+"""Points of a parameter space and the measures that were computed there."""
+
+import csv
+from dataclasses import dataclass
+from html import escape
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.measures import Measure
+from klack.errors import InputError, MissingExtraError
+from klack.input.problem import nearest, one_of
+from klack.whole_file import whole_file
+
+__all__ = ["NOT_COMPUTED", "PointColumn", "PointTable", "RunsInterrupted", "column_of"]
+
+NOT_COMPUTED = "not computed: the runs were interrupted before"
+_SHOWN = 10  # rows of a short view
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointColumn:
+    """One column of a table of points.
+
+    Parameters
+    ----------
+    name : str
+        Key of the case, or name of a measure.
+    unit : str
+        SI; ``"1"`` for pure numbers, empty for texts.
+    values : array, shape (points,)
+        Numbers, nan where there is none; of a key without unit what is written there.
+    measure : Measure, optional
+        With its definition.
+    """
+
+    name: str
+    unit: str
+    values: NDArray[Any]
+    measure: Measure[Any] | None = None
+
+    @property
+    def head(self) -> str:
+        """Name with the unit."""
+        return self.name if self.unit in ("", "1") else f"{self.name} [{self.unit}]"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointTable:
+    """Measures of a case at points of its parameter space, one row per point in the given order.
+
+    Parameters
+    ----------
+    case : str
+        Name of the case.
+    variant : str
+        That was computed.
+    points : tuple of PointColumn
+        Keys that points exchange, in SI; nan or None where a point leaves the case as it is.
+    measures : tuple of PointColumn
+        In the order in which they were asked for; nan where a run does not have the number.
+    failures : tuple of str
+        Why a point has no measures: the error of its run; empty where it was computed.
+    warnings : tuple of tuple of str
+        Doubts about the numbers of each point.
+    """
+
+    case: str
+    variant: str
+    points: tuple[PointColumn, ...]
+    measures: tuple[PointColumn, ...]
+    failures: tuple[str, ...]
+    warnings: tuple[tuple[str, ...], ...]
+
+    def __len__(self) -> int:
+        return len(self.failures)
+
+    @property
+    def columns(self) -> tuple[PointColumn, ...]:
+        """Points, then measures."""
+        return (*self.points, *self.measures)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Values of a key or a measure, shape (points,).
+
+        Raises
+        ------
+        InputError
+            If there is none of this name.
+        """
+        for column in self.columns:
+            if column.name == name:
+                return column.values
+        names = [column.name for column in self.columns]
+        raise InputError(
+            "column of a table of points",
+            got=f"'{name}'",
+            expected=f"one of: {one_of(names)}",
+            hint=nearest(str(name), names, "name a key or a measure of this table."),
+        )
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Points without measures, shape (points,)."""
+        return np.array([bool(text) for text in self.failures], dtype=bool)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Columns by name, then ``"failure"``, the text of each point."""
+        found = {column.name: column.values for column in self.columns}
+        return found | {"failure": np.array(self.failures, dtype=object)}
+
+    def to_pandas(self) -> Any:
+        """Return a ``pandas.DataFrame``; units are in its ``attrs["units"]``.
+
+        Raises
+        ------
+        MissingExtraError
+            Without the package pandas.
+        """
+        try:
+            from pandas import DataFrame  # type: ignore[import-untyped]
+        except ImportError:
+            raise MissingExtraError("pandas", "A table of points as a DataFrame", None) from None
+        frame = DataFrame(self.arrays())
+        frame.attrs["units"] = {column.name: column.unit for column in self.columns}
+        return frame
+
+    def to_csv(self, file: str | Path) -> Path:
+        """Write a CSV file: a head with units, all digits, empty where there is no number."""
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow([*(column.head for column in self.columns), "failure"])
+        for i, failure in enumerate(self.failures):
+            writer.writerow([*(_written(column.values[i]) for column in self.columns), failure])
+        path = Path(file)
+        with whole_file(path) as part:
+            part.write_text(text.getvalue(), encoding="utf-8", newline="")
+        return path
+
+    def __repr__(self) -> str:
+        rows = [[column.head for column in self.columns]]
+        rows += [self._row(i) for i in range(min(len(self), _SHOWN))]
+        widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+        lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in rows]
+        marks = ["", *(_first_line(text) for text in self.failures)]
+        table = [f"{line}  {mark}".rstrip() for line, mark in zip(lines, marks, strict=False)]
+        return "\n".join([self._title(), *table, *self._rest()])
+
+    def _repr_html_(self) -> str:
+        heads = "".join(f"<th>{escape(column.head)}</th>" for column in self.columns)
+        rows = "".join(
+            "<tr>"
+            + "".join(f"<td>{escape(cell)}</td>" for cell in self._row(i))
+            + f"<td>{escape(_first_line(self.failures[i]))}</td></tr>"
+            for i in range(min(len(self), _SHOWN))
+        )
+        rest = "".join(f"<p>{escape(line)}</p>" for line in self._rest())
+        return (
+            f"<b>{escape(self._title())}</b><table><thead><tr>{heads}<th></th></tr></thead>"
+            f"<tbody>{rows}</tbody></table>{rest}"
+        )
+
+    def _title(self) -> str:
+        failed = int(self.failed.sum())
+        doubts = sum(bool(notes) for notes in self.warnings)
+        parts = [f"{self.case}, {self.variant}: {len(self)} points"]
+        parts += [f"{failed} without measures"] if failed else []
+        parts += [f"{doubts} with warnings"] if doubts else []
+        return ", ".join(parts)
+
+    def _row(self, i: int) -> list[str]:
+        return [_short(column.values[i]) for column in self.columns]
+
+    def _rest(self) -> list[str]:
+        return [f"... and {len(self) - _SHOWN} more"] if len(self) > _SHOWN else []
+
+
+class RunsInterrupted(KeyboardInterrupt):
+    """Ctrl-C during the runs of many points.
+
+    Parameters
+    ----------
+    table : PointTable
+        What was computed until then; the other points say that they were not computed.
+    """
+
+    def __init__(self, table: PointTable) -> None:
+        super().__init__(f"interrupted after {int((~table.failed).sum())} of {len(table)} points")
+        self.table = table
+
+
+def column_of(
+    name: str, unit: str, values: list[Any], measure: Measure[Any] | None = None
+) -> PointColumn:
+    """Return a column: an array of floats if it has a unit, nan for None; else of objects."""
+    if not unit:
+        kept = np.empty(len(values), dtype=object)
+        kept[:] = values
+        return PointColumn(name, unit, kept, measure)
+    numbers = [float("nan") if value is None else float(value) for value in values]
+    return PointColumn(name, unit, np.array(numbers, dtype=float), measure)
+
+
+def _written(value: Any) -> str:
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return ""
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _short(value: Any) -> str:
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _first_line(text: str) -> str:
+    return text.partition("\n")[0]
