@@ -23,10 +23,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from klack.acoustics.port_forces import aligned_forces
+from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries

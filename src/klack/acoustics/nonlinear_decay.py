@@ -18,9 +18,10 @@ rise above ``v`` in falling. ``u`` is taken straight between its values, which c
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
+
+from klack.compiling.jit import njit
 
 __all__ = ["nonlinear_decay"]
 

@@ -9,8 +9,9 @@ revolution.  With it the 3 x 3 block of a solid is ``lambda G + mu (G^T + tr G 1
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
 
 __all__ = ["add_elements", "block_pattern", "diagonal_blocks", "node_graph"]
 

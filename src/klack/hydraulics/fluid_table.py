@@ -18,9 +18,9 @@ A last row of the same form starts at the highest pressure.
 from math import log1p
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.mixture import LOWEST_PRESSURE

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import exp, pi, sqrt
 from typing import Any, ClassVar, Self
 
-from numba import njit
 from pydantic import Field, model_validator
 
+from klack.compiling.jit import njit
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.input.problem import CaseProblem
 from klack.input.section import Count

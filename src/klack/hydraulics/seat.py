@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import acos, cos, pi, sin, sqrt
 from typing import Any, ClassVar, Literal, Self
 
-from numba import njit
 from pydantic import Field, model_validator
 
+from klack.compiling.jit import njit
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow, orifice_flow

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from numba import njit
+from klack.compiling.jit import njit
 
 __all__ = ["NEVER", "crossed_switch", "due_switch", "next_time", "state_block", "state_voltage"]
 

@@ -20,10 +20,11 @@ All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``
 from math import sqrt
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from klack.compiling.jit import njit
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 

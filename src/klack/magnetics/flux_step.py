@@ -16,9 +16,9 @@ identity stays exact:
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import njit
 from klack.errors import require_positive
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.drive_kernel import (

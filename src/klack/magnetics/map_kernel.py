@@ -18,9 +18,9 @@ continues by one more unbounded cell on each side.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_table import BRANCH_SIZE, HEADER, MAP
 

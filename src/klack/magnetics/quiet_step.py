@@ -7,8 +7,7 @@ course of voltage, a table interval left, a second Newton step) it leaves to the
 
 from typing import Any
 
-from numba import njit
-
+from klack.compiling.jit import njit
 from klack.magnetics.drive_kernel import state_block
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER

@@ -38,9 +38,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
 
 __all__ = [
     "STEP",
@@ -70,8 +72,11 @@ PythonStep = Callable[
 
 
 def step_function(function: Callable[..., int]) -> StepFunction:
-    """Compile a step function; it may call other compiled functions and index its pointers."""
-    return njit(STEP, cache=True, error_model="numpy")(function)
+    """Compile a step function when a network first has it, not when its file is imported.
+
+    It may call other compiled functions and index its pointers.
+    """
+    return njit(cache=True, error_model="numpy", no_cpython_wrapper=True)(function)
 
 
 @intrinsic

@@ -14,9 +14,9 @@ would be lost.  Laws arrive as flat numbers, see :class:`klack.contact.laws.Flat
 from math import sqrt
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.step_constants import (
     FORCE_LEFT,
     HERTZ_EQUAL,

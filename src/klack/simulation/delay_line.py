@@ -29,9 +29,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.network.rows import LineRow
 from klack.network.step_function import first, shift

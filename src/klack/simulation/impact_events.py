@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.rest import effective_mass, longest_period, rest_time

@@ -32,9 +32,9 @@ order 1.
 from math import log
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.step_constants import (
     FILM_NEWTON_LIMIT,
     FORCE_LEFT,

@@ -8,9 +8,9 @@ for each contact that is closed or closes.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched

@@ -16,9 +16,9 @@ for each number of ports, because a loop over ports inside the loop over modes w
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.simulation.kernel import FAST
 
 __all__ = [

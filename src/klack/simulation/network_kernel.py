@@ -18,9 +18,9 @@ release or in a noticeable film, it is discarded and done again in fine steps.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.network_arrays import (

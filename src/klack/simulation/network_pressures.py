@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from klack.compiling.jit import njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
 from klack.simulation.network_arrays import FORCE, SEEN, STORE, USED, Step

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from numba import njit
+from klack.compiling.jit import njit
 
 __all__ = ["compiled", "phase"]
 

@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
 from klack.simulation.network_arrays import StepRows
 from klack.simulation.phase import phase

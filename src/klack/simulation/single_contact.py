@@ -9,9 +9,9 @@ which costs as much as the pass itself.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched

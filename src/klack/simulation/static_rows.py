@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.step_function import first, pointers
 from klack.simulation.network_arrays import Nodes, StepRows

@@ -5,9 +5,9 @@ point that opens takes a row out, each at the cost of one product with it.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import ActiveSet
 

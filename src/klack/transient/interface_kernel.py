@@ -32,9 +32,9 @@ and the matrix of the complementarity problem loses
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import (

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import njit
 from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.driver import DriveProgram

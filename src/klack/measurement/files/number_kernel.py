@@ -6,8 +6,9 @@ fast path), which is exact up to 15 digits and right to two units in the last pl
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
 
 __all__ = ["BAD_CELL", "TOO_MANY", "WHITESPACE", "parse_rows"]
 
