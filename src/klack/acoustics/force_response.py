@@ -192,7 +192,7 @@ def _interval(sample: float | None, axis: TimeSeries) -> int:
     return every
 
 
-@njit(cache=True)
+@njit
 def _march(  # type: ignore[no-untyped-def]
     A, Q, squares, phi, part, force, q, v, every, states, stored, momentum, work, lost
 ):  # pragma: no cover - compiled

@@ -75,7 +75,7 @@ def injected_energy(density: Spectrum) -> float:
     return float(np.trapezoid(np.real(density.values), density.frequency))
 
 
-@njit(cache=True)
+@njit
 def _density(omega, steps, w, zeta, phi):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Sum the losses of all modes at all frequencies, shape (k,)."""
     out = np.zeros(omega.size)

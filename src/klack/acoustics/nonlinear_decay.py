@@ -54,7 +54,7 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _follow(core, both, alone, charge, fine):  # type: ignore[no-untyped-def]
     bands, n = core.shape
     out = np.empty((bands, n))

@@ -76,7 +76,7 @@ def step_function(function: Callable[..., int]) -> StepFunction:
 
     It may call other compiled functions and index its pointers.
     """
-    return njit(cache=True, error_model="numpy", no_cpython_wrapper=True)(function)
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=False)(function)
 
 
 @intrinsic
@@ -160,7 +160,7 @@ def address_of(step: StepFunction) -> int:
 Vector = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit
 def _call(address: int, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
     return int(call(address, first(par), first(state), first(inp), first(out)))
 

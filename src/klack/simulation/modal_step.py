@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 
 __all__ = [
@@ -55,7 +55,7 @@ _N = ROW
 _R = FIXED_ROWS
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance1(W: Any, n: int, F0: float) -> float:
     y0 = 0.0
     for i in range(n):
@@ -69,7 +69,7 @@ def _advance1(W: Any, n: int, F0: float) -> float:
     return y0
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance2(W: Any, n: int, F0: float, F1: float) -> tuple[float, float]:
     y0, y1 = 0.0, 0.0
     for i in range(n):
@@ -84,7 +84,7 @@ def _advance2(W: Any, n: int, F0: float, F1: float) -> tuple[float, float]:
     return y0, y1
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance3(W: Any, n: int, F0: float, F1: float, F2: float) -> tuple[float, float, float]:
     y0, y1, y2 = 0.0, 0.0, 0.0
     for i in range(n):
@@ -100,7 +100,7 @@ def _advance3(W: Any, n: int, F0: float, F1: float, F2: float) -> tuple[float, f
     return y0, y1, y2
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance4(
     W: Any, n: int, F0: float, F1: float, F2: float, F3: float
 ) -> tuple[float, float, float, float]:
@@ -120,7 +120,7 @@ def _advance4(
     return y0, y1, y2, y3
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance_forced(W: Any, n: int) -> None:
     for i in range(n):
         f = W[10 * _N + i]
@@ -129,13 +129,13 @@ def _advance_forced(W: Any, n: int) -> None:
         W[_N + i] = W[4 * _N + i] * q + W[5 * _N + i] * v + W[7 * _N + i] * f
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _add_row(W: Any, n: int, row: int, F: float) -> None:
     for i in range(n):
         W[10 * _N + i] += W[row * _N + i] * F
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def watch(W: Any, n: int, of: int, row: int) -> float:
     """Return the sum of the products of row ``of`` (``ROW_Q`` or ``ROW_V``) and row ``row``."""
     y = 0.0
@@ -144,7 +144,7 @@ def watch(W: Any, n: int, of: int, row: int) -> float:
     return y
 
 
-@njit(cache=True)
+@inner(_nrt=False, error_model="numpy", forceinline=True)
 def _modal_force(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     for i in range(n):
         W[10 * _N + i] = 0.0
@@ -152,7 +152,7 @@ def _modal_force(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         _add_row(W, n, _R + p - port0, F[p])
 
 
-@njit(cache=True)
+@njit(_nrt=False, error_model="numpy", forceinline=True)
 def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
     """Advance one block.
 
@@ -192,7 +192,7 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
             y[p] += watch(W, n, 0, _R + p - port0)
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     """Bring the forces of the last step into the state: ``q += B1 f``, ``v += B2 f``."""
     _modal_force(W, n, F, port0, port1)

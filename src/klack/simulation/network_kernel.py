@@ -109,7 +109,7 @@ class _Loop(NamedTuple):
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
-@njit(cache=True, _nrt=False, error_model="numpy")
+@njit(_nrt=False, error_model="numpy")
 def run_network(
     macros: int,
     per_record: int,

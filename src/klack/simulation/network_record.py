@@ -27,7 +27,7 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
         peaks[c] = 0.0
 
 
-@njit(cache=True)
+@njit(_nrt=False, error_model="numpy")
 def record_points(
     recording: Recording,
     record: int,

@@ -97,7 +97,7 @@ def take_states(rows: Any, k: int) -> int:
     return o0 + rows.states[k]
 
 
-@njit(cache=True)
+@njit
 def call_rows(
     rows: StepRows, t: float, h: float, y: Vector, v: Vector, p: Vector, rho: Vector
 ) -> tuple[int, int]:

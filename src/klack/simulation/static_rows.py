@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.step_function import first, pointers
 from klack.simulation.network_arrays import Nodes, StepRows
@@ -20,7 +20,7 @@ Index = NDArray[np.int64]
 _PRESS = 1e-9  # change of a pressure to see what follows from it, over the pressure
 
 
-@njit(cache=True)
+@njit
 def at_rest(
     elements: StepRows,
     branches: StepRows,
@@ -91,7 +91,7 @@ def at_rest(
     return True
 
 
-@njit(cache=True)
+@inner
 def _gather(rows: StepRows, force: Vector, size: Vector) -> None:
     """Add the forces of all rows to those of their ports, and what their round-off belongs to."""
     for k in range(rows.rows):
@@ -101,7 +101,7 @@ def _gather(rows: StepRows, force: Vector, size: Vector) -> None:
             size[rows.ports[j]] += abs(rows.outputs[o0 + j - q0])
 
 
-@njit(cache=True)
+@njit
 def slopes_at_rest(
     elements: StepRows,
     branches: StepRows,

@@ -152,7 +152,7 @@ def interface_motion(
     )
 
 
-@njit(cache=True)
+@njit
 def _run(
     q: Vector,
     v: Vector,

@@ -69,7 +69,7 @@ class CoilRun:
         return self.time[1:][np.diff(self.state) != 0]
 
 
-@njit(cache=True)
+@njit
 def _march(
     address: int, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
 ) -> int:

@@ -166,7 +166,7 @@ def run_line(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _march(
     lines: Lines,
     state: LineState,
