@@ -234,7 +234,7 @@ def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
     return p0 + s, i
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _volume(table: Vector, i: int, s: float) -> tuple[float, float]:
     """Specific volume and its slope in the piece at offset ``i``."""
     c1, c2, c3, c4, c5 = table[i + 2], table[i + 3], table[i + 4], table[i + 5], table[i + 6]

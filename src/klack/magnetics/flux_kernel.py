@@ -24,7 +24,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from klack.compiling.jit import inner, njit
+from klack.compiling.jit import inner
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 
@@ -55,7 +55,7 @@ def stack(typingctx: Any, size: Any) -> Any:
     return signature, codegen
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def interval(par: Any, table: int, hint: int, value: float) -> int:
     """Number of the interval that holds ``value``, searched from where it was last."""
     last = int(par[table]) - 1
@@ -67,12 +67,12 @@ def interval(par: Any, table: int, hint: int, value: float) -> int:
     return i
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _cubic(par: Any, row: int, s: float) -> float:
     return par[row + 1] + s * (par[row + 2] + s * (par[row + 3] + s * par[row + 4]))
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _cubic_integral(par: Any, row: int, s: float) -> float:
     return s * (
         par[row + 1]
@@ -116,7 +116,7 @@ def _iron_mean_far(par: Any, table: int, hint: int, b0: float, b1: float) -> tup
     return mean, ((end_mmf if b1 >= 0.0 else -end_mmf) - mean) / change
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _mean_of(par: Any, row: int, s0: float, s1: float) -> float:
     """Mean of a cubic between ``s0`` and ``s1``."""
     total, squares = s0 + s1, s0 * s0 + s1 * s1
@@ -156,7 +156,7 @@ def gap_reluctance(par: Any, table: int, hint: int, x: float) -> float:
     return _cubic(par, row, x - par[row])
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _quotient_of(par: Any, row: int, s0: float, s1: float) -> float:
     """Difference quotient of a cubic between ``s0`` and ``s1``."""
     total = s0 + s1
@@ -179,13 +179,13 @@ def gap_slope(par: Any, table: int, hint: int, x0: float, x1: float) -> float:
     return rise / (b - a)
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _tube(par: Any, at: int, k: int) -> int:
     loops = int(par[at])
     return at + _HEADER + loops + k * (_SIZE + loops)
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_flux(par: Any, at: int, k: int, phi: Any) -> float:
     """Flux of the tube ``k`` [Wb] from the loop fluxes."""
     loops, row = int(par[at]), _tube(par, at, k) + _SIZE
@@ -195,7 +195,7 @@ def circuit_flux(par: Any, at: int, k: int, phi: Any) -> float:
     return flux
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def linked(par: Any, at: int, phi: Any) -> float:
     """Linkage of the coil [Wb] from the loop fluxes (or their changes)."""
     total = par[at + _HEADER] * phi[0]
@@ -204,7 +204,7 @@ def linked(par: Any, at: int, phi: Any) -> float:
     return total
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_gaps(
     par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
 ) -> None:
@@ -232,7 +232,7 @@ def circuit_gaps(
         p += _SIZE + loops
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
     """Current [A] that belongs to ``phi + change`` and the reluctances ``end`` of the tubes."""
     loops = int(par[at])
@@ -253,7 +253,7 @@ def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: A
     return current
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
     """Stored energy [J]; notes in ``hints`` where in the tables of iron it was found."""
     loops = int(par[at])
@@ -274,7 +274,7 @@ def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
     return energy
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_loss_and_force(
     par: Any, at: int, phi: Any, change: Any, slope: Any
 ) -> tuple[float, float]:

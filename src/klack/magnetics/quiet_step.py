@@ -7,7 +7,7 @@ course of voltage, a table interval left, a second Newton step) it leaves to the
 
 from typing import Any
 
-from klack.compiling.jit import inner, njit
+from klack.compiling.jit import inner
 from klack.magnetics.drive_kernel import state_block
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
@@ -28,7 +28,7 @@ _STRIDE = _SIZE + 2
 _THIRD = 1.0 / 3.0
 
 
-@njit(error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _quiet_until(par: Any, block: int, state: Any, end: float, current: float) -> bool:
     """Whether no switch of a state is due up to the time ``end`` and its current."""
     low, high = min(state[4], current), max(state[4], current)

@@ -119,7 +119,9 @@ def call_rows(
     (int, int)
         The row that failed and its status; -1 and 0 if none did.
     """
-    before = y - h * v
+    before = np.empty(y.size)
+    for i in range(y.size):
+        before[i] = y[i] - h * v[i]
     at, y0, y1 = pointers(rows), first(before), first(y)
     for k in range(rows.rows):
         if rows.head > 0:
