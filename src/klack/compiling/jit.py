@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 import numba
+from numba.core import types
 
 from klack.compiling.compiled_store import CompiledStore
 
@@ -30,7 +31,15 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     options.pop("cache", None)
     dispatcher = numba.njit(**(_DEFAULTS | options))(function)
     dispatcher._cache = CompiledStore(dispatcher)
+    dispatcher.get_call_template = partial(_call_template, dispatcher)
     return dispatcher
+
+
+def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
+    """Template of a call from compiled code: numba would compile anew for every literal number."""
+    plain = tuple(map(types.unliteral, args))
+    named = {name: types.unliteral(kind) for name, kind in kws.items()}
+    return type(dispatcher).get_call_template(dispatcher, plain, named)
 
 
 _DEFAULTS = {
