@@ -49,8 +49,10 @@ __all__ = [
     "StepFunction",
     "address_of",
     "call",
+    "compile_step",
     "evaluate",
     "first",
+    "is_step_function",
     "pointer",
     "pointers",
     "python_step",
@@ -76,7 +78,9 @@ def step_function(function: Callable[..., int]) -> StepFunction:
 
     It may call other compiled functions and index its pointers.
     """
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=False)(function)
+    step = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=False)(function)
+    step.is_klack_step = True
+    return step
 
 
 @intrinsic
@@ -148,8 +152,21 @@ def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any)
     return signature, codegen
 
 
+def is_step_function(found: object) -> bool:
+    """Whether something is what :func:`step_function` returned."""
+    return getattr(found, "is_klack_step", False) is True
+
+
+def compile_step(step: StepFunction) -> None:
+    """Compile a step function, or load it."""
+    step.get_compile_result(STEP)
+
+
 def address_of(step: StepFunction) -> int:
-    """Address of the C entry of a step function; valid as long as the function is kept."""
+    """Address of the C entry of a step function; valid as long as the function is kept.
+
+    Compiles it, or loads it, the first time.
+    """
     if isinstance(step, _PythonStep):
         return step.address
     result = step.get_compile_result(STEP)
