@@ -26,7 +26,7 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
 from klack.analyses.catalogue import commands
-from klack.cli import cache, compare, demo, export, inspect, report, schema, verify
+from klack.cli import cache, compare, demo, export, inspect, report, schema, verify, warm
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
@@ -66,6 +66,7 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     verify.verify: "klack verify --group contact",
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",
+    warm.warm: "klack warm",
 }
 """Every command, with the example that its help shows."""
 

@@ -19,7 +19,14 @@ import klack
 from klack.compiling.compiled_folder import compiled_folder, is_usable
 from klack.cores import available_cores
 
-__all__ = ["LOOP_AND_REST", "compiling_ahead", "is_ready", "mark_ready", "start_compiling"]
+__all__ = [
+    "LOOP_AND_REST",
+    "compiling_ahead",
+    "is_ready",
+    "mark_ready",
+    "start_compiling",
+    "stop_compiling",
+]
 
 LOOP_AND_REST = ("loop", "rest")
 """Groups that every network needs, the longest first."""
@@ -53,32 +60,46 @@ def compiling_ahead(
     if cores < 2 or not is_usable(compiled_folder()):
         yield
         return
-    process = start_compiling([group for group in groups if not is_ready(group)])
+    process = None
+    with suppress(OSError):
+        process = start_compiling([group for group in groups if not is_ready(group)])
     try:
         yield
     finally:
         if process is not None:
-            _end(process)
+            stop_compiling(process)
 
 
-def start_compiling(groups: Sequence[str]) -> "subprocess.Popen[bytes] | None":
-    """Start a process that compiles these groups, one after another; None if that fails.
+def start_compiling(
+    groups: Sequence[str], output: int = subprocess.DEVNULL
+) -> "subprocess.Popen[bytes]":
+    """Start a process that compiles these groups, one after another.
 
     It ends by itself when this process has gone.
+
+    Parameters
+    ----------
+    groups : sequence of str
+    output : int
+        ``subprocess.PIPE`` to read a line for each group: name, seconds, functions.
+
+    Raises
+    ------
+    OSError
+        If the system starts no more processes.
     """
-    with suppress(OSError):
-        return subprocess.Popen(
-            [sys.executable, "-P", "-m", _WARM, *groups],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            cwd=Path(klack.__file__).parent,
-            env=os.environ | {"KLACK_CACHE": "off"},
-        )
-    return None
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", _WARM, *groups],
+        stdin=subprocess.PIPE,
+        stdout=output,
+        stderr=output,
+        cwd=Path(klack.__file__).parent,
+        env=os.environ | {"KLACK_CACHE": "off"},
+    )
 
 
-def _end(process: "subprocess.Popen[bytes]") -> None:
+def stop_compiling(process: "subprocess.Popen[bytes]") -> None:
+    """End a process of :func:`start_compiling`; what it has compiled stays."""
     if process.stdin is not None:
         with suppress(OSError):
             process.stdin.close()

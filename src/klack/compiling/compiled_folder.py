@@ -3,13 +3,22 @@
 import os
 import stat
 import warnings
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from klack.errors import CacheWarning
 from klack.own_file import caller
 
-__all__ = ["FOLDER_VARIABLE", "compiled_folder", "is_trusted", "is_usable", "warn_once"]
+__all__ = [
+    "FOLDER_VARIABLE",
+    "clear_folder",
+    "compiled_folder",
+    "is_trusted",
+    "is_usable",
+    "stored",
+    "warn_once",
+]
 
 FOLDER_VARIABLE = "NUMBA_CACHE_DIR"
 """Environment variable that names another parent folder; numba uses it as well."""
@@ -48,6 +57,31 @@ def is_usable(folder: Path | None) -> bool:
     if there is None or not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
         return False
     return there != folder or is_trusted(folder.stat())
+
+
+def stored(folder: Path) -> tuple[int, int]:
+    """Count the functions that are kept, and the bytes of all files of the folder."""
+    count = size = 0
+    with suppress(OSError):
+        for entry in os.scandir(folder):
+            with suppress(OSError):
+                size += entry.stat(follow_symlinks=False).st_size
+                count += entry.name.endswith(".code")
+    return count, size
+
+
+def clear_folder(folder: Path) -> None:
+    """Delete what is kept, except what another process writes at this moment.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be deleted.
+    """
+    with suppress(FileNotFoundError):
+        for entry in os.scandir(folder):
+            if entry.name.endswith((".code", ".ready", ".part")):
+                Path(entry.path).unlink(missing_ok=True)
 
 
 @cache
