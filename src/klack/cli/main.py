@@ -123,7 +123,8 @@ def _run(arguments: list[str], name: str) -> int:
         usual, warnings.showwarning = warnings.showwarning, note
         if arguments and not arguments[0].startswith("-"):
             require_present_folder()
-            prepare_compiling()
+            if arguments[0] != "warm":  # which says itself that there is no folder
+                prepare_compiling()
         code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
     sys.stdout.flush()
     return code if isinstance(code, int) else EXIT_OK
