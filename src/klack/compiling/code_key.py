@@ -18,7 +18,8 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from numba.core import config, types
+from numba import types
+from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
 __all__ = ["code_key"]

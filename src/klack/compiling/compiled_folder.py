@@ -42,7 +42,7 @@ def compiled_folder() -> Path | None:
 def is_trusted(state: os.stat_result) -> bool:
     """Whether only the caller or the administrator can have written a file or folder.
 
-    Machine code is run, so nobody else's is.
+    Machine code is run, so only that of these two is.
     """
     if caller() is None:
         return True

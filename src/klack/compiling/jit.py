@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 import numba
-from numba.core import types
+from numba import types
 
 from klack.compiling.compiled_store import CompiledStore
 

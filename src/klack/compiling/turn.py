@@ -26,7 +26,7 @@ _PATIENCE = 600.0  # [s] then it compiles itself: the other one may have been st
 
 
 class Turn:
-    """A locked file; without one nobody is kept out."""
+    """A locked file; without one, no process is kept out."""
 
     def __init__(self, path: Path, handle: int | None) -> None:
         self._path, self._handle = path, handle

@@ -31,7 +31,7 @@ def counted() -> Iterator[Compiled]:
     count = Compiled()
     depth, begin = 0, 0.0
 
-    class Listener(event.Listener):  # type: ignore[misc]
+    class Listener(event.Listener):
         def on_start(self, event: Any) -> None:
             nonlocal depth, begin
             if depth == 0:
