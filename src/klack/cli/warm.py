@@ -23,7 +23,7 @@ def warm(
 ) -> int:
     """Compile ahead what strokes and impacts need, once for each processor and version.
 
-    Without it the first command compiles, for up to half a minute.
+    Without it the first command compiles, for a minute or less.
     What is there already is not compiled again.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """

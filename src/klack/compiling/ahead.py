@@ -31,7 +31,7 @@ __all__ = [
 LOOP_AND_REST = ("loop", "rest")
 """Groups that every network needs, the longest first."""
 
-_TELL = "Compiling for this processor, once: up to half a minute. 'klack warm' does it ahead."
+_TELL = "Compiling for this processor, once: about a minute or less. 'klack warm' does it ahead."
 _WARM = "klack.warming"
 _FAREWELL = 5.0  # [s] until a process that was asked to end is ended
 
