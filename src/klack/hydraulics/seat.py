@@ -90,7 +90,7 @@ def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     ``state``: lift, area, jet force, mass flow, 1 once that flow is known.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
-    x = max(par[4] + inp[7] - inp[9], 0.0)
+    x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
     area, gap = _opening(par[0], x, par[1], par[2], par[3])
     area = min(area, par[5])
     flow = up = down = 0.0

@@ -62,6 +62,8 @@ LINE_MEMORY = ("samples", "head", "memory", "cavity")
 """Arrays of :class:`LineState` that one step hands on to the next."""
 
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over friction terms use registers
+_ROOM = 8  # windows of samples under way that a memory has room for
+_MOST_ROOM = 20_000  # samples, unless the window itself is longer
 _A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as whole
 
 
@@ -77,6 +79,8 @@ class Lines(NamedTuple):
         Fine step.
     coarse : int
         Fine steps of a coarse step.
+    near : int
+        Fine steps of a step between both.
     node : array of int, shape (2 n,)
         Hydraulic node of each end.
     impedance : array, shape (n,) [Pa s/m^3]
@@ -92,25 +96,29 @@ class Lines(NamedTuple):
         Rest of the delay, in steps.
     start : array of int, shape (s, 2)
         Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
-        twice as long as needed, the window of samples under way moves up, then back to its start.
+        several times as long as needed, the window of samples under way moves up, then back to its
+        start.
+    room : array of int, shape (s,)
+        Samples that this window may move up.
     first_term : array of int, shape (n + 1,)
         Terms of frequency-dependent friction of each line.
     first_memory : array of int, shape (n,)
         Where the memories of a line start; ordered by lump, then by term.
-    impedance_of_term : array, shape (2, k) [Pa s/m^3]
-        Mean ``dp / (q - i)`` of one whole lump over a fine step (0) and a coarse step (1).
-    decay : array, shape (2, k) [-]
-        Share of ``q - i`` left after a fine step (0) and a coarse step (1).
-    heat : array, shape (2, k) [Pa s^2/m^3]
+    impedance_of_term : array, shape (3, k) [Pa s/m^3]
+        Mean ``dp / (q - i)`` of one whole lump over a fine (0), a coarse (1) and a near step (2).
+    decay : array, shape (3, k) [-]
+        Share of ``q - i`` left after such a step.
+    heat : array, shape (3, k) [Pa s^2/m^3]
         Loss of one whole lump in a step over ``(q - i)^2``.
     inductance : array, shape (k,) [Pa s^2/m^3]
         Of one whole lump, ``gain / rate``.
-    lump : array, shape (2, n) [Pa s/m^3]
+    lump : array, shape (3, n) [Pa s/m^3]
         ``dp / q`` of one whole lump without memory: its resistance and all its terms.
     """
 
     step: float
     coarse: int
+    near: int
     node: Integers
     impedance: Vector
     resistance: Vector
@@ -119,6 +127,7 @@ class Lines(NamedTuple):
     depth: Integers
     fraction: Vector
     start: Integers
+    room: Integers
     first_term: Integers
     first_memory: Integers
     impedance_of_term: Matrix
@@ -156,9 +165,9 @@ class LineState(NamedTuple):
 
 
 def compile_lines(
-    rows: Sequence[LineRow], *, step: float, coarse: int, ambient_pressure: float
+    rows: Sequence[LineRow], *, step: float, coarse: int, near: int = 1, ambient_pressure: float
 ) -> tuple[Lines, LineState]:
-    """Lay out lines for steps of 1 and of ``coarse`` fine steps; at rest and at ambient pressure.
+    """Lay out lines for steps of 1, ``near`` and ``coarse`` fine steps, at rest.
 
     Segments have equal delays up to ``coarse`` steps, so that coarse steps find their own samples
     again and lose nothing; only the last segment of a line has a fraction of a step.
@@ -170,6 +179,8 @@ def compile_lines(
         Fine step.
     coarse : int
         Fine steps of a coarse step; 1 without coarse steps.
+    near : int
+        Fine steps of a step between both.
     ambient_pressure : float [Pa]
         From which ``P`` counts.
 
@@ -187,22 +198,24 @@ def compile_lines(
             whole.append(int(steps))
             fraction.append(steps - int(steps))
     depth = np.array(whole, dtype=np.int64) + 1
-    start = _offsets(np.repeat(2 * depth + coarse, 2))
+    room = np.minimum(_ROOM * depth, np.maximum(depth, _MOST_ROOM))
+    start = _offsets(np.repeat(depth + room + coarse, 2))
     segments = np.array([row.segments for row in rows], dtype=np.int64)
     terms = np.array([len(row.unsteady_gain) for row in rows], dtype=np.int64)
     memories = terms * (segments + 1)
     gain = _concatenate([row.unsteady_gain / row.segments for row in rows])
     rate = _concatenate([row.unsteady_rate for row in rows])
-    durations = rate * np.array([[step], [coarse * step]])
+    durations = rate * step * np.array([[1], [coarse], [near]])
     impedance_of_term = gain * -np.expm1(-durations) / durations
     resistance = np.array([row.resistance / row.segments for row in rows], dtype=float)
     line_of_term = np.repeat(np.arange(len(rows)), terms)
-    lump = np.tile(resistance, (2, 1))
-    for level in range(2):
+    lump = np.tile(resistance, (3, 1))
+    for level in range(3):
         np.add.at(lump[level], line_of_term, impedance_of_term[level])
     lines = Lines(
         step=float(step),
         coarse=int(coarse),
+        near=int(near),
         node=np.array([node for row in rows for node in (row.a, row.b)], dtype=np.int64),
         impedance=np.array([row.impedance for row in rows], dtype=float),
         resistance=resistance,
@@ -211,6 +224,7 @@ def compile_lines(
         depth=depth,
         fraction=np.array(fraction, dtype=float),
         start=np.ascontiguousarray(start[:-1].reshape(-1, 2)),
+        room=room,
         first_term=_offsets(terms),
         first_memory=_offsets(memories)[:-1],
         impedance_of_term=impedance_of_term,
@@ -315,6 +329,44 @@ def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
     return total
 
 
+@inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
+def _mean_of(window: Any, m: int, f: float) -> tuple[float, float]:
+    """Mean of ``m`` interpolated samples, and the sum of squares that reading it so takes; pointer.
+
+    The sums count from one of the samples, so that small differences keep their digits.
+    """
+    base = window[1]
+    total, spread, jumps = 0.0, 0.0, 0.0
+    for i in range(m):
+        x = window[i + 1]
+        jump = window[i] - x
+        y = x - base + f * jump
+        total += y
+        spread += y * y
+        jumps += jump * jump
+    mean = total / m
+    return base + mean, f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
+
+
+@inner(error_model="numpy", _nrt=False, forceinline=True)
+def _fill(window: Any, m: int, value: float) -> None:
+    for i in range(m):
+        window[i] = value
+
+
+@inner(error_model="numpy", _nrt=False, forceinline=True)
+def _move_back(window: Any, by: int, count: int) -> None:
+    for i in range(count):
+        window[i] = window[i + by]
+
+
+@inner(error_model="numpy", _nrt=False, forceinline=True)
+def _level(lines: Lines, m: int) -> int:
+    if m == 1:
+        return 0
+    return 1 if m == lines.coarse else 2
+
+
 @njit(error_model="numpy", forceinline=True, _nrt=False)  # two dozen arrays to hand over
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
     """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
@@ -326,11 +378,11 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
     Parameters
     ----------
     m : int
-        Fine steps of this step: 1 or ``lines.coarse``.
+        Fine steps of this step: 1, ``lines.near`` or ``lines.coarse``.
     c, Z : array, shape (2 n,)
         Written.
     """
-    level = 0 if m == 1 else 1
+    level = _level(lines, m)
     z = lines.impedance_of_term[level]
     for line in range(lines.impedance.size):
         s0, s1 = lines.first_segment[line], lines.first_segment[line + 1]
@@ -344,20 +396,10 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
                     state.incoming[s, wave] = x + f * (before - x)
                     lost += f * (1.0 - f) * (x - before) ** 2
                 else:
-                    # sums about one of the samples; not a function of its own, since numba then
-                    # counts references to every array in each call, ten times the work itself
-                    base = state.samples[oldest + 1]
-                    total, spread, jumps = 0.0, 0.0, 0.0
-                    for i in range(oldest, oldest + m):
-                        x = state.samples[i + 1]
-                        jump = state.samples[i] - x
-                        y = x - base + f * jump
-                        total += y
-                        spread += y * y
-                        jumps += jump * jump
-                    mean = total / m
-                    state.incoming[s, wave] = base + mean
-                    lost += f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
+                    window = shift(first(state.samples), oldest)
+                    mean, spread = _mean_of(window, m, f)
+                    state.incoming[s, wave] = mean
+                    lost += spread
         impedance = lines.impedance[line]
         state.scatter[line] = lines.step / (4.0 * impedance) * lost
         k0, k1 = lines.first_term[line], lines.first_term[line + 1]
@@ -387,7 +429,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
     books : array, shape (n, 3) [J]
         Losses of each line since the start, see :data:`LINE_LOSSES`; added to.
     """
-    level = 0 if m == 1 else 1
+    level = _level(lines, m)
     duration = m * lines.step
     decay, heating = lines.decay[level], lines.heat[level]
     z = lines.impedance_of_term[level]
@@ -410,8 +452,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         for s in range(s0, s1):
             depth, head = lines.depth[s], state.head[s]
             newest = lines.start[s, 0] + head + depth
-            for i in range(newest, newest + m):
-                state.samples[i] = out
+            _fill(shift(first(state.samples), newest), m, out)
             if s + 1 == s1:
                 back = state.incoming[s, 0] + 2.0 * Z * q_b
             else:
@@ -433,14 +474,12 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
                 back = left - 2.0 * Z * (Q + dQ)
                 out = right + 2.0 * Z * (Q - dQ)
             newest = lines.start[s, 1] + head + depth
-            for i in range(newest, newest + m):
-                state.samples[i] = back
+            _fill(shift(first(state.samples), newest), m, back)
             state.head[s] = head + m
-            if head + m > depth:
+            if head + m > lines.room[s]:
                 for wave in range(2):
-                    start = lines.start[s, wave]
-                    for i in range(start, start + depth):
-                        state.samples[i] = state.samples[i + head + m]
+                    window = shift(first(state.samples), lines.start[s, wave])
+                    _move_back(window, head + m, depth)
                 state.head[s] = 0
         books[line, 0] += heat
         books[line, 1] += state.scatter[line]

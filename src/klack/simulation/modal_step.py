@@ -31,12 +31,15 @@ __all__ = [
     "ROW_B1",
     "ROW_B2",
     "ROW_F",
+    "ROW_K",
     "ROW_P1",
     "ROW_P2",
     "ROW_Q",
     "ROW_V",
     "advance",
     "apply_forces",
+    "copy_state",
+    "kick",
     "watch",
 ]
 
@@ -47,8 +50,8 @@ ROW = 128
 
 ROW_Q, ROW_V = 0, 1
 ROW_A11, ROW_A12, ROW_A21, ROW_A22 = 2, 3, 4, 5
-ROW_P1, ROW_P2, ROW_B1, ROW_B2, ROW_F = 6, 7, 8, 9, 10
-FIXED_ROWS = 11
+ROW_P1, ROW_P2, ROW_B1, ROW_B2, ROW_F, ROW_K = 6, 7, 8, 9, 10, 11
+FIXED_ROWS = 12
 """Rows before the port shapes."""
 
 _N = ROW
@@ -193,6 +196,15 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
 
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
+def copy_state(source: Any, target: Any, n: int) -> None:
+    """Copy the state of ``n`` modes from one block to another."""
+    for i in range(n):
+        target[i] = source[i]
+    for i in range(_N, _N + n):
+        target[i] = source[i]
+
+
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     """Bring the forces of the last step into the state: ``q += B1 f``, ``v += B2 f``."""
     _modal_force(W, n, F, port0, port1)
@@ -200,3 +212,31 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         f = W[10 * _N + i]
         W[i] += W[8 * _N + i] * f
         W[_N + i] += W[9 * _N + i] * f
+
+
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
+def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
+    """Add the response to forces that acted over a whole step of another size, with its matrices.
+
+    Parameters
+    ----------
+    W, of : pointers
+        Block whose state changes, and the same block for the step of these forces.
+    n, F, port0, port1
+        As of :func:`advance`.
+
+    Returns
+    -------
+    float [J]
+        Kinetic and strain energy that it adds.
+    """
+    _modal_force(of, n, F, port0, port1)
+    energy = 0.0
+    for i in range(n):
+        f = of[10 * _N + i]
+        q, v = W[i], W[_N + i]
+        dq, dv = of[8 * _N + i] * f, of[9 * _N + i] * f
+        energy += of[11 * _N + i] * dq * (q + 0.5 * dq) + dv * (v + 0.5 * dv)
+        W[i] = q + dq
+        W[_N + i] = v + dv
+    return energy

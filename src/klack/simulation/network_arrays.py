@@ -8,21 +8,35 @@ from numpy.typing import NDArray
 from klack.simulation.delay_line import Lines, LineState
 
 __all__ = [
+    "AHEAD",
+    "ANSWER",
     "BEFORE",
-    "ELEMENTS",
-    "ELEMENTS_BEFORE",
+    "BEFORE_2",
+    "BEFORE_3",
+    "BEGIN",
+    "COARSE",
+    "CUT",
+    "EXCESS",
+    "FINE",
     "FORCE",
     "FREE",
-    "LAST",
+    "GUESS",
+    "KEPT",
     "LOSS",
+    "MIDDLE",
+    "MISSED",
+    "NEAR",
+    "PARTS",
     "PENDING",
+    "PENDING_BEGIN",
     "PORTS",
     "ROWS_AT",
     "SEEN",
+    "SIZES",
     "STORE",
     "SUPPLY",
-    "USED",
     "WORK",
+    "WORK_BEGIN",
     "Y0",
     "Y1",
     "Accounts",
@@ -54,20 +68,36 @@ STORE, SUPPLY, LOSS = 0, 1, 2
 PORTS = 64
 """Length of a row of port numbers; one less is the most a network can have."""
 
+FINE, COARSE, NEAR, MIDDLE, CUT = 0, 1, 2, 3, 4
+"""Sizes of step: the fine one; macro steps of many of them, in flight and about a touch; sub-steps
+of a few of them, for smooth contact forces; and parts of a fine step in which a contact closes or
+opens."""
+
+SIZES = 5
+
+PARTS = 8
+"""Parts of a fine step that is cut."""
+
 # Rows at constant distances: the compiler knows that none overlaps another.
 Y0 = 0 * PORTS  # displacements at the start of the step
 Y1 = 1 * PORTS  # ... at its end
-USED = 2 * PORTS  # ... as elements and fluid use them in this sweep
-SEEN = 3 * PORTS  # ... as they saw them at the end of the last step
-FREE = 4 * PORTS  # ... without the forces of this step
-FORCE = 5 * PORTS  # forces of this step
-PENDING = 6 * PORTS  # ... of the last step, not yet in the modes
-LAST = 7 * PORTS  # ... of the last step
-BEFORE = 8 * PORTS  # ... of the step before
-WORK = 9 * PORTS  # work done by the forces so far
-ELEMENTS = 10 * PORTS  # forces of elements and fluid in this sweep
-ELEMENTS_BEFORE = 11 * PORTS  # ... at the end of the last step
-ROWS_AT = 12
+SEEN = 2 * PORTS  # ... as elements and fluid saw them at the end of the last macro step
+FREE = 3 * PORTS  # ... without the forces of this step
+FORCE = 4 * PORTS  # forces of this step
+PENDING = 5 * PORTS  # ... of the last step, not yet in the modes
+WORK = 6 * PORTS  # work done by the forces so far
+ANSWER = 7 * PORTS  # forces of elements and fluid in this macro step
+BEFORE = 8 * PORTS  # ... in the last three
+BEFORE_2 = 9 * PORTS
+BEFORE_3 = 10 * PORTS
+GUESS = 11 * PORTS  # ... as the bodies feel them before elements and fluid are asked
+MISSED = 12 * PORTS  # what is missing of them in this guess
+AHEAD = 13 * PORTS  # displacements that it makes, which elements and fluid see in the next step
+BEGIN = 14 * PORTS  # displacements at the start of the macro step
+WORK_BEGIN = 15 * PORTS
+PENDING_BEGIN = 16 * PORTS
+EXCESS = 17 * PORTS  # one number: energy [J] that bodies got beyond what was given to them
+ROWS_AT = 18
 
 
 class Bodies(NamedTuple):
@@ -75,16 +105,16 @@ class Bodies(NamedTuple):
 
     ports: int
     blocks: int
-    fine: Vector  # blocks at the fine step
-    coarse: Vector  # the same at the coarse step
+    size: int  # numbers of all blocks
+    laid_out: Vector  # (SIZES, size) all blocks, for each size of step
     start: Index  # (blocks + 1,) first number of each block
     modes: Index  # (blocks,) in use, a multiple of four
     port0: Index  # (blocks,) ports of the body of the block
     port1: Index
     first: Index  # (ports,) first port of the body of each port
     last: Index
-    G: Vector  # (2, PORTS, PORTS) displacement at the end of a step per unit force during it
-    at: Vector  # (12, PORTS) what the ports do, row by row: see ``Y0`` and the following names
+    G: Vector  # (SIZES, PORTS, PORTS) displacement at the end of a step per unit force during it
+    at: Vector  # (ROWS_AT, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 
 class StepRows(NamedTuple):
@@ -123,7 +153,7 @@ class Nodes(NamedTuple):
     ambient: float
     density: float  # at ambient pressure
     volume: Vector  # at zero displacements
-    gamma: Vector  # (2, volumes) own compliance of the walls, A G A
+    gamma: Vector  # (2, volumes) own compliance of the walls in a fine step, A G A; then zeros
     time: Vector  # tables of the prescribed pressures
     pressure: Vector
     table0: Index
@@ -141,6 +171,7 @@ class NodeState(NamedTuple):
     p: Vector
     before: Vector
     g: Vector
+    rate: Vector  # at which flows balance the pressure of a volume [1/s]
     hint: Index
 
 
@@ -150,7 +181,7 @@ class Interfaces(NamedTuple):
     interfaces: int
     upper: Index
     lower: Index
-    G: Vector  # (2 n,) opening of the gap per unit force during a step, fine and coarse
+    G: Vector  # (SIZES n,) opening of the gap per unit force during a step
     dry: Index  # 1 without a film: no force while open
     gap0: Vector
     kind: Index
@@ -179,6 +210,8 @@ class InterfaceState(NamedTuple):
     deepest: Vector  # indentation since a damped contact was touched
     since: Vector  # closed since; infinity while open
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
+    pulled: Vector  # 1 of a film that pulls as much as it can
+    force_before: Vector  # force at the end of the macro step before the last
 
 
 class Accounts(NamedTuple):
@@ -211,10 +244,14 @@ class NetworkArrays(NamedTuple):
 class NodeTrial(NamedTuple):
     """Nodes in the step that is tried."""
 
-    rho: Vector
-    slope: Vector  # of the density over the pressure
+    rho: Vector  # what flows and walls feel in the step, between both ends
     g: Vector
     p: Vector
+    theta: Vector  # share of the end in it
+    rho_end: Vector
+    g_end: Vector
+    end: Vector  # pressure at the end
+    slope: Vector  # of the density over the pressure there
     p_used: Vector  # pressure and volume that the compliance of the walls counts from
     V: Vector
     V_used: Vector
@@ -224,6 +261,8 @@ class NodeTrial(NamedTuple):
     lower: Vector  # interval that holds the density
     upper: Vector
     own: Vector
+    stored: Vector  # of ``own``: in the volume itself
+    balanced: Vector  # what the pressure changes in flows
     matrix: Vector
 
 
@@ -248,6 +287,16 @@ class InterfaceTrial(NamedTuple):
     gap: Vector  # that film and dashpot saw
     contact_loss: Vector
     film_loss: Vector
+    far: Vector  # 1 of an interface that the sub-steps of this macro step leave out
+    least: Vector  # force in this macro step and at its start
+    most: Vector
+    chi: Vector  # dissipation factor at the start of the step
+    first: Vector  # force in the first sub-step
+    kept: Vector  # state at the start of the macro step
+
+
+KEPT = 16
+"""Numbers of an interface that a repeated macro step begins with."""
 
 
 class Scratch(NamedTuple):
@@ -266,7 +315,10 @@ def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sum
     return Scratch(
         nodes=NodeTrial(*[*vectors, np.zeros(nodes * nodes)]),
         flows=FlowTrial(*np.zeros((3, branches)), *np.zeros((3, ends))),
-        interfaces=InterfaceTrial(*np.zeros((len(InterfaceTrial._fields), interfaces))),
+        interfaces=InterfaceTrial(
+            *np.zeros((len(InterfaceTrial._fields) - 1, interfaces)),
+            np.zeros(KEPT * interfaces),
+        ),
         sums=np.zeros(sums),
         peaks=np.zeros(interfaces),
     )
@@ -275,7 +327,7 @@ def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sum
 class Step(NamedTuple):
     """One step that is tried."""
 
-    level: int  # 0 of a fine step, 1 of a coarse one
+    level: int  # ``FINE`` or another size
     steps: int  # fine steps in it
     t: float  # start [s]
     H: float  # length [s]

@@ -19,11 +19,13 @@ from klack.simulation.modal_step import (
     ROW,
     ROW_A11,
     ROW_B1,
+    ROW_K,
     ROW_P1,
     ROW_Q,
     ROW_V,
 )
 from klack.simulation.network_arrays import (
+    FINE,
     LOSS,
     PORTS,
     ROWS_AT,
@@ -40,6 +42,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
+from klack.simulation.step_sizes import StepSizes
 
 __all__ = [
     "CompiledNetwork",
@@ -114,8 +117,8 @@ class CompiledNetwork:
         return NetworkArrays(*(getattr(self, name) for name in NetworkArrays._fields))
 
 
-def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
-    """Lay out a network for steps of ``step`` and of ``coarse * step`` seconds."""
+def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
+    """Lay out a network for these steps."""
     if not rows.bodies:
         raise InputError(
             "network",
@@ -124,14 +127,18 @@ def compile_network(rows: Rows, *, step: float, coarse: int) -> CompiledNetwork:
             hint="add a rigid-mass or a flexible-body component.",
         )
     port_of, names = _number_ports(rows.bodies)
-    bodies, blocks = compile_bodies(rows.bodies, (step, coarse * step))
+    bodies, blocks = compile_bodies(rows.bodies, sizes.seconds)
     accounts = _Accounts()
     elements = _step_rows(rows.elements, 0, accounts, port_of, {})
     node_order = _order_nodes(rows)
     node_of = {handle: i for i, handle in enumerate(node_order)}
     branches = _step_rows(rows.branches, 3, accounts, port_of, node_of)
     lines, line_state = compile_lines(
-        rows.lines, step=step, coarse=coarse, ambient_pressure=rows.ambient.pressure
+        rows.lines,
+        step=sizes.step,
+        coarse=sizes.coarse,
+        near=sizes.near,
+        ambient_pressure=rows.ambient.pressure,
     )
     nodes, node_state = _nodes(rows, node_order, port_of, bodies, lines)
     if nodes.ends:
@@ -187,9 +194,9 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
     return port_of, names
 
 
-def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple[Bodies, Index]:
-    """Lay out the modes in blocks for two step sizes; also the first block of each body."""
-    fine, coarse = list[Vector](), list[Vector]()
+def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bodies, Index]:
+    """Lay out the modes in blocks for each step size; also the first block of each body."""
+    laid_out: tuple[list[Vector], ...] = tuple([] for _ in steps)
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
     blocks = [0]
     first_port = 0
@@ -203,7 +210,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
             expected=f"fewer than {PORTS}",
             hint="leave out unconnected ports of bodies.",
         )
-    G = np.zeros((2, PORTS, PORTS))
+    G = np.zeros((len(steps), PORTS, PORTS))
     for row in rows:
         body, own = row.body, len(row.ports)
         height = FIXED_ROWS + own + 1
@@ -218,7 +225,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
         for begin in range(0, max(modes, 1), ROW):
             part = slice(begin, min(begin + ROW, modes))
             used = part.stop - part.start
-            for level, (h, target) in enumerate(zip(steps, (fine, coarse), strict=True)):
+            for level, (h, target) in enumerate(zip(steps, laid_out, strict=True)):
                 W = np.zeros((height, ROW))
                 P = modal_propagator(body.omega[part], body.damping[part], h)
                 W[ROW_V, :used] = v0[part]
@@ -228,6 +235,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
                     P.A21 * P.B1 + P.A22 * P.B2,
                 )
                 W[ROW_B1 : ROW_B1 + 2, :used] = P.B1, P.B2
+                W[ROW_K, :used] = body.omega[part] ** 2
                 shapes = np.asarray(body.port_shapes)[part].T
                 W[FIXED_ROWS:-1, :used] = shapes
                 W[-1, :used] = cm[part]
@@ -242,8 +250,8 @@ def compile_bodies(rows: Sequence[BodyRow], steps: tuple[float, float]) -> tuple
     bodies = Bodies(
         ports=ports,
         blocks=len(count),
-        fine=np.concatenate(fine),
-        coarse=np.concatenate(coarse),
+        size=start[-1],
+        laid_out=np.concatenate([part for parts in laid_out for part in parts]),
         start=np.array(start, dtype=np.int64),
         modes=np.array(count, dtype=np.int64),
         port0=np.array(port0, dtype=np.int64),
@@ -354,11 +362,11 @@ def _nodes(
     volume = np.array([node.volume for node in given[:volumes]], dtype=float)
     gamma = np.zeros((2, max(volumes, 1)))
     walls = [(node_of[w.node], port_of[w.port], w.area) for w in rows.walls]
-    G = bodies.G.reshape(2, PORTS, PORTS)
+    G = bodies.G.reshape(-1, PORTS, PORTS)
     for i, a, area_a in walls:
         for j, b, area_b in walls:
             if i == j and i < volumes:
-                gamma[:, i] += area_a * G[:, a, b] * area_b
+                gamma[0, i] += area_a * G[FINE, a, b] * area_b
     nodes = Nodes(
         nodes=count,
         volumes=volumes,
@@ -378,7 +386,15 @@ def _nodes(
         end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
     )
     mass = volume * rho[:volumes]
-    state = NodeState(mass=mass, held=volume.copy(), p=p, before=p.copy(), g=g, hint=hint)
+    state = NodeState(
+        mass=mass,
+        held=volume.copy(),
+        p=p,
+        before=p.copy(),
+        g=g,
+        rate=np.full(count, np.inf),
+        hint=hint,
+    )
     return nodes, state
 
 
@@ -404,7 +420,7 @@ def _interfaces(
     lower = np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64)
     stroke = float(np.max(np.maximum(gap, film[2]), initial=0.0))
     film_time = stroke / _FLIGHT_SPEED or 1.0  # nothing to fly, no film to judge
-    moved, _ = compile_bodies(rows.bodies, (film_time, film_time))
+    moved, _ = compile_bodies(rows.bodies, (film_time,))
     force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
     rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
     interfaces = Interfaces(
@@ -437,16 +453,18 @@ def _interfaces(
         deepest=np.zeros(count),
         since=np.full(count, np.inf),
         film_before=np.zeros(count),
+        pulled=np.zeros(count),
+        force_before=np.zeros(count),
     )
     return interfaces, state
 
 
 def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
-    """Opening of each gap per unit force during a fine and during a coarse step, flat (2 n,)."""
+    """Opening of each gap per unit force during a step of each size, flat."""
     jump = np.zeros((len(upper), PORTS))
     jump[np.arange(len(upper)), upper] += 1.0
     jump[np.arange(len(lower)), lower] -= 1.0
-    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(2, PORTS, PORTS), jump).ravel()
+    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(-1, PORTS, PORTS), jump).ravel()
 
 
 def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:
@@ -455,7 +473,7 @@ def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:
     q, v = [], []
     bodies = network.bodies
     for k in range(network.body_blocks[body], network.body_blocks[body + 1]):
-        W = bodies.fine[bodies.start[k] : bodies.start[k + 1]].reshape(-1, ROW)
+        W = bodies.laid_out[bodies.start[k] : bodies.start[k + 1]].reshape(-1, ROW)
         q.append(W[ROW_Q])
         v.append(W[ROW_V])
     return np.concatenate(q)[:modes], np.concatenate(v)[:modes]

@@ -3,7 +3,7 @@
 from typing import Any
 
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import FORCE, SEEN, STORE, Y1, Step
+from klack.simulation.network_arrays import ANSWER, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_element, push_ports, take_states
 from klack.simulation.step_status import STATUS_DONE, STATUS_ELEMENT
@@ -13,8 +13,8 @@ __all__ = ["end_elements", "push_by_elements"]
 
 @phase
 def push_by_elements(elements: Any, S: Any, step: Step, report: Any) -> int:
-    """Forces of all elements for the displacements of this sweep."""
-    seen, end, force = shift(S, SEEN), shift(S, Y1), shift(S, FORCE)
+    """Forces of all elements for the displacements of this step."""
+    seen, end, force = shift(S, SEEN), shift(S, Y1), shift(S, ANSWER)
     for k in range(elements.rows):
         status = ask_element(elements, k, step.t, step.H, seen, end)
         if status != 0:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
 from klack.simulation.network_arrays import (
-    ELEMENTS_BEFORE,
+    BEFORE,
     PORTS,
     SEEN,
     STORE,
@@ -32,13 +32,19 @@ def reset_accounts(network: CompiledNetwork) -> None:
 def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     """Work [J] of the last forces, port by port, that elements and fluid see in the next step.
 
-    They live on the displacements of the last sweep, short of those of the bodies by what was left
-    of its change.  The differences of the forces times it cancel or are small; at the ends of a run
-    the whole force counts, and of a preloaded needle that is far more than what moves it.
+    They are behind the bodies by what the guess of the last step missed.  The differences of the
+    forces times it cancel or are repaid; at the ends of a run the whole force counts, and of a
+    preloaded needle that is far more than what moves it.  Contacts and films, too.
     """
-    at = network.bodies.at
-    force, end, seen = (at[row : row + PORTS] for row in (ELEMENTS_BEFORE, Y0, SEEN))
-    return np.asarray(force * (end - seen), dtype=float)
+    at, rows, state = network.bodies.at, network.interfaces, network.interface_state
+    force, end, seen = (at[row : row + PORTS] for row in (BEFORE, Y0, SEEN))
+    unseen = np.asarray(force * (end - seen), dtype=float)
+    ground = len(network.ports)
+    for c in range(rows.interfaces):
+        upper, lower = rows.upper[c], rows.lower[c]
+        behind = rows.gap0[c] + end[upper] - end[lower] - state.gap[c]
+        unseen[upper if upper < ground else lower] += state.force[c] * behind
+    return unseen
 
 
 def energy_stores(network: CompiledNetwork) -> dict[str, float]:

@@ -5,20 +5,39 @@ from typing import Any
 import numpy as np
 
 from klack.contact.step_constants import SEPARATED, SLOWEST
-from klack.simulation.contact_step import mean_force
 from klack.simulation.interface_step import solve_interface
-from klack.simulation.network_arrays import FORCE, PORTS, USED, Y1, Recording, Step
+from klack.simulation.network_arrays import (
+    AHEAD,
+    BEGIN,
+    COARSE,
+    FORCE,
+    GUESS,
+    KEPT,
+    PORTS,
+    Y1,
+    Recording,
+    Step,
+)
 from klack.simulation.phase import phase
 
 __all__ = [
+    "begin_cut_contacts",
     "begin_interfaces",
-    "changed_by_interfaces",
+    "begin_macro_interfaces",
     "coarse_step_holds",
+    "contacts_hold",
+    "cost_of_catching_up",
     "end_interfaces",
+    "end_macro_interfaces",
+    "far_ones_stay",
     "forget_interfaces",
+    "keep_dissipation",
     "level_of_step",
-    "push_by_interfaces",
+    "none_far",
+    "push_by_guess",
+    "smooth_contacts",
     "solve_interfaces",
+    "take_back_interfaces",
 ]
 
 
@@ -35,6 +54,18 @@ def forget_interfaces(contacts: Any) -> None:
     """Forces of the last step, where a step was discarded."""
     for c in range(contacts.rows.interfaces):
         contacts.trial.force[c] = contacts.state.force[c]
+
+
+_ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over the work of the step
+_LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
+_ROUND_OFF = 4e-16  # of a displacement
+_MOST_SWEEPS = 200
+_YOUNG = 0.5e-6  # [s] a contact just closed
+_FALLS = 1.5  # times the force at the end of the macro step: it had so much before, and releases soon
+_SMOOTH = 0.05  # of a gap and its cut-off: way in a middle step that the film follows
+_FAR = 1e-4  # of a small film force, even if the gap closed at
+_FASTEST = 5.0  # [m/s]
+_NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 
 @phase
@@ -61,9 +92,11 @@ def level_of_step(contacts: Any, now: float, length: float) -> int:
 
 
 @phase
-def push_by_interfaces(contacts: Any, S: Any) -> None:
-    """Add the forces so far to those of the ports."""
-    rows, force = contacts.rows, contacts.trial.force
+def push_by_guess(contacts: Any, bodies: Any) -> None:
+    """Forces of the ports: the guess of elements and fluid, and those of the interfaces so far."""
+    rows, force, S = contacts.rows, contacts.trial.force, bodies.at
+    for p in range(bodies.ports + 1):
+        S[FORCE + p] = S[GUESS + p]
     for c in range(rows.interfaces):
         if force[c] != 0.0:
             S[FORCE + rows.upper[c]] += force[c]
@@ -77,35 +110,53 @@ def _gap(rows: Any, S: Any, c: int) -> float:
 
 
 @phase
-def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step, moved: float) -> float:
-    """Forces of all interfaces, one after another; each moves the ports of its two bodies.
+def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
+    """Forces of all interfaces, one after another, again until they agree with each other.
+
+    Each moves the ports of its two bodies.  Films and contacts live on the gaps that they saw,
+    which the last change of the others moved; they catch up in the next step.
 
     Returns
     -------
-    float [m]
-        Largest change of a port displacement, ``moved`` by elements and fluid or more.
+    bool
+        Whether what is left of that change matters no more.
     """
-    rows, force, S = contacts.rows, contacts.trial.force, bodies.at
-    for c in range(rows.interfaces):
-        u, low = rows.upper[c], rows.lower[c]
-        _solve_interface(contacts, S, c, step)
-        change = contacts.trial.contact[c] + contacts.trial.film[c] - force[c]
-        if change != 0.0:
-            force[c] += change
-            S[FORCE + u] += change
-            S[FORCE + low] -= change
-            moved = _move_body(bodies, G, u, change, moved)
-            moved = _move_body(bodies, G, low, -change, moved)
-    return moved
+    rows, trial, S = contacts.rows, contacts.trial, bodies.at
+    for _sweep in range(_MOST_SWEEPS):
+        moved = 0.0
+        for c in range(rows.interfaces):
+            if trial.far[c] != 0.0:
+                continue
+            u, low = rows.upper[c], rows.lower[c]
+            _solve_interface(contacts, S, c, step)
+            change = trial.contact[c] + trial.film[c] - trial.force[c]
+            if change != 0.0:
+                trial.force[c] += change
+                S[FORCE + u] += change
+                S[FORCE + low] -= change
+                moved = _move_body(bodies, G, u, change, moved)
+                moved = _move_body(bodies, G, low, -change, moved)
+        left, work, distance = 0.0, 0.0, 0.0
+        for c in range(rows.interfaces):
+            if trial.force[c] != 0.0:
+                gap = _gap(rows, S, c)
+                change = abs(trial.force[c] - contacts.state.force[c])
+                left += (change + _LEAST_CHANGE * abs(trial.force[c])) * abs(gap - trial.gap[c])
+                work += abs(trial.force[c] * (gap - contacts.state.gap[c]))
+                distance = max(distance, abs(S[Y1 + rows.upper[c]]), abs(S[Y1 + rows.lower[c]]))
+        if left <= _ENERGY_LEFT * work or moved <= _ROUND_OFF * distance:
+            return True
+    return False
 
 
 @phase
 def _move_body(bodies: Any, G: Any, port: int, change: float, moved: float) -> float:
-    """Move the ports of a body by a change of the force at one of them."""
+    """Move the ports of a body by a change of the force at one of them; the largest move so far."""
     S = bodies.at
     for i in range(bodies.first[port], bodies.last[port]):
-        S[Y1 + i] += G[i * PORTS + port] * change
-        moved = max(moved, abs(S[Y1 + i] - S[USED + i]))
+        way = G[i * PORTS + port] * change
+        S[Y1 + i] += way
+        moved = max(moved, abs(way))
     return moved
 
 
@@ -153,19 +204,6 @@ def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
 
 
 @phase
-def changed_by_interfaces(contacts: Any, S: Any) -> tuple[float, float]:
-    """Energy that the last change of the gaps costs, and the work of all interfaces [J]."""
-    rows, state, force = contacts.rows, contacts.state, contacts.trial.force
-    left, work = 0.0, 0.0
-    for c in range(rows.interfaces):
-        if force[c] != 0.0:
-            gap = _gap(rows, S, c)
-            left += abs((force[c] - state.force[c]) * (gap - contacts.trial.gap[c]))
-            work += abs(force[c] * (gap - state.gap[c]))
-    return left, work
-
-
-@phase
 def coarse_step_holds(contacts: Any) -> bool:
     """Whether a coarse step met nothing that it cannot see: a touch, a release, a film."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
@@ -180,25 +218,224 @@ def coarse_step_holds(contacts: Any) -> bool:
 
 
 @phase
-def end_interfaces(
-    contacts: Any, S: Any, step: Step, accounts: Any, recording: Recording, sums: Any, peaks: Any
+def begin_macro_interfaces(
+    contacts: Any, accounts: Any, recording: Recording, sums: Any, peaks: Any
 ) -> None:
-    """Take over gaps, forces and compressions of all interfaces, and record what acted."""
+    """Keep what a repeated macro step begins with."""
+    state, trial = contacts.state, contacts.trial
+    for c in range(contacts.rows.interfaces):
+        k = KEPT * c
+        trial.kept[k] = state.e[c]
+        trial.kept[k + 1] = state.gap[c]
+        trial.kept[k + 2] = state.rate[c]
+        trial.kept[k + 3] = state.force[c]
+        trial.kept[k + 4] = state.chi[c]
+        trial.kept[k + 5] = state.deepest[c]
+        trial.kept[k + 6] = state.since[c]
+        trial.kept[k + 7] = state.film_before[c]
+        trial.kept[k + 8] = float(state.hint[c])
+        trial.kept[k + 9] = accounts.contact[c]
+        trial.kept[k + 10] = accounts.film[c]
+        trial.kept[k + 11] = sums[2 * c]
+        trial.kept[k + 12] = sums[2 * c + 1]
+        trial.kept[k + 13] = peaks[c]
+        trial.kept[k + 14] = float(recording.filled[c])
+        trial.kept[k + 15] = state.pulled[c]
+        begin_attempt(contacts, c)
+
+
+@phase
+def begin_attempt(contacts: Any, c: int) -> None:
+    """Nothing has acted yet; the last force is the first guess."""
+    trial, force = contacts.trial, contacts.state.force[c]
+    trial.force[c] = trial.least[c] = trial.most[c] = force
+    trial.first[c] = 0.0
+    if trial.far[c] != 0.0:
+        trial.force[c] = trial.contact[c] = trial.film[c] = 0.0
+        trial.contact_loss[c] = trial.film_loss[c] = 0.0
+
+
+@phase
+def take_back_interfaces(
+    contacts: Any, accounts: Any, recording: Recording, sums: Any, peaks: Any
+) -> None:
+    """Go back to the start of the macro step."""
+    state, kept = contacts.state, contacts.trial.kept
+    for c in range(contacts.rows.interfaces):
+        k = KEPT * c
+        state.e[c] = kept[k]
+        state.gap[c] = kept[k + 1]
+        state.rate[c] = kept[k + 2]
+        state.force[c] = kept[k + 3]
+        state.chi[c] = kept[k + 4]
+        state.deepest[c] = kept[k + 5]
+        state.since[c] = kept[k + 6]
+        state.film_before[c] = kept[k + 7]
+        state.hint[c] = int(kept[k + 8])
+        accounts.contact[c] = kept[k + 9]
+        accounts.film[c] = kept[k + 10]
+        sums[2 * c] = kept[k + 11]
+        sums[2 * c + 1] = kept[k + 12]
+        peaks[c] = kept[k + 13]
+        recording.filled[c] = int(kept[k + 14])
+        state.pulled[c] = kept[k + 15]
+        begin_attempt(contacts, c)
+
+
+@phase
+def smooth_contacts(contacts: Any, now: float, H: float, middle: float) -> bool:
+    """Whether contacts and films follow steps of ``middle`` [s] for the next ``H`` [s].
+
+    A contact may neither close nor be about to open, a film may not change by much.  Interfaces so
+    far apart that nothing can bring them near are marked, to be left out meanwhile.
+    """
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    smooth = True
+    for c in range(rows.interfaces):
+        rate = abs(state.rate[c])
+        x = state.gap[c] - 3.0 * rate * H
+        trial.far[c] = 0.0
+        if state.since[c] < np.inf:
+            if now - state.since[c] < _YOUNG or _FALLS * state.force[c] <= state.force_before[c]:
+                smooth = False
+            continue
+        if x <= 0.0:
+            smooth = False
+            continue
+        film = rate * (rows.cubic[c] / x**3 + rows.linear[c] / x)
+        if film < _FAR * rows.film_small[c] and state.gap[c] > _FASTEST * H and state.e[c] == 0.0:
+            trial.far[c] = 1.0
+        elif rate * middle > _SMOOTH * (x + rows.cut_off[c]):
+            smooth = False
+    return smooth
+
+
+@phase
+def far_ones_stay(contacts: Any, S: Any) -> bool:
+    """Whether interfaces that were left out are still far apart."""
+    stay = True
+    for c in range(contacts.rows.interfaces):
+        if contacts.trial.far[c] != 0.0 and _gap(contacts.rows, S, c) <= _NEAR * contacts.state.gap[c]:
+            stay = False
+    return stay
+
+
+@phase
+def none_far(contacts: Any) -> None:
+    """Look at all interfaces in the next step."""
+    for c in range(contacts.rows.interfaces):
+        contacts.trial.far[c] = 0.0
+
+
+@phase
+def contacts_hold(contacts: Any) -> bool:
+    """Whether no contact closed or opened in this step, and no film began or ceased to cavitate."""
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    holds = True
+    for c in range(rows.interfaces):
+        if (state.since[c] < np.inf) != (trial.contact[c] > 0.0):
+            holds = False
+        if (state.pulled[c] != 0.0) != _pulls(contacts, c):
+            holds = False
+    return holds
+
+
+@phase
+def _pulls(contacts: Any, c: int) -> bool:
+    film = contacts.trial.film[c]
+    return film < 0.0 and film <= -contacts.rows.suction[c]
+
+
+@phase
+def keep_dissipation(contacts: Any) -> None:
+    """Keep what the first solution of a step may change."""
+    for c in range(contacts.rows.interfaces):
+        contacts.trial.chi[c] = contacts.state.chi[c]
+
+
+@phase
+def begin_cut_contacts(contacts: Any) -> None:
+    """Begin a step once more."""
+    for c in range(contacts.rows.interfaces):
+        contacts.state.chi[c] = contacts.trial.chi[c]
+        contacts.trial.force[c] = contacts.state.force[c]
+
+
+@phase
+def cost_of_catching_up(contacts: Any, S: Any) -> tuple[float, float]:
+    """Energy that it costs interfaces to see the missed force a step late, and their work [J]."""
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    left, work = 0.0, 0.0
+    for c in range(rows.interfaces):
+        d = S[AHEAD + rows.upper[c]] - S[AHEAD + rows.lower[c]]
+        left += abs(d) * (trial.most[c] - trial.least[c])
+        work += abs(trial.force[c] * (state.gap[c] - trial.kept[KEPT * c + 1]))
+    return left, work
+
+
+@phase
+def end_macro_interfaces(contacts: Any, S: Any, H: float) -> float:
+    """End a macro step of interfaces; far ones learn where they are.
+
+    Returns
+    -------
+    float [J]
+        Energy that bodies got before beyond what the interfaces give: each was behind by what had
+        been missed, until its first sub-step.
+    """
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    excess = 0.0
+    for c in range(rows.interfaces):
+        begin = trial.kept[KEPT * c + 3]
+        state.force_before[c] = begin
+        behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
+        excess += (begin - trial.first[c]) * (behind - trial.kept[KEPT * c + 1])
+        if trial.far[c] != 0.0:
+            gap = _gap(rows, S, c)
+            state.rate[c] = (gap - state.gap[c]) / H
+            state.gap[c] = gap
+    return excess
+
+
+@phase
+def end_interfaces(
+    contacts: Any,
+    S: Any,
+    step: Step,
+    first: bool,
+    accounts: Any,
+    recording: Recording,
+    sums: Any,
+    peaks: Any,
+) -> None:
+    """Take over gaps, forces and compressions of all interfaces, and record what acted.
+
+    ``first`` is for the first step of a macro step.
+    """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
-        gap = _gap(rows, S, c)
-        state.rate[c] = (gap - state.gap[c]) * step.rate
-        state.gap[c] = gap
+        if trial.far[c] != 0.0:
+            continue
         was_closed = state.since[c] < np.inf
         acted = trial.contact[c] != 0.0 or trial.film[c] != 0.0 or trial.contact_loss[c] != 0.0
+        gap = _gap(rows, S, c)
         if acted or was_closed:
-            _end_force(contacts, c, gap, step.t, was_closed, accounts)
+            gap = trial.gap[c]  # what the others move after that it sees in the next step
+            _end_force(contacts, c, step.t, was_closed, accounts)
+            force = trial.force[c]
             sums[2 * c] += step.H * trial.contact[c]
             sums[2 * c + 1] += step.H * trial.film[c]
-            peaks[c] = max(peaks[c], trial.force[c])
-            felt = step.level == 0 and abs(trial.film[c]) > rows.film_felt[c]
+            peaks[c] = max(peaks[c], force)
+            if first:
+                trial.first[c] = force
+            trial.least[c] = min(trial.least[c], force)
+            trial.most[c] = max(trial.most[c], force)
+            felt = step.level != COARSE and abs(trial.film[c]) > rows.film_felt[c]
             if felt or was_closed or trial.contact[c] > 0.0:
                 _record_step(recording, c, step, trial.contact[c], trial.film[c], gap)
+        state.pulled[c] = 1.0 if _pulls(contacts, c) else 0.0
+        state.rate[c] = (gap - state.gap[c]) * step.rate
+        state.gap[c] = gap
         if state.chi[c] != 0.0:
             state.deepest[c] = max(state.deepest[c], -gap)
             if gap > SEPARATED * state.deepest[c]:
@@ -206,34 +443,18 @@ def end_interfaces(
 
 
 @phase
-def _end_force(
-    contacts: Any, c: int, gap: float, now: float, was_closed: bool, accounts: Any
-) -> None:
+def _end_force(contacts: Any, c: int, now: float, was_closed: bool, accounts: Any) -> None:
     """Take over what one interface did, with its losses."""
-    rows, state, trial = contacts.rows, contacts.state, contacts.trial
-    e, contact, film = trial.e[c], trial.contact[c], trial.film[c]
-    lost = trial.contact_loss[c]
-    state.e[c] = e
+    state, trial = contacts.state, contacts.trial
+    state.e[c] = trial.e[c]
     state.force[c] = trial.force[c]
-    # over the way that the bodies went, not the one that film and dashpot saw
-    ahead = gap - trial.gap[c]
-    if state.chi[c] != 0.0 and ahead != 0.0:
-        elastic, _, _ = mean_force(
-            rows.kind[c],
-            contacts.laws,
-            rows.law0[c],
-            -(trial.gap[c] + e),
-            -(gap + e),
-            state.hint[c],
-        )
-        lost += (elastic - contact) * ahead
-    accounts.contact[c] += lost
-    accounts.film[c] += trial.film_loss[c] - film * ahead
+    accounts.contact[c] += trial.contact_loss[c]
+    accounts.film[c] += trial.film_loss[c]
     state.film_before[c] = 0.0
-    if contact > 0.0:
+    if trial.contact[c] > 0.0:
         if not was_closed:
             state.since[c] = now
-            state.film_before[c] = film
+            state.film_before[c] = trial.film[c]
     else:
         state.since[c] = np.inf
 

@@ -1,18 +1,21 @@
 """The time loop of a network: bodies, elements, fluid nodes, branches, lines, contacts and films.
 
-One step of length ``h`` (or ``M h`` while nothing touches):
+One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 
-1. Every mode moves exactly, without the forces of this step.
-2. Sweeps: all elements, then all pressures (Newton), then all interfaces find their mean forces
-   from the port displacements at both ends of the step; the forces move the ports by ``G F``;
-   again, until no port moves by more than a small share of the way in the step.  Elements and
-   fluid live on the displacements that they saw last, so what is left of that change costs energy
-   in second order: the change of their forces times it, a small share of the work of the step.
-3. States, masses, waves and energy accounts are taken over; the forces stay pending for the next
-   pass over the modes.
+1. **Guess** the forces of elements and fluid, constant over the macro step.
+2. **Act**: modes move exactly, contacts and films find their mean forces.  Far from each other or
+   at rest, in one step of ``H``; else in sub-steps, the fine ones ``h`` about first touch and
+   release, and some of them together while contact forces are smooth.
+3. **Answer**: elements, pressures and lines are asked once, for the way that their ports went.
+4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
+   are linear, so that adding the response is exact.  Elements, fluid and interfaces see the
+   displacement ``d`` that it makes in the next macro step; of the energy this costs
+   ``d`` times the change of the forces meanwhile.
+5. **Judge**: where that is more than a small share of the work of the step, the macro step is
+   repeated with the answer as the guess.
 
-A coarse step is tried when all interfaces are far apart or at rest; if it ends in a contact, in a
-release or in a noticeable film, it is discarded and done again in fine steps.
+Where the answer does not settle (a stiff friction, a switch), ``M`` fine steps follow each other
+with elements and fluid in each of them, repeated until nothing moves any more.
 """
 
 from typing import Any, NamedTuple
@@ -24,8 +27,14 @@ from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.network_arrays import (
-    ELEMENTS,
-    FORCE,
+    ANSWER,
+    COARSE,
+    CUT,
+    EXCESS,
+    FINE,
+    MIDDLE,
+    NEAR,
+    PARTS,
     PORTS,
     Accounts,
     Bodies,
@@ -40,28 +49,45 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_elements import end_elements, push_by_elements
 from klack.simulation.network_interfaces import (
+    begin_cut_contacts,
     begin_interfaces,
-    changed_by_interfaces,
+    begin_macro_interfaces,
     coarse_step_holds,
+    contacts_hold,
+    cost_of_catching_up,
     end_interfaces,
-    forget_interfaces,
+    end_macro_interfaces,
+    far_ones_stay,
+    keep_dissipation,
     level_of_step,
-    push_by_interfaces,
+    none_far,
+    push_by_guess,
+    smooth_contacts,
     solve_interfaces,
+    take_back_interfaces,
 )
 from klack.simulation.network_ports import (
-    apply_pending,
+    begin_cut,
+    begin_macro_step,
     begin_ports,
+    bring,
+    catch_up,
     end_ports,
+    end_sub_step,
     finite,
-    forget_forces,
+    guess_answer,
     guess_forces,
+    keep_for_cut,
+    keep_modes,
+    largest_missed,
+    matters,
+    miss,
     move_free,
-    move_ports,
     move_ports_by_guess,
+    repay,
+    respace_forces,
     row_length,
-    settled_ports,
-    start_coarse,
+    take_back_ports,
 )
 from klack.simulation.network_pressures import (
     begin_fluid,
@@ -74,20 +100,31 @@ from klack.simulation.network_pressures import (
 )
 from klack.simulation.network_record import record_means, record_points
 from klack.simulation.phase import phase, unfolded
-from klack.simulation.step_status import STATUS_DONE, STATUS_FORCES, STATUS_REFUSED
+from klack.simulation.step_status import (
+    STATUS_DONE,
+    STATUS_FORCES,
+    STATUS_MET,
+    STATUS_REFUSED,
+)
 
-__all__ = ["run_network"]
+__all__ = ["CLOCK", "run_network"]
 
 Index = NDArray[np.int64]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_SETTLED = 5e-5  # last change of a port displacement over the longest way of a port in the step
-_SETTLED_COARSE = 3e-8  # the same for a coarse step, whose forces change more
+CLOCK = 8
+"""Time in fine steps, size of the last step; steps done: fine, coarse, of sub-steps; sub-steps, fine
+ones among them, repeats."""
+
+_SETTLED = 5e-5  # displacement by what the guess missed over the longest way of a port, fine steps
+_SETTLED_MACRO = 1e-3  # the same of macro steps
+_ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
+_ENERGY_MACRO = 3e-7  # the same of macro steps
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
-_FEW_SWEEPS = 8  # are enough, unless what still changes is round-off
-_MOST_SWEEPS = 200
-_COARSE_SWEEPS = 20  # without success: fine steps
+_FEW_REPEATS = 8  # are enough, unless what still changes is round-off
+_MOST_REPEATS = 200
+_MACRO_REPEATS = 6  # without success: fine steps
 
 
 class _Loop(NamedTuple):
@@ -109,14 +146,16 @@ class _Loop(NamedTuple):
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
-@njit(_nrt=False, error_model="numpy")
+@njit(_nrt=False, error_model="numpy", nogil=True)
 def run_network(
     macros: int,
     per_record: int,
     clock: Index,
     M: int,
+    near: int,
+    R: int,
     h: float,
-    allow_coarse: bool,
+    allow_macro: bool,
     network: NetworkArrays,
     recording: Recording,
     scratch: Scratch,
@@ -124,43 +163,93 @@ def run_network(
 ) -> int:
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
-    ``clock`` counts: time in fine steps, level of the last step, fine and coarse steps done;
-    ``report`` gets the row of a failure, its status and its time.
+    ``near`` fine steps are a macro step about a touch, ``R`` of them a middle one.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row
+    of a failure, its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
-    now, last_level = clock[0], clock[1]
+    now, last_level, at = clock[0], clock[1], FINE
+    last_steps = 1
+    if last_level == COARSE:
+        last_steps = M
+    elif last_level == NEAR:
+        last_steps = near
     in_record, record, record_time = 0, 0, 0.0
-    fine_steps, coarse_steps = 0, 0
-    inverse_h = 1.0 / h
     for _macro in range(macros):
-        level = level_of_step(contacts, now * h, M * h) if allow_coarse else 0
-        if level == 1:
-            start_coarse(bodies)
+        together = allow_macro
+        flight = together and level_of_step(contacts, now * h, M * h) == COARSE
+        smooth = R > 1
         done = 0
         while done < M:
-            steps = M if level == 1 else 1
-            rate = inverse_h if level == 0 else inverse_h / M
-            step = Step(level, steps, now * h, steps * h, rate)
-            status = _try_step(step, loop, level == last_level, first(report))
+            # what acts: one step, or sub-steps
+            level, of_sub, parts = FINE, FINE, 1
+            if together:
+                level = of_sub = COARSE
+                if not flight:
+                    level = NEAR
+                    smooth = smooth and smooth_contacts(contacts, now * h, near * h, R * h)
+                    of_sub = MIDDLE if smooth else FINE
+                    parts = near // R if smooth else near
+            if of_sub != MIDDLE:
+                none_far(contacts)
+            steps = 1
+            if level == COARSE:
+                steps = M
+            elif level == NEAR:
+                steps = near
+            step = Step(level, steps, now * h, steps * h, 1.0 / (steps * h))
+            sub = Step(of_sub, steps // parts, now * h, steps // parts * h, parts / (steps * h))
+            if at != of_sub:
+                bring(bodies, at, of_sub)
+                at = of_sub
+            begin_macro_step(bodies)
+            begin_macro_interfaces(
+                contacts, loop.accounts, recording, _interface_sums(loop), loop.peaks
+            )
+            if together:
+                keep_modes(bodies, of_sub)
+            straight = level == last_level
+            if not straight:
+                respace_forces(bodies, steps / last_steps)
+            guess_forces(bodies)
+            guess_pressures(loop.fluid, step.t + step.H, step.H, straight)
+            if loop.fluid.nodes.ends > 0:
+                lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
+            status = _settle(step, sub, parts, flight, loop, first(clock), first(report))
             if status > STATUS_DONE:
                 return status
-            # a coarse step may not meet what it cannot see
-            if level == 1 and (status == STATUS_REFUSED or not coarse_step_holds(contacts)):
-                level, last_level = 0, -1
-                forget_forces(bodies)
-                forget_interfaces(contacts)
+            if status != STATUS_DONE:
+                # again: in sub-steps, in fine ones, at the fine rate of elements and fluid
+                take_back_ports(bodies, of_sub, True)
+                take_back_interfaces(
+                    contacts, loop.accounts, recording, _interface_sums(loop), loop.peaks
+                )
+                if status == STATUS_REFUSED:
+                    together = False
+                elif flight:
+                    flight = False
+                else:
+                    smooth = False
+                last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
-            _end_step(step, loop)
-            last_level = level
+            _end_step(step, of_sub, parts, loop)
+            last_level, last_steps = level, steps
             done += steps
             now += steps
-            coarse_steps += level
-            fine_steps += 1 - level
-        apply_pending(bodies, level)
+            if level == FINE:
+                clock[2] += 1
+            elif level == COARSE:
+                clock[3] += 1
+            else:
+                clock[4] += 1
+                clock[5] += parts
+                clock[6] += parts if of_sub == FINE else 0
+                smooth = R > 1
         in_record += 1
         record_time += M * h
         if in_record == per_record:
+            bring(bodies, at, FINE)
+            at = FINE
             record_means(recording, record, record_time, loop.sums, loop.peaks)
             record_points(
                 recording,
@@ -173,9 +262,8 @@ def run_network(
             )
             record += 1
             in_record, record_time = 0, 0.0
+    bring(bodies, at, FINE)
     clock[0], clock[1] = now, last_level
-    clock[2] += fine_steps
-    clock[3] += coarse_steps
     return STATUS_DONE
 
 
@@ -217,95 +305,151 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
 
 
 @unfolded
-def _try_step(step: Step, loop: Any, straight: bool, report: Any) -> int:
-    """One step up to what it would change; ``straight`` guesses on the line of the last two.
+def _settle(
+    step: Step, sub: Step, parts: int, flight: bool, loop: Any, clock: Any, report: Any
+) -> int:
+    """One step up to what it would change: again and again, until its guess missed nothing.
 
     Returns
     -------
     int
-        ``STATUS_DONE``; ``STATUS_REFUSED`` for a coarse step that does not settle; or what failed.
+        ``STATUS_DONE``; ``STATUS_MET`` where a contact closed or opened in a step too long for it;
+        ``STATUS_REFUSED`` for a macro step that does not settle; or what failed.
     """
-    bodies, fluid = loop.bodies, loop.fluid
-    move_free(bodies, step.level)
-    if straight:
-        guess_forces(bodies)
-    else:
-        forget_forces(bodies)
-    guess_pressures(fluid, step.t + step.H, straight)
-    if fluid.nodes.ends > 0:
-        lines_incoming(loop.lines, loop.line_state, step.steps, loop.ends.c, loop.ends.Z)
-    status = _settle(step, bodies, loop.elements, fluid, loop.contacts, report)
-    bodies.at[FORCE + bodies.ports] = 0.0  # what pushes the ground moves nothing
-    return status
+    bodies, contacts = loop.bodies, loop.contacts
+    G = shift(bodies.G, step.level * PORTS * PORTS)
+    fine = step.level == FINE
+    share = _SETTLED if fine else _SETTLED_MACRO
+    energy = _ENERGY if fine else _ENERGY_MACRO
+    for attempt in range(_MOST_REPEATS if fine else _MACRO_REPEATS):
+        if attempt > 0:
+            take_back_ports(bodies, sub.level, parts > 1)
+            take_back_interfaces(
+                contacts, loop.accounts, loop.recording, _interface_sums(loop), loop.peaks
+            )
+            guess_answer(bodies)
+            clock[7] += 1
+        status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop)
+        if status == STATUS_DONE:
+            status = _push_by_rows(step, bodies, loop.elements, loop.fluid, report)
+        if status != STATUS_DONE:
+            report[0], report[2] = (0.0, step.t) if status == STATUS_FORCES else (report[0], report[2])
+            return status
+        miss(bodies, G)
+        left, work = cost_of_catching_up(contacts, bodies.at)
+        if not matters(bodies, step.level, share, energy, left, work):
+            return STATUS_DONE
+        if fine:
+            moved = largest_missed(bodies)
+            if attempt >= _FEW_REPEATS and moved <= _moved_by_round_off(
+                G, bodies.ports, loop.elements, loop.fluid, contacts
+            ):
+                return STATUS_DONE
+            if attempt == 0 and not finite(bodies):
+                break
+    if fine:
+        report[0], report[2] = largest_missed(bodies), step.t
+        return STATUS_FORCES
+    return STATUS_REFUSED
 
 
 @unfolded
-def _end_step(step: Step, loop: Any) -> None:
-    """Take over states, masses, waves and accounts; the forces stay pending."""
+def _act(sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any) -> int:
+    """Modes, contacts and films over one step, or over all sub-steps of a macro step.
+
+    Returns
+    -------
+    int
+        ``STATUS_DONE``; ``STATUS_MET``; ``STATUS_REFUSED``; ``STATUS_FORCES`` where contacts do not
+        settle in a fine step.
+    """
+    bodies, contacts = loop.bodies, loop.contacts
+    done, cut = 0, 0
+    while done < parts:
+        now = Step(sub.level, sub.steps, sub.t + done * sub.H, sub.H, sub.rate)
+        if cut > 0:
+            H = sub.H / PARTS
+            now = Step(CUT, 0, now.t + (PARTS - cut) * H, H, sub.rate * PARTS)
+        elif move:
+            keep_dissipation(contacts)
+            if now.level == FINE and parts > 1:
+                keep_for_cut(bodies)
+        G = shift(bodies.G, now.level * PORTS * PORTS)
+        if move:
+            move_free(bodies, now.level)
+        push_by_guess(contacts, bodies)
+        move_ports_by_guess(bodies, G)
+        if not solve_interfaces(contacts, bodies, G, now):
+            return STATUS_FORCES if fine else STATUS_REFUSED
+        if flight and not coarse_step_holds(contacts):
+            return STATUS_MET
+        if parts > 1 and cut == 0 and not contacts_hold(contacts):
+            if now.level == MIDDLE:
+                return STATUS_MET
+            begin_cut(bodies)
+            begin_cut_contacts(contacts)
+            cut = PARTS
+            continue
+        end_interfaces(
+            contacts,
+            bodies.at,
+            now,
+            done == 0 and (cut == 0 or cut == PARTS),
+            loop.accounts,
+            loop.recording,
+            _interface_sums(loop),
+            loop.peaks,
+        )
+        end_sub_step(bodies)
+        if cut == 0:
+            done += 1
+        else:
+            cut -= 1
+            if cut == 0:
+                bring(bodies, CUT, FINE)
+                done += 1
+    if sub.level == MIDDLE and not far_ones_stay(contacts, bodies.at):
+        return STATUS_MET
+    return STATUS_DONE
+
+
+@unfolded
+def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
+    """Take over states, masses, waves and accounts; repair the bodies."""
     bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
     accounts, kind, H = loop.accounts, loop.kind, step.H
-    sums_of_branches = shift(loop.sums, elements.port0[elements.rows])
-    sums_of_interfaces = shift(sums_of_branches, fluid.branches.rows)
     end_elements(elements, H, accounts, kind, loop.sums)
     if fluid.nodes.nodes > 0:
+        sums_of_branches = shift(loop.sums, elements.port0[elements.rows])
         end_branches(fluid, bodies.at, H, accounts, kind, sums_of_branches)
         end_ends(fluid, H)
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
-        end_nodes(fluid, accounts)
-    end_interfaces(
-        loop.contacts, bodies.at, step, accounts, loop.recording, sums_of_interfaces, loop.peaks
-    )
+        end_nodes(fluid, H, accounts)
+    repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
+    catch_up(bodies, level, step.level, parts == 1)
+    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, H)
     end_ports(bodies)
 
 
-@unfolded
-def _settle(step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, report: Any) -> int:
-    """Sweep over elements, pressures and interfaces until no port moves any more.
-
-    Returns
-    -------
-    int
-        ``STATUS_DONE``; ``STATUS_REFUSED`` for a coarse step that does not settle; or what failed.
-    """
-    S = bodies.at
-    G = shift(bodies.G, step.level * PORTS * PORTS)
-    share = _SETTLED if step.level == 0 else _SETTLED_COARSE
-    for sweep in range(_MOST_SWEEPS):
-        move_ports_by_guess(bodies, G)
-        status = _push_by_rows(step, bodies, elements, fluid, report)
-        if status != STATUS_DONE:
-            return status
-        push_by_interfaces(contacts, S)
-        moved = move_ports(bodies, G)
-        moved = solve_interfaces(contacts, bodies, G, step, moved)
-        left, work = changed_by_interfaces(contacts, S)
-        if settled_ports(bodies, moved, share, left, work):
-            return STATUS_DONE
-        if sweep >= _FEW_SWEEPS and moved <= _moved_by_round_off(
-            G, bodies.ports, elements, fluid, contacts
-        ):
-            return STATUS_DONE
-        if step.level == 1 and sweep >= _COARSE_SWEEPS:
-            return STATUS_REFUSED
-        if sweep == _MOST_SWEEPS - 1 or (sweep == 0 and not finite(bodies)):
-            report[0], report[2] = moved, step.t
-            return STATUS_FORCES
-    return STATUS_FORCES
+@phase
+def _interface_sums(loop: Any) -> Any:
+    """Sums of interfaces behind those of elements and branches."""
+    elements, branches = loop.elements, loop.fluid.branches
+    return shift(loop.sums, elements.port0[elements.rows] + branches.rows)
 
 
 @phase
 def _push_by_rows(step: Step, bodies: Any, elements: Any, fluid: Any, report: Any) -> int:
-    """Forces of elements and fluid for the displacements of this sweep."""
+    """Forces of elements and fluid for the way that their ports went."""
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[FORCE + i] = 0.0
+        S[ANSWER + i] = 0.0
     status = push_by_elements(elements, S, step, report)
     if status == STATUS_DONE and fluid.nodes.nodes > 0:
         status = solve_pressures(fluid, S, step, report)
         push_by_fluid(fluid, S)
-    for i in range(bodies.ports):
-        S[ELEMENTS + i] = S[FORCE + i]
+    S[ANSWER + bodies.ports] = 0.0  # what pushes the ground moves nothing
     return status
 
 

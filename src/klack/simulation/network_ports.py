@@ -1,44 +1,63 @@
-"""Phases of a step for bodies: modes in free motion, guesses, and the displacements of ports."""
+"""Phases of a step for bodies: modes in free motion, guessed forces, and what they missed."""
 
 from typing import Any
 
 import numpy as np
 
 from klack.network.step_function import shift
-from klack.simulation.modal_step import ROW, advance, apply_forces
+from klack.simulation.modal_step import advance, apply_forces, copy_state, kick
 from klack.simulation.network_arrays import (
+    AHEAD,
+    ANSWER,
     BEFORE,
-    ELEMENTS,
-    ELEMENTS_BEFORE,
+    BEFORE_2,
+    BEFORE_3,
+    BEGIN,
+    COARSE,
+    CUT,
+    EXCESS,
+    FINE,
     FORCE,
     FREE,
-    LAST,
+    GUESS,
+    MISSED,
     PENDING,
+    PENDING_BEGIN,
     PORTS,
     SEEN,
-    USED,
     WORK,
+    WORK_BEGIN,
     Y0,
     Y1,
 )
 from klack.simulation.phase import phase
 
 __all__ = [
-    "apply_pending",
+    "begin_cut",
+    "begin_macro_step",
     "begin_ports",
+    "bring",
+    "catch_up",
     "end_ports",
+    "end_sub_step",
     "finite",
-    "forget_forces",
+    "guess_answer",
     "guess_forces",
+    "keep_for_cut",
+    "keep_modes",
+    "largest_missed",
+    "matters",
+    "miss",
     "move_free",
-    "move_ports",
     "move_ports_by_guess",
+    "repay",
+    "respace_forces",
     "row_length",
-    "settled_ports",
-    "start_coarse",
+    "take_back_ports",
 ]
 
-_ENERGY_LEFT = 1e-12  # energy that what is left of that change costs, over the work of the step
+_LONGER = 4.0  # times the steps before
+_OWED = 1e-6  # of the largest force of elements and fluid: most that repays
 _UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
 _ROUND_OFF = 4e-16  # of the displacements themselves
 
@@ -55,30 +74,82 @@ def begin_ports(bodies: Any) -> None:
     S = bodies.at
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
-        S[FORCE + i] = S[LAST + i]
 
 
 @phase
 def _block(bodies: Any, k: int, level: int) -> Any:
-    start = bodies.fine
-    if level == 1:
-        start = bodies.coarse
-    return shift(start, bodies.start[k])
+    return shift(bodies.laid_out, level * bodies.size + bodies.start[k])
 
 
 @phase
-def _copy_state(source: Any, target: Any, bodies: Any) -> None:
+def _copy_state(bodies: Any, source: int, target: int) -> None:
     for k in range(bodies.blocks):
-        s = bodies.start[k]
-        for i in range(bodies.modes[k]):
-            target[s + i] = source[s + i]
-            target[s + ROW + i] = source[s + ROW + i]
+        a, b = _block(bodies, k, source), _block(bodies, k, target)
+        copy_state(a, b, bodies.modes[k])
 
 
 @phase
-def start_coarse(bodies: Any) -> None:
-    """Give the modes of the coarse step the present state."""
-    _copy_state(bodies.fine, bodies.coarse, bodies)
+def bring(bodies: Any, source: int, target: int) -> None:
+    """Bring the modes from one size of step to another, with the forces that are pending."""
+    S = bodies.at
+    for k in range(bodies.blocks):
+        block = _block(bodies, k, source)
+        apply_forces(block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k])
+    for i in range(row_length(bodies)):
+        S[PENDING + i] = 0.0
+    if target != source:
+        _copy_state(bodies, source, target)
+
+
+@phase
+def keep_modes(bodies: Any, level: int) -> None:
+    """Keep the state of the modes, where another size of step has none meanwhile."""
+    _copy_state(bodies, level, _kept_at(level))
+
+
+@phase
+def _kept_at(level: int) -> int:
+    return FINE if level == COARSE else COARSE
+
+
+@phase
+def keep_for_cut(bodies: Any) -> None:
+    """Keep the state of the modes where a fine step begins, for the parts it may be cut into."""
+    _copy_state(bodies, FINE, CUT)
+
+
+@phase
+def begin_cut(bodies: Any) -> None:
+    """Begin a fine step once more, in parts, with the forces that were pending."""
+    S = bodies.at
+    for k in range(bodies.blocks):
+        block, of_fine = _block(bodies, k, CUT), _block(bodies, k, FINE)
+        port0, port1 = bodies.port0[k], bodies.port1[k]
+        kick(block, of_fine, bodies.modes[k], shift(S, PENDING), port0, port1)
+    for i in range(row_length(bodies)):
+        S[PENDING + i] = 0.0
+
+
+@phase
+def begin_macro_step(bodies: Any) -> None:
+    """Keep what a repeated macro step begins with."""
+    S = bodies.at
+    for i in range(row_length(bodies)):
+        S[BEGIN + i] = S[Y0 + i]
+        S[WORK_BEGIN + i] = S[WORK + i]
+        S[PENDING_BEGIN + i] = S[PENDING + i]
+
+
+@phase
+def take_back_ports(bodies: Any, level: int, kept: bool) -> None:
+    """Go back to the start of the macro step; the modes too, where they were ``kept``."""
+    S = bodies.at
+    for i in range(row_length(bodies)):
+        S[Y0 + i] = S[BEGIN + i]
+        S[WORK + i] = S[WORK_BEGIN + i]
+        S[PENDING + i] = S[PENDING_BEGIN + i]
+    if kept:
+        _copy_state(bodies, _kept_at(level), level)
 
 
 @phase
@@ -94,44 +165,48 @@ def move_free(bodies: Any, level: int) -> None:
 
 
 @phase
-def apply_pending(bodies: Any, level: int) -> None:
-    """Bring the forces of the last step into the modes, and these to the fine step."""
-    S = bodies.at
-    for k in range(bodies.blocks):
-        port0, port1 = bodies.port0[k], bodies.port1[k]
-        block = _block(bodies, k, level)
-        apply_forces(block, bodies.modes[k], shift(S, PENDING), port0, port1)
-    for i in range(row_length(bodies)):
-        S[PENDING + i] = 0.0
-    if level == 1:
-        _copy_state(bodies.coarse, bodies.fine, bodies)
-
-
-@phase
 def guess_forces(bodies: Any) -> None:
-    """Forces on the line through those of the last two steps."""
+    """Forces of elements and fluid on the parabola through those of the last three steps."""
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[FORCE + i] = 2.0 * S[LAST + i] - S[BEFORE + i]
-        S[BEFORE + i] = S[LAST + i]
+        S[GUESS + i] = 3.0 * (S[BEFORE + i] - S[BEFORE_2 + i]) + S[BEFORE_3 + i]
+    S[GUESS + bodies.ports] = 0.0  # what pushes the ground moves nothing
 
 
 @phase
-def forget_forces(bodies: Any) -> None:
-    """Forces of the last step, after one of another length or one that was discarded."""
+def respace_forces(bodies: Any, ratio: float) -> None:
+    """Forces of the last three steps as if they had been longer by ``ratio``.
+
+    They are means, so on the same parabola in the middle of such steps.  Longer ones that reach far
+    beyond what is known begin with the last force.
+    """
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[FORCE + i] = S[LAST + i]
-        S[BEFORE + i] = S[LAST + i]
+        a, b, c = S[BEFORE + i], S[BEFORE_2 + i], S[BEFORE_3 + i]
+        first, second = b - a, 0.5 * (c - 2.0 * b + a)
+        if ratio > _LONGER:
+            first, second = 0.0, 0.0
+        # x steps before the last one: a + first x + second x (x - 1)
+        x1, x2, x3 = 0.5 * ratio - 0.5, 1.5 * ratio - 0.5, 2.5 * ratio - 0.5
+        S[BEFORE + i] = a + x1 * (first + second * (x1 - 1.0))
+        S[BEFORE_2 + i] = a + x2 * (first + second * (x2 - 1.0))
+        S[BEFORE_3 + i] = a + x3 * (first + second * (x3 - 1.0))
 
 
 @phase
-def _port_end(bodies: Any, G: Any, p: int) -> float:
-    """Displacement of a port at the end of the step under the forces of its body."""
+def guess_answer(bodies: Any) -> None:
+    """Take the forces that elements and fluid gave as the guess of the repeated step."""
     S = bodies.at
-    total = S[FREE + p]
+    for i in range(row_length(bodies)):
+        S[GUESS + i] = S[ANSWER + i]
+
+
+@phase
+def _port_end(bodies: Any, G: Any, p: int, force: int) -> float:
+    """Displacement of a port under the forces of its body, those of row ``force``."""
+    S, total = bodies.at, 0.0
     for j in range(bodies.first[p], bodies.last[p]):
-        total += G[p * PORTS + j] * S[FORCE + j]
+        total += G[p * PORTS + j] * S[force + j]
     return total
 
 
@@ -144,46 +219,67 @@ def move_ports_by_guess(bodies: Any, G: Any) -> None:
     """
     S = bodies.at
     for p in range(bodies.ports):
-        total = _port_end(bodies, G, p)
-        S[Y1 + p] = total
-        S[USED + p] = total
+        S[Y1 + p] = S[FREE + p] + _port_end(bodies, G, p, FORCE)
 
 
 @phase
-def move_ports(bodies: Any, G: Any) -> float:
-    """The same under the new forces; returns the largest change."""
-    S, moved = bodies.at, 0.0
+def end_sub_step(bodies: Any) -> None:
+    """Take over displacements and the work of interfaces; the forces stay pending."""
+    S = bodies.at
     for p in range(bodies.ports):
-        total = _port_end(bodies, G, p)
-        S[Y1 + p] = total
-        moved = max(moved, abs(total - S[USED + p]))
-    return moved
+        S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * (S[Y1 + p] - S[Y0 + p])
+        S[Y0 + p] = S[Y1 + p]
+        S[PENDING + p] = S[FORCE + p]
 
 
 @phase
-def settled_ports(bodies: Any, moved: float, share: float, left: float, work: float) -> bool:
-    """Whether the last change of the displacements matters no more.
+def miss(bodies: Any, G: Any) -> None:
+    """What the guess missed, and the displacements that it makes over the whole macro step.
 
-    ``left`` and ``work`` are what the interfaces add to both sums.  What an element saw is
-    ``d = Y1 - USED`` short of the end of the step, and catches up in the next one: of ``F dy`` the
-    energy ``F_n (d_n - d_(n-1))`` is lost, in sum ``(F_n - F_(n+1)) d_n``.
+    Modes are linear: the response to a constant force adds to what they did without it.
     """
     S = bodies.at
-    way = 0.0
     for p in range(bodies.ports):
-        y, force = S[Y1 + p], S[ELEMENTS + p]
-        here = abs(y - S[Y0 + p])
+        S[MISSED + p] = S[ANSWER + p] - S[GUESS + p]
+    for p in range(bodies.ports):
+        S[AHEAD + p] = _port_end(bodies, G, p, MISSED)
+
+
+@phase
+def matters(bodies: Any, level: int, share: float, energy: float, left: float, work: float) -> bool:
+    """Whether what the guess missed matters: then the step is repeated with a better one.
+
+    ``left`` and ``work`` are what the interfaces add to both sums.  Elements and fluid live
+    ``d = AHEAD`` behind the bodies, and catch up in the next step: of ``F dy`` the energy
+    ``F_n (d_n - d_(n-1))`` is lost, in sum ``(F_n - F_(n+1)) d_n``.
+    """
+    S = bodies.at
+    moved, way = 0.0, 0.0
+    for p in range(bodies.ports):
+        force, d = S[ANSWER + p], abs(S[AHEAD + p])
+        here = abs(S[Y1 + p] - S[BEGIN + p])
         way = max(way, here)
-        left += abs((force - S[ELEMENTS_BEFORE + p]) * (y - S[USED + p]))
+        moved = max(moved, d)
+        left += abs(force - S[BEFORE + p]) * d
         work += abs(force) * here
-    if moved <= share * way and left <= _ENERGY_LEFT * work and work < np.inf:
-        return True
+    if moved <= share * way and left <= energy * work and work < np.inf:
+        return False
     displacement, by_forces = 0.0, 0.0
     for p in range(bodies.ports):
         displacement = max(displacement, abs(S[Y1 + p]))
-        by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
+        if level == FINE:
+            by_forces = max(by_forces, abs(S[Y1 + p] - S[FREE + p]))
     # a force or displacement that is not finite never settles
-    return work < np.inf and moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement)
+    return not (work < np.inf and moved <= max(_UNSEEN * by_forces, _ROUND_OFF * displacement))
+
+
+@phase
+def largest_missed(bodies: Any) -> float:
+    """Longest displacement of a port that the missed force makes [m]."""
+    moved = 0.0
+    for p in range(bodies.ports):
+        moved = max(moved, abs(bodies.at[AHEAD + p]))
+    return moved
 
 
 @phase
@@ -196,13 +292,75 @@ def finite(bodies: Any) -> bool:
 
 
 @phase
+def repay(bodies: Any, G: Any) -> None:
+    """Take the energy that bodies got beyond what was given to them back, by a minute force.
+
+    Elements, fluid and interfaces see what was missed a step late, at the forces of that step.  The
+    force acts where the way is longest, and is limited: then the rest is left for the next step.
+    """
+    S = bodies.at
+    port, longest, largest = 0, 0.0, 0.0
+    for p in range(bodies.ports):
+        way = abs(S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p])
+        if way > longest:
+            port, longest = p, way
+        largest = max(largest, abs(S[ANSWER + p]))
+    excess = abs(S[EXCESS])
+    if excess > _OWED * largest * longest:
+        excess = _OWED * largest * longest
+    if excess > 0.0:
+        way = S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port]
+        force = excess / way
+        if S[EXCESS] > 0.0:
+            force = -force
+        S[MISSED + port] += force
+        for i in range(bodies.first[port], bodies.last[port]):
+            S[AHEAD + i] += G[i * PORTS + port] * force
+        S[EXCESS] += force * (S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port])
+
+
+@phase
+def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
+    """Let what the guess missed act as if it had acted all the time, in the macro step ``macro``.
+
+    Its modal response is that of a constant force over the macro step; where this was ``one_step``
+    it only joins the forces that are pending.  Counted are the work on the bodies, and the energy
+    that they got beyond what is given to them: elements and fluid are behind by what was missed
+    before, interfaces will be by what is missed now.
+    """
+    S = bodies.at
+    excess = 0.0
+    if one_step:
+        for p in range(bodies.ports):
+            S[PENDING + p] += S[MISSED + p]
+            way = S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p]
+            S[WORK + p] += (S[GUESS + p] + S[MISSED + p]) * way
+            S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * S[AHEAD + p]
+    else:
+        bring(bodies, level, level)
+        for k in range(bodies.blocks):
+            block, of_macro = _block(bodies, k, level), _block(bodies, k, macro)
+            port0, port1 = bodies.port0[k], bodies.port1[k]
+            energy = kick(block, of_macro, bodies.modes[k], shift(S, MISSED), port0, port1)
+            S[WORK + port0] += energy
+            excess += energy
+        for p in range(bodies.ports):
+            way, d = S[Y1 + p] - S[BEGIN + p], S[AHEAD + p]
+            S[WORK + p] += S[GUESS + p] * way
+            excess -= S[MISSED + p] * (way + d) + S[FORCE + p] * d
+    for p in range(bodies.ports):
+        excess += (S[BEFORE + p] - S[ANSWER + p]) * (S[BEGIN + p] - S[SEEN + p])
+        S[SEEN + p] = S[Y1 + p]
+        S[Y1 + p] += S[AHEAD + p]
+    S[EXCESS] += excess
+
+
+@phase
 def end_ports(bodies: Any) -> None:
-    """Take over displacements, forces and their work; the forces stay pending."""
+    """Take over displacements and forces of the macro step."""
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[WORK + i] += S[FORCE + i] * (S[Y1 + i] - S[Y0 + i])
         S[Y0 + i] = S[Y1 + i]
-        S[SEEN + i] = S[USED + i]
-        S[PENDING + i] = S[FORCE + i]
-        S[LAST + i] = S[FORCE + i]
-        S[ELEMENTS_BEFORE + i] = S[ELEMENTS + i]
+        S[BEFORE_3 + i] = S[BEFORE_2 + i]
+        S[BEFORE_2 + i] = S[BEFORE + i]
+        S[BEFORE + i] = S[ANSWER + i]

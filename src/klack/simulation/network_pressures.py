@@ -7,7 +7,7 @@ import numpy as np
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import FORCE, SEEN, STORE, USED, Step
+from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
 from klack.simulation.step_status import (
@@ -44,7 +44,8 @@ def begin_fluid(fluid: Any) -> None:
     """Begin a run with the pressures of the last step; no density is known."""
     trial, flows = fluid.trial, fluid.flows
     for i in range(fluid.nodes.nodes):
-        trial.p[i] = fluid.state.p[i]
+        trial.p[i] = trial.end[i] = fluid.state.p[i]
+        trial.theta[i] = 1.0
         trial.known[i] = -1.0
     for e in range(fluid.nodes.ends):
         flows.Z[e] = 1.0
@@ -69,17 +70,27 @@ def _table(time: Any, value: Any, first: int, last: int, t: float) -> float:
 
 
 @phase
-def guess_pressures(fluid: Any, end: float, straight: bool) -> None:
-    """Pressures of volumes as they were, or ``straight`` on; given ones at the end of the step."""
-    nodes, state, p = fluid.nodes, fluid.state, fluid.trial.p
+def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
+    r"""Pressures of volumes as they were, or ``straight`` on; given ones at the end of the step.
+
+    What acts in the step is :math:`\hat p = \theta p_1 + (1 - \theta) p_0`: of second order for
+    :math:`\theta = 1/2`, which would let a pressure that flows balance at the rate :math:`k` swing
+    about its end where :math:`k H > 2`; :math:`\theta = 1 - 1/(k H)` is the smallest that does not.
+    """
+    nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     for i in range(nodes.volumes):
+        theta, balanced = 0.5, state.rate[i] * H
+        if balanced > 2.0:
+            theta = 1.0 - 1.0 / balanced
+        trial.theta[i] = theta
+        trial.end[i] = state.p[i]
         if straight:
-            p[i] = max(2.0 * state.p[i] - state.before[i], _LEAST_PRESSURE)
-        else:
-            p[i] = state.p[i]
+            trial.end[i] = max(2.0 * state.p[i] - state.before[i], _LEAST_PRESSURE)
+        trial.p[i] = state.p[i] + theta * (trial.end[i] - state.p[i])
     for i in range(nodes.volumes, nodes.nodes):
         k = i - nodes.volumes
-        p[i] = _table(nodes.time, nodes.pressure, nodes.table0[k], nodes.table0[k + 1], end)
+        p = _table(nodes.time, nodes.pressure, nodes.table0[k], nodes.table0[k + 1], end)
+        trial.p[i] = trial.end[i] = p
 
 
 @phase
@@ -87,7 +98,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     """All pressures and flows at the end of the step, with ports where the last sweep left them."""
     nodes, trial = fluid.nodes, fluid.trial
     p, r = trial.p, trial.r
-    gamma = shift(nodes.gamma, step.level * max(nodes.volumes, 1))
+    gamma = shift(nodes.gamma, min(step.level, 1) * max(nodes.volumes, 1))
     _place_walls(fluid, S)
     for iteration in range(_MOST_NEWTON):
         _look_up(fluid)
@@ -97,6 +108,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             report[0], report[1], report[2] = failed, code, step.t
             return STATUS_BRANCH
         _add_up_ends(fluid, step.H)
+        _compare_storage(fluid)
         if nodes.volumes == 1:
             r[0] /= trial.own[0]
         else:
@@ -104,16 +116,14 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
         if finite and worst < _PRESSURE_LEFT:
-            for i in range(nodes.volumes):
-                p[i] += r[i]
+            _step_by(fluid, 1.0)
             break
         # a root-like law about no drop lets Newton's method swing across for ever
         share = 1.0 if iteration < _FULL_NEWTON else 0.5
-        for i in range(nodes.volumes):
-            p[i] += share * r[i]
+        _step_by(fluid, share)
         # at once, while it can be seen which branch is to blame
         if iteration == _MOST_NEWTON - 1 or not finite or not worst < np.inf:
-            if step.level == 1:  # fine steps may do
+            if step.level != FINE:  # fine steps may do
                 return STATUS_REFUSED
             report[0], report[2] = _worst_volume(fluid, worst), step.t
             return STATUS_PRESSURES
@@ -136,31 +146,49 @@ def _place_walls(fluid: Any, S: Any) -> None:
     for w in range(nodes.walls):
         i = nodes.wall_node[w]
         if i < nodes.volumes:
-            trial.V_used[i] += nodes.wall_area[w] * S[USED + nodes.wall_port[w]]
+            trial.V_used[i] += nodes.wall_area[w] * S[Y1 + nodes.wall_port[w]]
+
+
+@phase
+def _step_by(fluid: Any, share: float) -> None:
+    """Take a share of the Newton step."""
+    trial = fluid.trial
+    for i in range(fluid.nodes.volumes):
+        trial.p[i] += share * trial.r[i]
+        trial.end[i] += share * trial.r[i] / trial.theta[i]
 
 
 @phase
 def _look_up(fluid: Any) -> None:
     """Density, its slope and pressure energy of every node at the present pressures."""
-    nodes, trial, hint = fluid.nodes, fluid.trial, fluid.state.hint
-    p = trial.p
-    for i in range(nodes.nodes):
-        if i < nodes.volumes or p[i] != trial.known[i]:
-            trial.rho[i], trial.slope[i], trial.g[i], hint[i] = fluid_at(nodes.fluid, p[i], hint[i])
-            trial.known[i] = p[i]
+    nodes, state, trial, hint = fluid.nodes, fluid.state, fluid.trial, fluid.state.hint
+    for i in range(nodes.volumes):
+        theta = trial.theta[i]
+        rho, trial.slope[i], g, hint[i] = fluid_at(nodes.fluid, trial.end[i], hint[i])
+        trial.rho_end[i], trial.g_end[i] = rho, g
+        before = state.mass[i] / state.held[i]
+        trial.rho[i] = before + theta * (rho - before)
+        trial.g[i] = state.g[i] + theta * (g - state.g[i])
+    for i in range(nodes.volumes, nodes.nodes):
+        if trial.p[i] != trial.known[i]:
+            rho, _, g, hint[i] = fluid_at(nodes.fluid, trial.p[i], hint[i])
+            trial.rho[i], trial.g[i] = rho, g
+            trial.g_end[i] = g
+            trial.known[i] = trial.p[i]
 
 
 @phase
 def _add_up_volumes(fluid: Any, gamma: Any) -> None:
     """Mass that each volume misses, without flows, and what the pressures change in it."""
     nodes, trial = fluid.nodes, fluid.trial
-    p, rho, V = trial.p, trial.rho, trial.V
+    p, rho, V = trial.p, trial.rho_end, trial.V
     for i in range(nodes.volumes):
         V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
         trial.r[i] = fluid.state.mass[i] - V[i] * rho[i]
         for j in range(nodes.volumes):
             trial.matrix[i * nodes.volumes + j] = 0.0
-        trial.own[i] = V[i] * trial.slope[i] + rho[i] * gamma[i]
+        trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
+        trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
 
 
 @phase
@@ -169,9 +197,9 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     volumes, H = fluid.nodes.volumes, step.H
     A, own, r = trial.matrix, trial.own, trial.r
-    seen, used = shift(S, SEEN), shift(S, USED)
+    seen, end = shift(S, SEEN), shift(S, Y1)
     for k in range(branches.rows):
-        status = ask_branch(branches, k, step.t, H, seen, used, trial.p, trial.rho)
+        status = ask_branch(branches, k, step.t, H, seen, end, trial.p, trial.rho)
         if status != 0:
             return k, status
         a, b, o0 = branches.a[k], branches.b[k], branches.output0[k]
@@ -201,7 +229,19 @@ def _add_up_ends(fluid: Any, H: float) -> None:
         flows.q[e] = (nodes.density * trial.g[i] - flows.c[e]) / flows.Z[e]
         if i < nodes.volumes:
             trial.r[i] -= H * nodes.density * flows.q[e]
-            trial.own[i] += H * nodes.density * (nodes.density / trial.rho[i]) / flows.Z[e]
+            trial.own[i] += H * nodes.density * (nodes.density / trial.rho_end[i]) / flows.Z[e]
+
+
+@phase
+def _compare_storage(fluid: Any) -> None:
+    """What a pressure changes in the flows of its volume, beside what it changes in the volume."""
+    nodes, trial = fluid.nodes, fluid.trial
+    for j in range(nodes.volumes):
+        total = trial.own[j]
+        for i in range(nodes.volumes):
+            if i != j:
+                total -= trial.matrix[i * nodes.volumes + j]
+        trial.balanced[j] = max(total - trial.stored[j], 0.0)
 
 
 @inner(error_model="numpy", _nrt=False, forceinline=True)
@@ -258,11 +298,12 @@ def bracketed(
 def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
     """Newton steps that the fluid can follow; the largest over its pressure, and their sum."""
     nodes, trial, hint = fluid.nodes, fluid.trial, fluid.state.hint
-    p, r, rho, lower, upper = trial.p, trial.r, trial.rho, trial.lower, trial.upper
+    p, r, rho, lower, upper = trial.p, trial.r, trial.rho_end, trial.lower, trial.upper
     worst, total = 0.0, 0.0
     for i in range(nodes.volumes):
         total += r[i]
-        target = rho[i] + trial.slope[i] * r[i]
+        theta = trial.theta[i]
+        target = rho[i] + trial.slope[i] * r[i] / theta
         large = abs(r[i]) > _LARGE_STEP * p[i]
         if iteration >= _PLAIN_NEWTON:
             if iteration == _PLAIN_NEWTON:
@@ -272,16 +313,16 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
         if large:
             # boiling: the density takes the step, the pressure follows it
             new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
-            r[i] = new - p[i]
-        worst = max(worst, abs(r[i]) / max(p[i], nodes.ambient))
+            r[i] = theta * (new - trial.end[i])
+        worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
     return worst, total
 
 
 @phase
 def _worst_volume(fluid: Any, worst: float) -> int:
-    p, r, found = fluid.trial.p, fluid.trial.r, 0
+    trial, r, found = fluid.trial, fluid.trial.r, 0
     for i in range(fluid.nodes.volumes):
-        if abs(r[i]) / max(p[i], fluid.nodes.ambient) == worst:
+        if abs(r[i]) / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient) == worst:
             found = i
     return found
 
@@ -311,7 +352,7 @@ def _finish_flows(fluid: Any) -> tuple[int, int]:
 @phase
 def push_by_fluid(fluid: Any, S: Any) -> None:
     """Add the forces of pressures on walls and those of branches to those of the ports."""
-    force = shift(S, FORCE)
+    force = shift(S, ANSWER)
     push_walls(fluid.nodes, fluid.trial.p, force)
     for k in range(fluid.branches.rows):
         push_ports(fluid.branches, k, force)
@@ -321,12 +362,15 @@ def push_by_fluid(fluid: Any, S: Any) -> None:
 def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: Any) -> None:
     """Take over flows and states of branches; the hydraulic power is stored, supplied or lost."""
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
-    inflow, g, r, rho = trial.inflow, trial.g, trial.r, trial.rho
+    inflow, g = trial.inflow, trial.g
     for i in range(fluid.nodes.nodes):
         inflow[i] = 0.0
     for i in range(fluid.nodes.volumes):
-        # r is the last Newton step: g to second order in it
-        g[i] += r[i] / rho[i] * (1.0 - 0.5 * r[i] * trial.slope[i] / rho[i])
+        # the last Newton step: g to second order in it
+        last, rho = trial.r[i] / trial.theta[i], trial.rho_end[i]
+        change = last / rho * (1.0 - 0.5 * last * trial.slope[i] / rho)
+        trial.g_end[i] += change
+        g[i] += trial.theta[i] * change
     for k in range(branches.rows):
         a, b, mdot = branches.a[k], branches.b[k], flows.mdot[k]
         inflow[a] -= H * mdot
@@ -336,7 +380,7 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
         o0, q0 = branches.output0[k] + branches.head, branches.port0[k]
         for j in range(q0, branches.port0[k + 1]):
             port = branches.ports[j]
-            power -= branches.outputs[o0 + j - q0] * (S[USED + port] - S[SEEN + port])
+            power -= branches.outputs[o0 + j - q0] * (S[Y1 + port] - S[SEEN + port])
         o0 = take_states(branches, k)
         for j in range(branches.accounts[k]):
             account, value = branches.account0[k] + j, branches.outputs[o0 + j]
@@ -357,29 +401,29 @@ def end_ends(fluid: Any, H: float) -> None:
         i = nodes.end_node[e]
         q = flows.q[e]
         if i < nodes.volumes:
-            q += nodes.density / trial.rho[i] / flows.Z[e] * trial.r[i]
+            q += nodes.density / trial.rho_end[i] / flows.Z[e] * trial.r[i]
         flows.q[e] = q
         trial.inflow[i] -= H * nodes.density * q
 
 
 @phase
-def end_nodes(fluid: Any, accounts: Any) -> None:
+def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
     """Take over masses, volumes and pressures, with the loss of the implicit step."""
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     p, g, V, inflow = trial.p, trial.g, trial.V, trial.inflow
     for i in range(nodes.volumes):
         mass = state.mass[i] + inflow[i]
-        excess = p[i] - nodes.ambient
-        stored = mass * g[i] - excess * V[i]
+        stored = mass * trial.g_end[i] - (trial.end[i] - nodes.ambient) * V[i]
         was = state.mass[i] * state.g[i]
         was -= (state.p[i] - nodes.ambient) * state.held[i]
-        work = excess * (V[i] - state.held[i])
+        work = (p[i] - nodes.ambient) * (V[i] - state.held[i])
         accounts.implicit[i] += was - stored + g[i] * inflow[i] - work
         state.mass[i] = mass
         state.held[i] = V[i]
+        state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
     for i in range(nodes.volumes, nodes.nodes):
         accounts.supply[i - nodes.volumes] -= g[i] * inflow[i]
     for i in range(nodes.nodes):
         state.before[i] = state.p[i]
-        state.p[i] = p[i]
-        state.g[i] = g[i]
+        state.p[i] = trial.end[i]
+        state.g[i] = trial.g_end[i]

@@ -68,6 +68,6 @@ def _speed(bodies: Bodies, block0: int, block1: int, row: int) -> float:
         shape = row
         if row < 0:
             shape += (bodies.start[k + 1] - bodies.start[k]) // ROW
-        block = pointer(bodies.fine, bodies.start[k])
+        block = pointer(bodies.laid_out, bodies.start[k])
         total += watch(block, bodies.modes[k], ROW_V, shape)
     return total

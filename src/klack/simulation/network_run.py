@@ -32,11 +32,12 @@ from klack.simulation.network_compile import (
     modal_state,
 )
 from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
-from klack.simulation.network_kernel import run_network
+from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
+from klack.simulation.step_sizes import StepSizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -121,7 +122,8 @@ def simulate_network(
             expected="1 or more",
             hint="1 switches coarse steps off, 16 is usual.",
         )
-    network = compile_network(rows, step=step, coarse=coarse)
+    sizes = _sizes(step, coarse)
+    network = compile_network(rows, sizes)
     grid = _grid(duration, step, coarse, record)
     chunk = _PYTHON_CHUNK if _has_python_steps(rows) else _CHUNK
     recorder = Recorder(
@@ -131,7 +133,8 @@ def simulate_network(
         chunk=min(max(1, chunk // grid.look_steps), grid.records * grid.looks),
         fine=max(chunk, grid.look_steps),
     )
-    clock = np.array([0, -1, 0, 0], dtype=np.int64)
+    clock = np.zeros(CLOCK, dtype=np.int64)
+    clock[1] = -1
     begun = None
     if state is not None:
         _restore(network, clock, state)
@@ -227,6 +230,14 @@ def _grid(duration: float, step: float, coarse: int, record: float) -> _Grid:
         records=max(1, int(np.ceil(duration / (of_record * block * step) - 1e-9))),
         coarse=coarse > 1,
     )
+
+
+NEAR_MOST = 32
+
+
+def _sizes(step: float, coarse: int) -> StepSizes:
+    near = _largest_divisor(coarse, min(coarse, NEAR_MOST))
+    return StepSizes(step=step, coarse=coarse, near=near, middle=4 if near % 4 == 0 else 1)
 
 
 def _largest_divisor(number: int, most: int) -> int:
@@ -379,6 +390,8 @@ def _advance(
         per_record,
         clock,
         block,
+        _sizes(step, block).near,
+        _sizes(step, block).middle,
         step,
         allow_coarse,
         network.arrays,
@@ -526,7 +539,7 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
     """All arrays that a step changes and the next one begins with, as a stored state calls them."""
     line = network.line_state
     groups = {
-        "bodies": {"fine": network.bodies.fine, "at": network.bodies.at},
+        "bodies": {"fine": network.bodies.laid_out[: network.bodies.size], "at": network.bodies.at},
         "elements": {"state": network.elements.state},
         "branches": {"state": network.branches.state},
         "nodes": network.node_state._asdict(),

@@ -41,8 +41,8 @@ from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
     BEFORE,
-    ELEMENTS_BEFORE,
-    LAST,
+    BEFORE_2,
+    BEFORE_3,
     SEEN,
     Y0,
 )
@@ -620,9 +620,8 @@ class _Balance:
         at, ports = bodies.at, self.ports
         for row in (Y0, SEEN):
             at[row : row + ports] = state.y[:-1]
-        for row in (LAST, BEFORE):
-            at[row : row + ports] = self.force[:-1]
-        at[ELEMENTS_BEFORE : ELEMENTS_BEFORE + ports] = self.elements[:-1]
+        for row in (BEFORE, BEFORE_2, BEFORE_3):
+            at[row : row + ports] = self.elements[:-1]
         begin, mode = 0, 0
         for b, body_row in enumerate(network.rows.bodies):
             body, r = body_row.body, body_row.body.rigid_count
@@ -633,7 +632,7 @@ class _Balance:
             for k in range(network.body_blocks[b], network.body_blocks[b + 1]):
                 part = q[ROW * (k - network.body_blocks[b]) :][:ROW]
                 place = bodies.start[k] + ROW * ROW_Q
-                bodies.fine[place : place + part.size] = part
+                bodies.laid_out[place : place + part.size] = part
             begin, mode = here.stop, mode + r
 
     def _put_fluid(self, state: _State) -> None:
@@ -667,7 +666,7 @@ class _Balance:
     def _put_interfaces(self, state: _State) -> None:
         network = self.network
         interfaces, now, rows = network.interfaces, network.interface_state, network.rows
-        now.force[:] = self.contact_force
+        now.force[:] = now.force_before[:] = self.contact_force
         now.gap[:] = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
         now.rate[:] = 0.0
         now.e[:] = interfaces.series * now.force  # in equilibrium with the contacts

@@ -5,6 +5,7 @@ __all__ = [
     "STATUS_DONE",
     "STATUS_ELEMENT",
     "STATUS_FORCES",
+    "STATUS_MET",
     "STATUS_PRESSURES",
     "STATUS_REFUSED",
 ]
@@ -12,4 +13,7 @@ __all__ = [
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
 
 STATUS_REFUSED = -1
-"""Of a coarse step: fine ones may do."""
+"""Of a macro step: elements and fluid need fine steps."""
+
+STATUS_MET = -2
+"""Of a step that met a touch or a release: bodies need finer ones."""
