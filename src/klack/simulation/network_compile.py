@@ -194,7 +194,9 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
     return port_of, names
 
 
-def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bodies, Index]:
+def compile_bodies(
+    rows: Sequence[BodyRow], steps: Sequence[float]
+) -> tuple[Bodies, Index]:
     """Lay out the modes in blocks for each step size; also the first block of each body."""
     laid_out: tuple[list[Vector], ...] = tuple([] for _ in steps)
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()

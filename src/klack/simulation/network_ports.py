@@ -13,9 +13,9 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     BEGIN,
+    EXCESS,
     COARSE,
     CUT,
-    EXCESS,
     FINE,
     FORCE,
     FREE,
@@ -50,8 +50,8 @@ __all__ = [
     "miss",
     "move_free",
     "move_ports_by_guess",
-    "repay",
     "respace_forces",
+    "repay",
     "row_length",
     "take_back_ports",
 ]
@@ -94,7 +94,9 @@ def bring(bodies: Any, source: int, target: int) -> None:
     S = bodies.at
     for k in range(bodies.blocks):
         block = _block(bodies, k, source)
-        apply_forces(block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k])
+        apply_forces(
+            block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k]
+        )
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
     if target != source:
@@ -246,7 +248,9 @@ def miss(bodies: Any, G: Any) -> None:
 
 
 @phase
-def matters(bodies: Any, level: int, share: float, energy: float, left: float, work: float) -> bool:
+def matters(
+    bodies: Any, level: int, share: float, energy: float, left: float, work: float
+) -> bool:
     """Whether what the guess missed matters: then the step is repeated with a better one.
 
     ``left`` and ``work`` are what the interfaces add to both sums.  Elements and fluid live
