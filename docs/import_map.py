@@ -31,6 +31,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance"),
     ("units", "unit_systems", "materials", "signals", "held_folder", "cache"),
     ("folder_lock", "stages"),
+    ("compiling",),
     ("stage",),
     ("whole_file",),
     # bodies
@@ -49,7 +50,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("assembling", "terminal"),
     ("analyses",),
     ("exchange",),
-    ("verification", "api"),
+    ("verification", "api", "warming"),
     ("cli",),
     ("__main__",),
 )

@@ -184,12 +184,14 @@ def test_no_home_and_no_folder_for_temporary_files(result: Path, tmp_path: Path)
 def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypatch, capsys):
     """In a private folder: numba runs what it finds there."""
     from klack.cli import surroundings
+    from klack.compiling import compiled_folder
 
     monkeypatch.setattr(os, "environ", dict(os.environ))
     os.environ.pop("NUMBA_CACHE_DIR", None)
     surroundings.prepare_compiling()
     assert "NUMBA_CACHE_DIR" not in os.environ  # this machine has a place
-    monkeypatch.setattr(surroundings, "_writable", lambda folder: False)
+    monkeypatch.setattr(compiled_folder, "is_usable", lambda folder: False)
+    monkeypatch.setattr(compiled_folder, "compiled_folder", lambda: None)
     surroundings.prepare_compiling()
     place = Path(os.environ["NUMBA_CACHE_DIR"])
     assert place.stat().st_mode & 0o077 == 0

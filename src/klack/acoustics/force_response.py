@@ -23,10 +23,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from klack.acoustics.port_forces import aligned_forces
+from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
@@ -192,7 +192,7 @@ def _interval(sample: float | None, axis: TimeSeries) -> int:
     return every
 
 
-@njit(cache=True)
+@njit
 def _march(  # type: ignore[no-untyped-def]
     A, Q, squares, phi, part, force, q, v, every, states, stored, momentum, work, lost
 ):  # pragma: no cover - compiled

@@ -16,10 +16,10 @@ the static energy between the first and the last one.
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from klack.acoustics.port_forces import aligned_forces
+from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.reduction.structure import Structure
 from klack.signals import Spectrum, TimeSeries
@@ -75,7 +75,7 @@ def injected_energy(density: Spectrum) -> float:
     return float(np.trapezoid(np.real(density.values), density.frequency))
 
 
-@njit(cache=True)
+@njit
 def _density(omega, steps, w, zeta, phi):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Sum the losses of all modes at all frequencies, shape (k,)."""
     out = np.zeros(omega.size)

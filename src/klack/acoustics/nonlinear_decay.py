@@ -18,9 +18,10 @@ rise above ``v`` in falling. ``u`` is taken straight between its values, which c
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
+
+from klack.compiling.jit import njit
 
 __all__ = ["nonlinear_decay"]
 
@@ -53,7 +54,7 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _follow(core, both, alone, charge, fine):  # type: ignore[no-untyped-def]
     bands, n = core.shape
     out = np.empty((bands, n))

@@ -23,6 +23,7 @@ __all__ = [
     "InspectionJson",
     "ReportJson",
     "VerificationJson",
+    "WarmJson",
     "measures_catalogue",
     "result_schema",
 ]
@@ -61,6 +62,24 @@ class CacheJson(TypedDict):
     count: int
     size_B: int
     limit_B: int
+
+
+class WarmedJson(TypedDict):
+    """One group of compiled functions."""
+
+    compiled: Annotated[int, Field(description="Functions; 0 if all were there.")]
+    compile_time_s: float
+    wall_time_s: float
+
+
+class WarmJson(TypedDict):
+    """``klack warm``."""
+
+    schema: Literal["klack-warm/1"]
+    folder: str
+    count: int
+    size_B: int
+    groups: dict[str, WarmedJson]
 
 
 class InspectedRowJson(TypedDict):
@@ -102,7 +121,7 @@ class ExportJson(TypedDict):
     files: Annotated[list[str], Field(description="Names of the files and folders written.")]
 
 
-_OTHERS = (InspectionJson, ReportJson, ExportJson, VerificationJson, CacheJson)
+_OTHERS = (InspectionJson, ReportJson, ExportJson, VerificationJson, CacheJson, WarmJson)
 
 
 def measures_catalogue() -> dict[str, Any]:

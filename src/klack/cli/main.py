@@ -26,7 +26,7 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
 from klack.analyses.catalogue import commands
-from klack.cli import cache, compare, demo, export, inspect, report, schema, verify
+from klack.cli import cache, compare, demo, export, inspect, report, schema, verify, warm
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
@@ -66,6 +66,7 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     verify.verify: "klack verify --group contact",
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",
+    warm.warm: "klack warm",
 }
 """Every command, with the example that its help shows."""
 
@@ -122,7 +123,8 @@ def _run(arguments: list[str], name: str) -> int:
         usual, warnings.showwarning = warnings.showwarning, note
         if arguments and not arguments[0].startswith("-"):
             require_present_folder()
-            prepare_compiling()
+            if arguments[0] != "warm":  # which says itself that there is no folder
+                prepare_compiling()
         code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
     sys.stdout.flush()
     return code if isinstance(code, int) else EXIT_OK

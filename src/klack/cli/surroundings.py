@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Mapping
 from io import TextIOWrapper
-from pathlib import Path
 from typing import TextIO
 
 from klack.errors import InputError
@@ -48,29 +47,27 @@ def prepare_streams() -> None:
 
 
 def prepare_compiling() -> None:
-    """Switch the store of compiled functions off where numba finds no place for it.
+    """Keep compiled functions for one command where no folder for them can be written to.
 
-    It looks beside the package, then in the home of the user, and gives up if neither can be
-    written to; then every command compiles anew.
+    Its processes share them; without a home of the user every command compiles anew.
     """
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return
-    package = Path(__file__).parents[1]
-    places = [folder / "__pycache__" for folder in (package, *package.iterdir()) if folder.is_dir()]
-    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    if not all(map(_writable, places)) and not _writable(home):
-        import atexit
-        import shutil
-        from tempfile import mkdtemp
+    from klack.compiling.compiled_folder import FOLDER_VARIABLE, compiled_folder, is_usable
 
-        place = mkdtemp(prefix="klack-compiled-")  # not a shared one: numba runs what it finds
-        atexit.register(shutil.rmtree, place, ignore_errors=True)
-        os.environ["NUMBA_CACHE_DIR"] = place
-        print(
-            "klack: note: compiled functions cannot be cached (no writable home directory), "
-            "so every command compiles them again.",
-            file=sys.stderr,
-        )
+    folder = compiled_folder()
+    if is_usable(folder) or (folder is not None and folder.is_dir()):  # may be read at least
+        return
+    import atexit
+    import shutil
+    from tempfile import mkdtemp
+
+    place = mkdtemp(prefix="klack-compiled-")  # not a shared one: what is found there is run
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    os.environ[FOLDER_VARIABLE] = place
+    print(
+        "klack: note: compiled functions cannot be cached (no writable home directory), "
+        "so every command compiles them again.",
+        file=sys.stderr,
+    )
 
 
 def require_present_folder() -> None:
@@ -99,8 +96,3 @@ def close_quietly() -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _writable(folder: Path) -> bool:
-    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
-    return existing.is_dir() and os.access(existing, os.W_OK)

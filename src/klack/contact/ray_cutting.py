@@ -4,10 +4,10 @@ A face is a polynomial :math:`x(\xi, \eta) = \sum_m c_m\, p_m(\xi, \eta)` in the
 that every face family spans; a line of an axisymmetric body becomes a strip around it.
 """
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.mesh.families import FAMILIES
 
@@ -100,7 +100,7 @@ def _monomial_factors(family: str) -> NDArray[np.float64]:
     return np.round(4.0 * factors) / 4.0  # all are quarters
 
 
-@numba.njit(cache=True)
+@njit
 def cut_nearest(  # type: ignore[no-untyped-def]
     points, normals, coefficients, centre, axes, half, triangle, inside, opposed, deepest
 ):
@@ -137,7 +137,7 @@ def cut_nearest(  # type: ignore[no-untyped-def]
     return face, xi, gap
 
 
-@numba.njit(cache=True)
+@njit
 def cut_listed(  # type: ignore[no-untyped-def]
     first,
     listed,
@@ -176,7 +176,7 @@ def cut_listed(  # type: ignore[no-untyped-def]
     return gap
 
 
-@numba.njit(cache=True)
+@njit
 def list_near(points, normals, start, centre, axes, half, within):  # type: ignore[no-untyped-def]
     """Faces whose boxes, larger by ``within`` [m] on all sides, each line meets.
 
@@ -205,7 +205,7 @@ def list_near(points, normals, start, centre, axes, half, within):  # type: igno
     return first, listed
 
 
-@numba.njit(cache=True)
+@inner
 def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
     """Whether a line along n meets a box whose middle is at d from a point of the line."""
     x = d[0] * axes[0, 0] + d[1] * axes[0, 1] + d[2] * axes[0, 2]
@@ -223,7 +223,7 @@ def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True)
+@inner
 def _nearest_of(  # type: ignore[no-untyped-def]
     faces, x, n, coefficients, centre, axes, half, triangle, inside, opposed, deepest, close
 ):
@@ -263,7 +263,7 @@ def _nearest_of(  # type: ignore[no-untyped-def]
     return found, at_u, at_v, gap
 
 
-@numba.njit(cache=True, inline="always")
+@njit(inline="always")
 def _component(c, k, u, v):  # type: ignore[no-untyped-def]
     """Coordinate k of a face at (u, v) and its two slopes."""
     value = (
@@ -276,7 +276,7 @@ def _component(c, k, u, v):  # type: ignore[no-untyped-def]
     return value, along_u, along_v
 
 
-@numba.njit(cache=True)
+@inner
 def cut_face(c, x0, x1, x2, n0, n1, n2, u, v, g):  # type: ignore[no-untyped-def]
     """Solve x + g n = face(u, v) from a guess; returns u, v, g, cosine of the normals, settled."""
     for _ in range(25):

@@ -9,13 +9,14 @@ revolution.  With it the 3 x 3 block of a solid is ``lambda G + mu (G^T + tr G 1
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from klack.compiling.jit import inner, njit
 
 __all__ = ["add_elements", "block_pattern", "diagonal_blocks", "node_graph"]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def node_graph(
     elements: NDArray[np.int32], offsets: NDArray[np.int64], node_count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
@@ -70,7 +71,7 @@ def node_graph(
     return start, neighbours
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def block_pattern(
     start: NDArray[np.int64], neighbours: NDArray[np.int32], d: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -90,7 +91,7 @@ def block_pattern(
     return columns, row_start
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def diagonal_blocks(
     start: NDArray[np.int64], neighbours: NDArray[np.int32], values: NDArray[np.float64], d: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
@@ -111,7 +112,7 @@ def diagonal_blocks(
     return entries, columns, row_start
 
 
-@njit(cache=True, nogil=True)
+@inner(nogil=True)
 def _geometry(x, dN, N, axisymmetric, g):  # type: ignore[no-untyped-def]
     """Fill ``g`` (n, 3) at one point; return the Jacobian and the volume factor."""
     n, d = dN.shape
@@ -152,7 +153,7 @@ def _geometry(x, dN, N, axisymmetric, g):  # type: ignore[no-untyped-def]
     return det, 1.0
 
 
-@njit(cache=True, nogil=True)
+@inner(nogil=True)
 def _position(neighbours, low, high, node):  # type: ignore[no-untyped-def]
     """Index of ``node`` in the sorted slice [low, high)."""
     while high - low > 1:
@@ -164,7 +165,7 @@ def _position(neighbours, low, high, node):  # type: ignore[no-untyped-def]
     return low
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def add_elements(
     points: NDArray[np.float64],
     connectivity: NDArray[np.int32],
@@ -258,7 +259,7 @@ def add_elements(
     return jacobians
 
 
-@njit(cache=True, nogil=True)
+@inner(nogil=True)
 def _stiffness_block(G, lame_lambda, mu, axisymmetric, block):  # type: ignore[no-untyped-def]
     """Fill the (d, d) block of one pair of nodes."""
     if axisymmetric:  # components r, z, hoop

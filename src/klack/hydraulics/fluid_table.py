@@ -19,9 +19,9 @@ from functools import lru_cache
 from math import log1p
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import HIGHEST_PRESSURE, Murnaghan, Tait
@@ -151,7 +151,7 @@ def _error(fluid: NetworkFluid, left: Vector, right: Vector, factors: Vector) ->
     return np.where(rough & (right - left > 1e-6 * right), np.inf, error)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", _nrt=False, forceinline=True)
 def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, int]:
     """Density [kg/m^3], its slope [kg/(m^3 Pa)], pressure energy [J/kg] and the place in the table.
 
@@ -189,7 +189,7 @@ def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, i
     return rho, -slope * rho * rho, g, i
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _beyond(
     v0: float, slope: float, g0: float, s: float, place: int
 ) -> tuple[float, float, float, int]:
@@ -201,7 +201,7 @@ def _beyond(
     return rho, rise, g0 + log1p(rise * v0 * s) / rise, place
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", _nrt=False, forceinline=True)
 def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
     """Absolute pressure [Pa] at which the fluid has the density ``rho`` [kg/m^3], and its place.
 
@@ -248,7 +248,7 @@ def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
     return p0 + s, i
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _volume(table: Vector, i: int, s: float) -> tuple[float, float]:
     """Specific volume and its slope in the piece at offset ``i``."""
     c1, c2, c3, c4, c5 = table[i + 2], table[i + 3], table[i + 4], table[i + 5], table[i + 6]

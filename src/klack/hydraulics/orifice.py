@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import exp, pi, sqrt
 from typing import Any, ClassVar, Self
 
-from numba import njit
 from pydantic import Field, model_validator
 
+from klack.compiling.jit import njit
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
@@ -26,7 +26,7 @@ _SATURATED = 20.0  # 1 - tanh(20) = 8e-18
 _SOFT = 1e3  # [Pa] above the vapour pressure, where the root of the limit is rounded
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _tanh(X: float) -> tuple[float, float]:
     """``tanh X`` and ``tanh(X)/X`` for ``X >= 0``; half the time of the library's."""
     if X < _SERIES:
@@ -41,7 +41,7 @@ def _tanh(X: float) -> tuple[float, float]:
     return t, t / X
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def choked_flow(
     flow: float,
     up: float,
@@ -89,7 +89,7 @@ def choked_flow(
     return limit, scale * (1.5 - s) / _SOFT, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def orifice_flow(
     p_a: float,
     p_b: float,

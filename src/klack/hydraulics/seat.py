@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import acos, cos, pi, sin, sqrt
 from typing import Any, ClassVar, Literal, Self
 
-from numba import njit
 from pydantic import Field, model_validator
 
+from klack.compiling.jit import inner, njit
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow, orifice_flow
@@ -24,13 +24,13 @@ _FLAT, _CONE, _BALL = 0.0, 1.0, 2.0
 _KINDS = {"flat": _FLAT, "cone": _CONE, "ball": _BALL}
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def flat_opening(x: float, r: float) -> tuple[float, float]:
     """Area [m^2] and gap [m] of a flat face at lift ``x`` over an edge of radius ``r`` [m]."""
     return 2.0 * pi * r * x, x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def cone_opening(x: float, r: float, s: float, c: float) -> tuple[float, float]:
     """Area and normal gap of a cone in a sharp edge of radius ``r``; sine and cosine of its angle.
 
@@ -43,7 +43,7 @@ def cone_opening(x: float, r: float, s: float, c: float) -> tuple[float, float]:
     return pi * gap * (2.0 * r - gap * c), gap
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def ball_opening(x: float, r: float, R: float, x0: float) -> tuple[float, float]:
     """Area and gap of a ball of radius ``R`` in a sharp edge; ``x0 = sqrt(R^2 - r^2)``."""
     rise = x * (x + 2.0 * x0)
@@ -51,7 +51,7 @@ def ball_opening(x: float, r: float, R: float, x0: float) -> tuple[float, float]
     return pi * r * rise / distance, rise / (distance + R)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def gap_flow(drop: float, linear: float, square: float) -> tuple[float, float]:
     r"""Flow [m^3/s] through a gap and an edge in series, and its slope with the drop.
 
@@ -71,7 +71,7 @@ def gap_flow(drop: float, linear: float, square: float) -> tuple[float, float]:
     return 2.0 * drop / (linear + root), 1.0 / root
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[float, float]:
     if kind == _CONE:
         return cone_opening(x, r, g1, g2)

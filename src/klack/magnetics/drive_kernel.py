@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from numba import njit
+from klack.compiling.jit import inner
 
 __all__ = ["NEVER", "crossed_switch", "due_switch", "next_time", "state_block", "state_voltage"]
 
@@ -10,13 +10,13 @@ NEVER = 1e300
 """Time that does not come [s]."""
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def state_block(par: Any, drive: int, state: int) -> int:
     """Where the block of a state starts in ``par``."""
     return drive + int(par[drive + 1 + state])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def due_switch(
     par: Any, block: int, time: float, entered: float, cycle: float, current: float, close: float
 ) -> int:
@@ -37,7 +37,7 @@ def due_switch(
     return -1
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -> float:
     """Return the next time at which the voltage of a state bends or a switch is due."""
     due = NEVER
@@ -56,7 +56,7 @@ def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -
     return due
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def crossed_switch(par: Any, block: int, before: int, current: float) -> int:
     """Return the first switch at or after ``before`` that an end current calls for; -1 if none."""
     for k in range(before, int(par[block + 2])):
@@ -67,7 +67,7 @@ def crossed_switch(par: Any, block: int, before: int, current: float) -> int:
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _point_after(par: Any, source: int, time: float) -> int:
     """Return the first point of a course that is later than ``time``."""
     low, high = 0, int(par[source])
@@ -80,7 +80,7 @@ def _point_after(par: Any, source: int, time: float) -> int:
     return low
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def state_voltage(par: Any, block: int, time: float) -> float:
     """Return the voltage of a state at a time since the start of the cycle [V]."""
     source = block + 3 + 4 * int(par[block + 2])

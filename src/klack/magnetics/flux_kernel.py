@@ -20,10 +20,11 @@ All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``
 from math import sqrt
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from klack.compiling.jit import inner
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 
@@ -54,7 +55,7 @@ def stack(typingctx: Any, size: Any) -> Any:
     return signature, codegen
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def interval(par: Any, table: int, hint: int, value: float) -> int:
     """Number of the interval that holds ``value``, searched from where it was last."""
     last = int(par[table]) - 1
@@ -66,12 +67,12 @@ def interval(par: Any, table: int, hint: int, value: float) -> int:
     return i
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _cubic(par: Any, row: int, s: float) -> float:
     return par[row + 1] + s * (par[row + 2] + s * (par[row + 3] + s * par[row + 4]))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _cubic_integral(par: Any, row: int, s: float) -> float:
     return s * (
         par[row + 1]
@@ -79,7 +80,7 @@ def _cubic_integral(par: Any, row: int, s: float) -> float:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def iron_mmf(par: Any, table: int, hint: int, flux: float) -> float:
     """Magnetomotive force [A]; odd in the flux."""
     a = abs(flux)
@@ -88,7 +89,7 @@ def iron_mmf(par: Any, table: int, hint: int, flux: float) -> float:
     return mmf if flux >= 0.0 else -mmf
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _iron_mean_far(par: Any, table: int, hint: int, b0: float, b1: float) -> tuple[float, float]:
     """Mean over more than one interval or across zero; see :func:`_iron_mean`."""
     a0, a1 = abs(b0), abs(b1)
@@ -115,7 +116,7 @@ def _iron_mean_far(par: Any, table: int, hint: int, b0: float, b1: float) -> tup
     return mean, ((end_mmf if b1 >= 0.0 else -end_mmf) - mean) / change
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _mean_of(par: Any, row: int, s0: float, s1: float) -> float:
     """Mean of a cubic between ``s0`` and ``s1``."""
     total, squares = s0 + s1, s0 * s0 + s1 * s1
@@ -127,7 +128,7 @@ def _mean_of(par: Any, row: int, s0: float, s1: float) -> float:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _iron_mean(par: Any, table: int, hint: int, b0: float, b1: float) -> tuple[float, float]:
     """Mean mmf between two fluxes and its derivative by ``b1``."""
     a0, a1 = abs(b0), abs(b1)
@@ -148,21 +149,21 @@ def _iron_mean(par: Any, table: int, hint: int, b0: float, b1: float) -> tuple[f
     return (-mean if negative else mean), slope
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def gap_reluctance(par: Any, table: int, hint: int, x: float) -> float:
     """Reluctance [A/Wb] at a gap."""
     row = table + 1 + 6 * interval(par, table, hint, x)
     return _cubic(par, row, x - par[row])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _quotient_of(par: Any, row: int, s0: float, s1: float) -> float:
     """Difference quotient of a cubic between ``s0`` and ``s1``."""
     total = s0 + s1
     return par[row + 2] + par[row + 3] * total + par[row + 4] * (total * total - s0 * s1)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def gap_slope(par: Any, table: int, hint: int, x0: float, x1: float) -> float:
     """Difference quotient of the reluctance between two gaps [A/(Wb m)]."""
     i0 = interval(par, table, hint, x0)
@@ -178,13 +179,13 @@ def gap_slope(par: Any, table: int, hint: int, x0: float, x1: float) -> float:
     return rise / (b - a)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _tube(par: Any, at: int, k: int) -> int:
     loops = int(par[at])
     return at + _HEADER + loops + k * (_SIZE + loops)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_flux(par: Any, at: int, k: int, phi: Any) -> float:
     """Flux of the tube ``k`` [Wb] from the loop fluxes."""
     loops, row = int(par[at]), _tube(par, at, k) + _SIZE
@@ -194,7 +195,7 @@ def circuit_flux(par: Any, at: int, k: int, phi: Any) -> float:
     return flux
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def linked(par: Any, at: int, phi: Any) -> float:
     """Linkage of the coil [Wb] from the loop fluxes (or their changes)."""
     total = par[at + _HEADER] * phi[0]
@@ -203,7 +204,7 @@ def linked(par: Any, at: int, phi: Any) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_gaps(
     par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
 ) -> None:
@@ -231,7 +232,7 @@ def circuit_gaps(
         p += _SIZE + loops
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
     """Current [A] that belongs to ``phi + change`` and the reluctances ``end`` of the tubes."""
     loops = int(par[at])
@@ -252,7 +253,7 @@ def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: A
     return current
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
     """Stored energy [J]; notes in ``hints`` where in the tables of iron it was found."""
     loops = int(par[at])
@@ -273,7 +274,7 @@ def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
     return energy
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def circuit_loss_and_force(
     par: Any, at: int, phi: Any, change: Any, slope: Any
 ) -> tuple[float, float]:
@@ -294,7 +295,7 @@ def circuit_loss_and_force(
     return loss, force
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _factorise(A: Any, n: int) -> bool:
     """Replace the lower half of ``A`` by its Cholesky factor; False if it is not positive."""
     for j in range(n):
@@ -313,7 +314,7 @@ def _factorise(A: Any, n: int) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _solve(A: Any, g: Any, n: int) -> None:
     """Replace ``g`` by the solution with the factor ``A``."""
     for i in range(n):
@@ -329,7 +330,7 @@ def _solve(A: Any, g: Any, n: int) -> None:
         g[i] = v / A[i * n + i]
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def circuit_step(
     par: Any,
     at: int,

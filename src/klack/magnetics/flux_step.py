@@ -16,9 +16,9 @@ identity stays exact:
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import inner
 from klack.errors import require_positive
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.drive_kernel import (
@@ -106,7 +106,7 @@ _MAP = MAP
 _HEADER = 8
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _gaps(
     par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
 ) -> None:
@@ -117,7 +117,7 @@ def _gaps(
         circuit_gaps(par, at, hints, x0, x1, middle, end, slope)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _advance(
     par: Any,
     at: int,
@@ -138,7 +138,7 @@ def _advance(
     return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[1], conducts)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
     """Return the current at the end of a piece [A]."""
     if par[at + _MAP] != 0.0:
@@ -146,7 +146,7 @@ def _current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> 
     return circuit_current(par, at, hints, phi, change, end)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _locate(
     par: Any,
     at: int,
@@ -199,7 +199,7 @@ def _locate(
     return -1.0, 0.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, int]:
     """Return the current and the first transition before ``end``."""
     target, which, earliest = 0.0, _NONE, 2.0
@@ -215,7 +215,7 @@ def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, 
     return target, which
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _next_state(
     par: Any, block: int, switch: int, now: float, entered: float, cycle: float
 ) -> tuple[float, float, float]:

@@ -18,9 +18,9 @@ continues by one more unbounded cell on each side.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_table import BRANCH_SIZE, HEADER, MAP
 
@@ -77,13 +77,13 @@ def map_numbers(flux_map: FluxMap) -> Vector:
     return np.concatenate((frame, [float(m), float(n + 1), step], columns, cells.ravel()))
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _row(par: Any, t: int, size: float) -> int:
     """Row of cells that holds a linkage."""
     return min(int(size / par[t + 2]), int(par[t]) - 1)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _column(par: Any, t: int, x: float) -> int:
     """Column of cells that holds a gap."""
     low, high = 0, int(par[t + 1]) - 1
@@ -96,7 +96,7 @@ def _column(par: Any, t: int, x: float) -> int:
     return low
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _over_linkage(par: Any, t: int, k: int, j: int, x: float) -> tuple[float, float, float, float]:
     """Cubic ``W(u)`` of the cell ``k, j`` at a gap."""
     c = t + 3 + 2 * int(par[t + 1]) + 16 * (k * int(par[t + 1]) + j)
@@ -109,7 +109,7 @@ def _over_linkage(par: Any, t: int, k: int, j: int, x: float) -> tuple[float, fl
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _over_gap(par: Any, t: int, k: int, j: int, u: float) -> tuple[float, float, float]:
     """Slope factors of the cubic ``W(v)`` of the cell ``k, j`` at a linkage."""
     c = t + 3 + 2 * int(par[t + 1]) + 16 * (k * int(par[t + 1]) + j)
@@ -120,7 +120,7 @@ def _over_gap(par: Any, t: int, k: int, j: int, u: float) -> tuple[float, float,
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def map_energy(par: Any, at: int, linkage: float, x: float) -> float:
     """Stored energy [J]."""
     t, a = at + _TABLE, abs(linkage)
@@ -130,7 +130,7 @@ def map_energy(par: Any, at: int, linkage: float, x: float) -> float:
     return c0 + u * (c1 + u * (c2 + u * c3))
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def map_current(par: Any, at: int, linkage: float, x: float) -> float:
     """Current [A]; odd in the linkage."""
     t, a = at + _TABLE, abs(linkage)
@@ -141,7 +141,7 @@ def map_current(par: Any, at: int, linkage: float, x: float) -> float:
     return current if linkage >= 0.0 else -current
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _mean_current(par: Any, at: int, psi0: float, psi1: float, x: float) -> tuple[float, float]:
     """Mean current between two linkages at a gap, and its derivative by ``psi1``."""
     t = at + _TABLE
@@ -172,7 +172,7 @@ def _mean_current(par: Any, at: int, psi0: float, psi1: float, x: float) -> tupl
     return mean, (map_current(par, at, psi1, x) - mean) / change
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _mean_slope(par: Any, at: int, linkage: float, x0: float, x1: float) -> float:
     """Mean of ``dW/dx`` [N] between two gaps at a linkage."""
     t, a = at + _TABLE, abs(linkage)
@@ -197,14 +197,14 @@ def _mean_slope(par: Any, at: int, linkage: float, x0: float, x1: float) -> floa
     return work / (high - low)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def map_force(par: Any, at: int, psi: float, change: float, x0: float, x1: float) -> float:
     """Mean force along the gap [N] of a step."""
     before = _mean_slope(par, at, psi, x0, x1)
     return -0.5 * (before + _mean_slope(par, at, psi + change, x0, x1))
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def map_step(
     par: Any,
     at: int,

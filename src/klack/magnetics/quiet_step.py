@@ -7,8 +7,7 @@ course of voltage, a table interval left, a second Newton step) it leaves to the
 
 from typing import Any
 
-from numba import njit
-
+from klack.compiling.jit import inner
 from klack.magnetics.drive_kernel import state_block
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
@@ -29,7 +28,7 @@ _STRIDE = _SIZE + 2
 _THIRD = 1.0 / 3.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inner(error_model="numpy", forceinline=True)
 def _quiet_until(par: Any, block: int, state: Any, end: float, current: float) -> bool:
     """Whether no switch of a state is due up to the time ``end`` and its current."""
     low, high = min(state[4], current), max(state[4], current)
@@ -49,7 +48,7 @@ def _quiet_until(par: Any, block: int, state: Any, end: float, current: float) -
 
 
 # a multiply and its add may become one operation: a tenth faster, and no less accurate
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@inner(error_model="numpy", fastmath={"contract"})
 def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
     """Write a step to ``out`` if it is a usual one; False (and ``out`` undefined) if not."""
     h = inp[1]

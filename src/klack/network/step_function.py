@@ -38,17 +38,21 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
 
 __all__ = [
     "STEP",
     "StepFunction",
     "address_of",
     "call",
+    "compile_step",
     "evaluate",
     "first",
+    "is_step_function",
     "pointer",
     "pointers",
     "python_step",
@@ -70,8 +74,13 @@ PythonStep = Callable[
 
 
 def step_function(function: Callable[..., int]) -> StepFunction:
-    """Compile a step function; it may call other compiled functions and index its pointers."""
-    return njit(STEP, cache=True, error_model="numpy")(function)
+    """Compile a step function when a network first has it, not when its file is imported.
+
+    It may call other compiled functions and index its pointers.
+    """
+    step = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=False)(function)
+    step.is_klack_step = True
+    return step
 
 
 @intrinsic
@@ -143,8 +152,21 @@ def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any)
     return signature, codegen
 
 
+def is_step_function(found: object) -> bool:
+    """Whether something is what :func:`step_function` returned."""
+    return getattr(found, "is_klack_step", False) is True
+
+
+def compile_step(step: StepFunction) -> None:
+    """Compile a step function, or load it."""
+    step.get_compile_result(STEP)
+
+
 def address_of(step: StepFunction) -> int:
-    """Address of the C entry of a step function; valid as long as the function is kept."""
+    """Address of the C entry of a step function; valid as long as the function is kept.
+
+    Compiles it, or loads it, the first time.
+    """
     if isinstance(step, _PythonStep):
         return step.address
     result = step.get_compile_result(STEP)
@@ -155,7 +177,7 @@ def address_of(step: StepFunction) -> int:
 Vector = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit
 def _call(address: int, par: Vector, state: Vector, inp: Vector, out: Vector) -> int:
     return int(call(address, first(par), first(state), first(inp), first(out)))
 

@@ -14,9 +14,9 @@ would be lost.  Laws arrive as flat numbers, see :class:`klack.contact.laws.Flat
 from math import sqrt
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FORCE_LEFT,
     HERTZ_EQUAL,
@@ -35,14 +35,14 @@ __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 Vector = NDArray[np.float64]
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _power(d: float, n: float) -> float:
     if n == 1.5:
         return d * sqrt(d)
     return d**n
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _interval(p: Vector, start: int, d: float, hint: int) -> int:
     """Offset in ``p`` of the table interval that holds ``d``, searched from where it was last."""
     first = start + 1
@@ -55,7 +55,7 @@ def _interval(p: Vector, start: int, d: float, hint: int) -> int:
     return i
 
 
-@compiled()
+@njit
 def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
     """Stored energy [J] of the elastic law at indentation ``d``."""
     if d <= 0.0:
@@ -69,7 +69,7 @@ def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
     return p[i + 5] + s * (p[i + 1] + s * (p[i + 2] / 2 + s * (p[i + 3] / 3 + s * p[i + 4] / 4)))
 
 
-@njit(cache=True)
+@inner
 def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
     """Mean of ``K d^n`` over ``low < d < high``, both positive and close together or not."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -82,7 +82,7 @@ def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
     return K / (n + 1.0) * (_power(high, n) * high - _power(low, n) * low) / (high - low)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _cubic_mean(p: Vector, i: int, s0: float, s1: float) -> tuple[float, float]:
     """Mean force between two places of one table interval, and its slope over ``s1``."""
     c1, c2, c3 = p[i + 2], p[i + 3], p[i + 4]
@@ -92,13 +92,13 @@ def _cubic_mean(p: Vector, i: int, s0: float, s1: float) -> tuple[float, float]:
     return mean, slope
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _within(p: Vector, start: int, i: int, d0: float, d1: float) -> bool:
     """Whether both indentations lie in the table interval at offset ``i``."""
     return min(d0, d1) >= p[i] and (i + 6 > start + 6 * int(p[start]) or max(d0, d1) < p[i + 6])
 
 
-@njit(cache=True)
+@inner
 def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple[float, float, int]:
     """Mean force of a table, its slope over ``d1``, and the interval of ``d1``."""
     i = _interval(p, start, max(d1, 0.0), hint)
@@ -123,7 +123,7 @@ def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple
     return mean, (f1 - mean) / (d1 - d0), number
 
 
-@compiled()
+@njit
 def mean_force(
     kind: int, p: Vector, start: int, d0: float, d1: float, hint: int
 ) -> tuple[float, float, int]:
@@ -166,7 +166,7 @@ def solve_linear(k: float, G: float, d0: float, df: float) -> float:
     return 0.5 * k * d1 * d1 / (d1 - d0)
 
 
-@compiled()
+@njit
 def solve_step(
     kind: int,
     p: Vector,
@@ -227,7 +227,7 @@ def solve_step(
     return force, hint, _lost(kind, p, start, chi_over_h, d0, d1, hint)
 
 
-@njit(cache=True)
+@inner
 def _step_force(
     kind: int, p: Vector, start: int, chi_over_h: float, d0: float, d1: float, hint: int
 ) -> tuple[float, float, int]:
@@ -240,7 +240,7 @@ def _step_force(
     return mean * factor, slope * factor + mean * chi_over_h, hint
 
 
-@njit(cache=True)
+@inner
 def _lost(
     kind: int, p: Vector, start: int, chi_over_h: float, d0: float, d1: float, hint: int
 ) -> float:

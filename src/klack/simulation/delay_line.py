@@ -29,9 +29,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.errors import InputError
 from klack.network.rows import LineRow
 from klack.network.step_function import first, shift
@@ -309,7 +309,7 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
     return np.concatenate([np.zeros(0), *parts])
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _memory(memory: Any, z: Any, count: int) -> float:
     """Part of the pressure drop of a lump that its memory takes back [Pa]; pointers."""
     drop = 0.0
@@ -318,7 +318,7 @@ def _memory(memory: Any, z: Any, count: int) -> float:
     return drop
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
     """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]; pointers."""
     total = 0.0
@@ -329,7 +329,7 @@ def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _mean_of(window: Any, m: int, f: float) -> tuple[float, float]:
     """Mean of ``m`` interpolated samples, and the sum of squares that reading it so takes; pointer.
 
@@ -348,26 +348,26 @@ def _mean_of(window: Any, m: int, f: float) -> tuple[float, float]:
     return base + mean, f * (1.0 - f) * jumps + max(spread - mean * total, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _fill(window: Any, m: int, value: float) -> None:
     for i in range(m):
         window[i] = value
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _move_back(window: Any, by: int, count: int) -> None:
     for i in range(count):
         window[i] = window[i + by]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _level(lines: Lines, m: int) -> int:
     if m == 1:
         return 0
     return 1 if m == lines.coarse else 2
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
+@njit(error_model="numpy", forceinline=True, _nrt=False)  # two dozen arrays to hand over
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
     """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
 
@@ -416,7 +416,7 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
             c[b] -= 0.5 * _memory(shift(memory, (s1 - s0) * terms), own_z, terms)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)  # two dozen arrays to hand over
+@njit(error_model="numpy", forceinline=True, _nrt=False)  # two dozen arrays to hand over
 def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matrix) -> None:
     """Finish the step that :func:`lines_incoming` began: send the waves, move on by ``m`` steps.
 
@@ -486,7 +486,7 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         books[line, 2] += collapse
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def line_store(lines: Lines, state: LineState, line: int) -> float:
     """Energy [J] held in a line now: waves, memory of the friction, cavities.
 
@@ -507,7 +507,7 @@ def line_store(lines: Lines, state: LineState, line: int) -> float:
     return energy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def line_volume(lines: Lines, state: LineState, line: int) -> float:
     """Fluid [m^3] that compression stores in a line now, ``P`` over its stiffness.
 
@@ -520,13 +520,13 @@ def line_volume(lines: Lines, state: LineState, line: int) -> float:
     return volume
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def line_cavity(lines: Lines, state: LineState, line: int) -> float:
     """Vapour [m^3] in all cavities of a line now."""
     return state.cavity[lines.first_segment[line] : lines.first_segment[line + 1]].sum()
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy")
 def _held(lines: Lines, state: LineState, segment: int, wave: int, power: int) -> float:
     """Sum of the samples, or of their squares, still in transit."""
     oldest = lines.start[segment, wave] + state.head[segment]

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.rest import effective_mass, longest_period, rest_time
@@ -162,7 +162,7 @@ class ImpactFinder:
         )
 
 
-@njit(cache=True)
+@njit
 def _feed(
     state: Any,
     c: int,
@@ -195,7 +195,7 @@ def _feed(
     return count
 
 
-@njit(cache=True)
+@inner
 def _record(s: Any, period: float, time: float, rate: float) -> None:
     """Take in the speed of the gap at a time."""
     s.time0, s.rate0 = s.time1, s.rate1
@@ -208,7 +208,7 @@ def _record(s: Any, period: float, time: float, rate: float) -> None:
         _after_contact(s, period, time, rate)
 
 
-@njit(cache=True)
+@inner
 def _after_contact(s: Any, period: float, time: float, rate: float) -> None:
     """Speed of the gap after the last contact of an impact."""
     s.between_earlier = s.between
@@ -227,7 +227,7 @@ def _after_contact(s: Any, period: float, time: float, rate: float) -> None:
         s.impact_news = 1.0
 
 
-@njit(cache=True)
+@inner
 def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: float) -> None:
     if s.closed == 0.0:
         if not t - s.row_time < max(pause, _PAUSE_STEPS * h):
@@ -258,7 +258,7 @@ def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: f
             s.rests = 1.0
 
 
-@njit(cache=True)
+@inner
 def _contact_over(s: Any, period: float, t: float, out: Any, count: int) -> int:
     """End the contact at ``t``: a part of the impact so far, or the beginning of the next one."""
     s.until = t
@@ -281,7 +281,7 @@ def _contact_over(s: Any, period: float, t: float, out: Any, count: int) -> int:
     return emitted
 
 
-@njit(cache=True)
+@inner
 def _joins(s: Any, period: float, duration: float) -> bool:
     """Whether the present contact, of this duration so far, belongs to the impact before it."""
     if s.opened <= 0.0:
@@ -292,7 +292,7 @@ def _joins(s: Any, period: float, duration: float) -> bool:
     return bool(s.begin - s.stop < pause)
 
 
-@njit(cache=True)
+@inner
 def _merge(s: Any) -> None:
     """Add the present contact to the impact, or begin one with it and the film before it."""
     if s.impact == 0.0:
@@ -317,14 +317,14 @@ def _merge(s: Any) -> None:
     s.impact_rests = s.rests
 
 
-@njit(cache=True)
+@inner
 def _add_tail(s: Any) -> None:
     s.impact_impulse += s.tail_impulse
     if s.tail_peak > s.impact_peak:
         s.impact_peak, s.impact_peak_time = s.tail_peak, s.tail_peak_time
 
 
-@njit(cache=True)
+@inner
 def _open_step(s: Any, period: float, pause: float, t: float, h: float, film: float) -> None:
     """Film between two contacts: the end of one impact, the beginning of another, or both."""
     gapless = t - s.row_time < max(pause, _PAUSE_STEPS * h)
@@ -353,7 +353,7 @@ def _open_step(s: Any, period: float, pause: float, t: float, h: float, film: fl
         s.lead_peak, s.lead_peak_time = film, t + 0.5 * h
 
 
-@njit(cache=True)
+@inner
 def _emit(s: Any, out: Any, count: int) -> int:
     """Write the impact as a row of ``_EVENT``; 0 if it was none, or nothing of it is new."""
     if s.impact_from_start > 0.0 or s.impact_news == 0.0:
@@ -385,7 +385,7 @@ def _emit(s: Any, out: Any, count: int) -> int:
     return 1
 
 
-@njit(cache=True)
+@njit
 def _unfinished(state: Any, c: int, period: float, out: Any) -> int:
     """Unfinished impacts as if nothing followed; leaves the state as it is."""
     copy = state[c : c + 1].copy()

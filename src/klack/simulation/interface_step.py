@@ -32,9 +32,9 @@ order 1.
 from math import log
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FILM_NEWTON_LIMIT,
     FORCE_LEFT,
@@ -53,7 +53,7 @@ Vector = NDArray[np.float64]
 Step = tuple[float, float, float, float, int, float, float]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def film_force(
     cubic: float, linear: float, cut_off: float, h: float, z0: float, z1: float
 ) -> float:
@@ -66,7 +66,7 @@ def film_force(
     return _film_mean(cubic, linear, x0, x1, 1.0 / x0, 1.0 / x1, closed) / h
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def _film_mean(
     cubic: float,
     linear: float,
@@ -89,7 +89,7 @@ def _film_mean(
     return closed * damping
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def interface_store(
     kind: int, law_data: Vector, law_start: int, series: float, g: float, e: float
 ) -> float:
@@ -111,7 +111,7 @@ def interface_store(
     return stored
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", _nrt=False, forceinline=True)
 def solve_interface(
     kind: int,
     law_data: Vector,
@@ -212,7 +212,7 @@ def solve_interface(
     )
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def _line(G: float, series: float, theta: float, g_free: float, e0: float) -> tuple[float, float]:
     """``S`` and ``base`` of the gap between the faces, ``z1 = base + S F``."""
     if theta == 0.5:
@@ -221,7 +221,7 @@ def _line(G: float, series: float, theta: float, g_free: float, e0: float) -> tu
     return G + series * inverse, g_free - (inverse - 1.0) * e0
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def _compressed(series: float, theta: float, force: float, e0: float) -> tuple[float, float]:
     """Compression at the end of the step, and what it lost by relaxing."""
     if series == 0.0:
@@ -232,7 +232,7 @@ def _compressed(series: float, theta: float, force: float, e0: float) -> tuple[f
     return e1, (theta - 0.5) * (e1 - e0) * (e1 - e0) / series
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def _relaxing(
     cubic: float,
     linear: float,
@@ -253,7 +253,7 @@ def _relaxing(
     return 0.5 + most * max(2.0 * reach / z0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _bare(
     kind: int,
     p: Vector,
@@ -280,7 +280,7 @@ def _bare(
     return contact, 0.0, g_free + G * contact, e1, hint, lost + relaxed, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _contact_alone(
     kind: int,
     p: Vector,
@@ -300,7 +300,7 @@ def _contact_alone(
     return force, hint
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _film_alone(
     cubic: float,
     linear: float,
@@ -349,7 +349,7 @@ def _film_alone(
     return film, False
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _both(
     kind: int,
     p: Vector,
@@ -429,7 +429,7 @@ def _both(
     return contact, film, g1, e1, hint, lost, film * (z0 - (g1 + e1)) + relaxed
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _contact(
     kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z: float, hint: int
 ) -> tuple[float, float, float, int]:
@@ -452,7 +452,7 @@ def _contact(
     return mean * factor, slope * factor + mean * chi_over_h, longest, hint
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def _damping_loss(
     kind: int, p: Vector, start: int, contact: float, z0: float, z1: float, hint: int
 ) -> float:

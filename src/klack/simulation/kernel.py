@@ -8,9 +8,9 @@ for each contact that is closed or closes.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
@@ -65,7 +65,7 @@ def _dot(a: Vector, b: Vector) -> float:
     return y
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _watch(rows: Matrix, k: int, state: Vector) -> float:
     y = 0.0
     for i in range(state.size):
@@ -96,7 +96,7 @@ def add_release(loss: float, contacts: Contacts, c: int, compression: float, gap
     return loss
 
 
-@njit(cache=True)
+@inner
 def _watch_all(
     rows: Matrix,
     force_rows: Matrix,
@@ -113,7 +113,7 @@ def _watch_all(
         out[place, k] = y
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _copy(q: Vector, v: Vector, q0: Vector, v0: Vector) -> None:
     for i in range(q.size):
         q0[i] = q[i]
@@ -184,7 +184,7 @@ class _Now(NamedTuple):
     pushed_v: Vector
 
 
-@njit(cache=True)
+@inner
 def _begin(modes: StepMatrices, contacts: Contacts) -> _Now:
     m, c, p = modes.A.shape[1], contacts.gap.size, modes.push_index.size
     return _Now(
@@ -344,7 +344,7 @@ def _end_record(
         now.pushed_q[k] = now.pushed_v[k] = 0.0
 
 
-@njit(cache=True)
+@njit
 def run_steps(
     steps_per_record: int,
     q: Vector,

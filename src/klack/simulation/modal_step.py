@@ -16,9 +16,9 @@ for each number of ports, because a loop over ports inside the loop over modes w
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 
 __all__ = [
@@ -58,7 +58,7 @@ _N = ROW
 _R = FIXED_ROWS
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance1(W: Any, n: int, F0: float) -> float:
     y0 = 0.0
     for i in range(n):
@@ -72,7 +72,7 @@ def _advance1(W: Any, n: int, F0: float) -> float:
     return y0
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance2(W: Any, n: int, F0: float, F1: float) -> tuple[float, float]:
     y0, y1 = 0.0, 0.0
     for i in range(n):
@@ -87,7 +87,7 @@ def _advance2(W: Any, n: int, F0: float, F1: float) -> tuple[float, float]:
     return y0, y1
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance3(W: Any, n: int, F0: float, F1: float, F2: float) -> tuple[float, float, float]:
     y0, y1, y2 = 0.0, 0.0, 0.0
     for i in range(n):
@@ -103,7 +103,7 @@ def _advance3(W: Any, n: int, F0: float, F1: float, F2: float) -> tuple[float, f
     return y0, y1, y2
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance4(
     W: Any, n: int, F0: float, F1: float, F2: float, F3: float
 ) -> tuple[float, float, float, float]:
@@ -123,7 +123,7 @@ def _advance4(
     return y0, y1, y2, y3
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _advance_forced(W: Any, n: int) -> None:
     for i in range(n):
         f = W[10 * _N + i]
@@ -132,13 +132,13 @@ def _advance_forced(W: Any, n: int) -> None:
         W[_N + i] = W[4 * _N + i] * q + W[5 * _N + i] * v + W[7 * _N + i] * f
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def _add_row(W: Any, n: int, row: int, F: float) -> None:
     for i in range(n):
         W[10 * _N + i] += W[row * _N + i] * F
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def watch(W: Any, n: int, of: int, row: int) -> float:
     """Return the sum of the products of row ``of`` (``ROW_Q`` or ``ROW_V``) and row ``row``."""
     y = 0.0
@@ -147,7 +147,7 @@ def watch(W: Any, n: int, of: int, row: int) -> float:
     return y
 
 
-@njit(cache=True)
+@inner(_nrt=False, error_model="numpy", forceinline=True)
 def _modal_force(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     for i in range(n):
         W[10 * _N + i] = 0.0
@@ -155,7 +155,7 @@ def _modal_force(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         _add_row(W, n, _R + p - port0, F[p])
 
 
-@njit(cache=True)
+@njit(_nrt=False, error_model="numpy", forceinline=True)
 def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
     """Advance one block.
 
@@ -195,7 +195,7 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
             y[p] += watch(W, n, 0, _R + p - port0)
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def copy_state(source: Any, target: Any, n: int) -> None:
     """Copy the state of ``n`` modes from one block to another."""
     for i in range(n):
@@ -204,7 +204,7 @@ def copy_state(source: Any, target: Any, n: int) -> None:
         target[i] = source[i]
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
     """Bring the forces of the last step into the state: ``q += B1 f``, ``v += B2 f``."""
     _modal_force(W, n, F, port0, port1)
@@ -214,7 +214,7 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         W[_N + i] += W[9 * _N + i] * f
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
 def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
     """Add the response to forces that acted over a whole step of another size, with its matrices.
 

@@ -21,9 +21,9 @@ with elements and fluid in each of them, repeated until nothing moves any more.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.network_arrays import (
@@ -120,7 +120,7 @@ CLOCK = 8
 _SETTLED = 5e-5  # displacement by what the guess missed over the longest way of a port, fine steps
 _SETTLED_MACRO = 2e-4  # the same of macro steps
 _ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
-_ENERGY_MACRO = 3e-7  # the same of macro steps
+_ENERGY_MACRO = 1e-5  # the same of macro steps
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
 _FEW_REPEATS = 8  # are enough, unless what still changes is round-off
 _MOST_REPEATS = 200
@@ -146,7 +146,7 @@ class _Loop(NamedTuple):
 
 
 # without the runtime of numba there is no counting of references, half the time of a step
-@njit(cache=True, _nrt=False, error_model="numpy", nogil=True)
+@njit(_nrt=False, error_model="numpy", nogil=True)
 def run_network(
     macros: int,
     per_record: int,

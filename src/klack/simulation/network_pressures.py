@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
 from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step
@@ -51,7 +51,7 @@ def begin_fluid(fluid: Any) -> None:
         flows.Z[e] = 1.0
 
 
-@njit(cache=True)
+@inner(_nrt=False, error_model="numpy", forceinline=True)
 def _table(time: Any, value: Any, first: int, last: int, t: float) -> float:
     """Lines through points, constant beyond them."""
     if t <= time[first]:
@@ -244,7 +244,7 @@ def _compare_storage(fluid: Any) -> None:
         trial.balanced[j] = max(total - trial.stored[j], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner(error_model="numpy", _nrt=False, forceinline=True)
 def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
     """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
 
@@ -274,7 +274,7 @@ def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
         r[k] /= A[k * n + k]
 
 
-@njit(cache=True)
+@njit(_nrt=False, error_model="numpy", forceinline=True)
 def bracketed(
     target: float, density: float, lower: float, upper: float
 ) -> tuple[float, float, float]:

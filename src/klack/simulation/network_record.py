@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.step_function import pointer
 from klack.simulation.modal_step import ROW, ROW_V, watch
 from klack.simulation.network_arrays import Bodies, Recording
@@ -27,7 +27,7 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
         peaks[c] = 0.0
 
 
-@njit(cache=True)
+@njit(_nrt=False, error_model="numpy")
 def record_points(
     recording: Recording,
     record: int,

@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
 from klack.simulation.network_arrays import StepRows
 from klack.simulation.phase import phase
@@ -97,7 +97,7 @@ def take_states(rows: Any, k: int) -> int:
     return o0 + rows.states[k]
 
 
-@njit(cache=True)
+@njit
 def call_rows(
     rows: StepRows, t: float, h: float, y: Vector, v: Vector, p: Vector, rho: Vector
 ) -> tuple[int, int]:
@@ -119,7 +119,9 @@ def call_rows(
     (int, int)
         The row that failed and its status; -1 and 0 if none did.
     """
-    before = y - h * v
+    before = np.empty(y.size)
+    for i in range(y.size):
+        before[i] = y[i] - h * v[i]
     at, y0, y1 = pointers(rows), first(before), first(y)
     for k in range(rows.rows):
         if rows.head > 0:

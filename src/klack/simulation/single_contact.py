@@ -9,9 +9,9 @@ which costs as much as the pass itself.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
@@ -61,7 +61,7 @@ def _whole(modes: int) -> int:
     return _LANES * ((modes + _LANES - 1) // _LANES)
 
 
-@njit(cache=True)
+@inner
 def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matrix, Matrix]:
     """State (chunks, 2 * 64) and step matrices (chunks, 7 * 64), filled up with still modes."""
     chunks = (q.size + CHUNK - 1) // CHUNK
@@ -77,7 +77,7 @@ def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matr
     return S, K
 
 
-@njit(cache=True)
+@inner
 def _pack_losses(B: Matrix, W: Matrix, Q: Matrix, row: Vector) -> Matrix:
     """What a unit force leaves pending, energy weights and loss forms, (chunks, 10 * 64)."""
     chunks = (row.size + CHUNK - 1) // CHUNK
@@ -95,7 +95,7 @@ def _pack_losses(B: Matrix, W: Matrix, Q: Matrix, row: Vector) -> Matrix:
     return L
 
 
-@njit(cache=True)
+@inner
 def _pack_watched(rows: Matrix) -> tuple[Cube, Matrix]:
     """Recorded rows in chunks, and how many modes of each count: whole vectors, from its start."""
     chunks = (rows.shape[1] + CHUNK - 1) // CHUNK
@@ -110,7 +110,7 @@ def _pack_watched(rows: Matrix) -> tuple[Cube, Matrix]:
     return packed, counts
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _watch_chunk(W: Cube, S: Cube, k: int, c: int, part: int, count: int) -> float:
     y = 0.0
     for i in range(count):
@@ -118,7 +118,7 @@ def _watch_chunk(W: Cube, S: Cube, k: int, c: int, part: int, count: int) -> flo
     return y
 
 
-@njit(cache=True)
+@inner
 def _watch(
     W: Cube, counts: Matrix, force_rows: Matrix, S: Cube, part: int, F: float, out: Matrix, at: int
 ) -> None:
@@ -140,7 +140,7 @@ def _push_in(S: Matrix, index: NDArray[np.int64], pushed_q: Vector, pushed_v: Ve
         pushed_q[k] = pushed_v[k] = 0.0
 
 
-@njit(cache=True)
+@inner
 def _unpack(S: Matrix, q: Vector, v: Vector) -> None:
     """Modal state as two plain arrays (no views: counting their references costs more)."""
     for c in range(S.shape[0]):
@@ -150,14 +150,14 @@ def _unpack(S: Matrix, q: Vector, v: Vector) -> None:
             v[first + i] = S[c, i + 64]
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _copy(S: Matrix, before: Matrix) -> None:
     for c in range(S.shape[0]):
         for i in range(S.shape[1]):
             before[c, i] = S[c, i]
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _damped_energy_chunk(S: Matrix, L: Matrix, c: int, F: float) -> float:
     energy = 0.0
     for i in range(64):
@@ -176,7 +176,7 @@ def _damped_energy(S: Matrix, L: Matrix, F: float) -> float:
     return total
 
 
-@njit(cache=True, fastmath=FAST)
+@inner(fastmath=FAST)
 def _damping_loss_chunk(S: Matrix, L: Matrix, c: int, F_before: float, F: float) -> float:
     loss = 0.0
     for i in range(64):
@@ -290,7 +290,7 @@ def _end_step(
     return _Contact(now.F, now.F_before, after, e, chi, approaching, deepest, now.hint), loss
 
 
-@njit(cache=True)
+@njit
 def run_one_contact(
     steps_per_record: int,
     q: Vector,

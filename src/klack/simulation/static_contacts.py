@@ -1,9 +1,9 @@
 """Forces of all contacts of a network at rest, and how they answer to their gaps."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.step_constants import NO_LAW
 from klack.simulation.contact_step import mean_force
 
@@ -15,7 +15,7 @@ Index = NDArray[np.int64]
 _MOST_NEWTON = 60
 
 
-@njit(cache=True)
+@njit
 def contacts_at_rest(
     kind: Index, law: Vector, law0: Index, series: Vector, gap: Vector
 ) -> tuple[Vector, Vector]:
@@ -37,7 +37,7 @@ def contacts_at_rest(
     return force, slope
 
 
-@njit(cache=True)
+@njit
 def _pressed(kind: int, law: Vector, first: int, series: float, gap: float) -> tuple[float, float]:
     low, high, d = 0.0, -gap, -gap
     force = stiffness = 0.0

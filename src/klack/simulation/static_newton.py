@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
 
 __all__ = ["Balance", "Couplings", "last_change", "least_share", "newton_system"]
 
@@ -50,7 +51,7 @@ class Balance(NamedTuple):
     rest: Vector  # what accelerates each column, (c,)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def newton_system(at: Couplings, now: Balance, creep: Vector, tau: float) -> tuple[Matrix, Vector]:
     """Matrix, every row scaled to one, and right-hand side in the units of the unknowns."""
     r, n = at.shapes.shape
@@ -96,7 +97,7 @@ def newton_system(at: Couplings, now: Balance, creep: Vector, tau: float) -> tup
     return A, left
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _fill_volumes(A: Matrix, left: Vector, at: Couplings, now: Balance, tau: float) -> None:
     """Rows of the masses in free volumes."""
     r, n = at.shapes.shape
@@ -111,7 +112,7 @@ def _fill_volumes(A: Matrix, left: Vector, at: Couplings, now: Balance, tau: flo
         left[row] = now.filled[i] - through * now.net[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def least_share(at: Couplings, change: Vector, p: Vector) -> float:
     """Smallest share of a pressure that a step leaves, 1 at most; nan for a step that is none."""
     r, n = at.shapes.shape
@@ -124,7 +125,7 @@ def least_share(at: Couplings, change: Vector, p: Vector) -> float:
     return least
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def last_change(at: Couplings, change: Vector, y: Vector, p: Vector, length: float) -> float:
     """Largest change of a displacement over the largest one, and of a pressure over itself.
 

@@ -11,6 +11,7 @@ __all__ = ["Progress", "show_progress"]
 
 _PATIENCE = 2.0  # s that a stage may take without a line
 _SOON = 0.5  # s until the bar is there
+_KINDS = ("numba:compile", "klack:wait")  # the second while another process compiles
 
 
 class Progress(Protocol):
@@ -131,14 +132,16 @@ class _Compiling:
                 outer._count(-1)
 
         self._listener = Listener()
-        event.register("numba:compile", self._listener)
+        for kind in _KINDS:
+            event.register(kind, self._listener)
 
     def forget(self) -> None:
         """Listen no more."""
         if self._listener is not None:
             from numba.core import event
 
-            event.unregister("numba:compile", self._listener)
+            for kind in _KINDS:
+                event.unregister(kind, self._listener)
 
     def _count(self, change: int) -> None:
         before, self._depth = self.is_on, self._depth + change

@@ -5,9 +5,9 @@ point that opens takes a row out, each at the cost of one product with it.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import ActiveSet
 
@@ -18,7 +18,7 @@ _REFRESH = 256
 """Changes of the active set after which its inverse is computed afresh."""
 
 
-@njit(cache=True)
+@inner
 def _rebuild(A: NDArray, B: NDArray, index: NDArray, m: int) -> None:
     block = np.empty((m, m))
     for i in range(m):
@@ -119,7 +119,7 @@ def _flip(A: NDArray, carrying: ActiveSet, j: int, many: bool, u: NDArray) -> bo
     return True
 
 
-@njit(cache=True)
+@njit
 def solve_active(
     A: NDArray,
     q: NDArray,

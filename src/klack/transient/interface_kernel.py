@@ -32,9 +32,9 @@ and the matrix of the complementarity problem loses
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import (
@@ -117,7 +117,7 @@ def contact_compliance(
     return np.ascontiguousarray(A)
 
 
-@njit(cache=True)
+@njit
 def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
     """Force of the spring per displacement that the step would have without it [N/m]."""
     yields = 0.0
@@ -161,7 +161,7 @@ def _gather(traces: Matrix, force: Vector, factor: float, kick: Vector) -> None:
                 kick[i] += a * traces[k, i]
 
 
-@njit(cache=True)
+@njit
 def safe_flight(
     gap: NDArray,
     traces: NDArray,
@@ -240,7 +240,7 @@ def _work(points: ContactPoints, before: Vector, step: _Step) -> tuple[float, fl
     return work, stored
 
 
-@njit(cache=True)
+@njit
 def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
     """Room for a step, and how much a force brakes the shaft."""
     M, n, guides = len(modes.push), len(points.gap), len(bore.clearance)
@@ -519,7 +519,7 @@ def _finish(
         record.drift[taken, b] = s
 
 
-@njit(cache=True)
+@njit
 def march(
     steps: int,
     wait: int,

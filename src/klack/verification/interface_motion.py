@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from klack.compiling.jit import njit
 from klack.contact.laws import ContactLaw, FlatLaw, HuntCrossley
 from klack.contact.step_constants import NO_LAW, SEPARATED
 from klack.network.rows import FilmRow
@@ -152,7 +152,7 @@ def interface_motion(
     )
 
 
-@njit(cache=True)
+@njit
 def _run(
     q: Vector,
     v: Vector,

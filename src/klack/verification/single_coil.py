@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import njit
 from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.driver import DriveProgram
@@ -69,7 +69,7 @@ class CoilRun:
         return self.time[1:][np.diff(self.state) != 0]
 
 
-@njit(cache=True)
+@njit
 def _march(
     address: int, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
 ) -> int:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.jit import njit
 from klack.hydraulics.line_friction import ExponentialWeights
 from klack.network.rows import LineRow
 from klack.simulation.delay_line import (
@@ -166,7 +166,7 @@ def run_line(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _march(
     lines: Lines,
     state: LineState,

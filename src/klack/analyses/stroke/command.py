@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.compiling.ahead import LOOP_AND_REST, compiling_ahead
 from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
@@ -54,30 +55,31 @@ def stroke(
     asked: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
-    from klack.case.shipped import find_case
+    with compiling_ahead(LOOP_AND_REST, asked.threads, quiet=asked.quiet):
+        from klack.case.shipped import find_case
 
-    with show_progress(asked.quiet):
-        checked = _checked_case(find_case(case), duration, step, imported(component))
-    # both "--variant a,b" and "--variant a --variant b"
-    wanted = tuple(name for item in variant or () for name in item.split(",") if name)
-    wanted = checked.require_variants(wanted or checked.run.variants)
-    ending = Ending.of(asked, checked.name)
+        with show_progress(asked.quiet):
+            checked = _checked_case(find_case(case), duration, step, imported(component))
+        # both "--variant a,b" and "--variant a --variant b"
+        wanted = tuple(name for item in variant or () for name in item.split(",") if name)
+        wanted = checked.require_variants(wanted or checked.run.variants)
+        ending = Ending.of(asked, checked.name)
 
-    with show_progress(asked.quiet):
-        from klack.analyses.stroke.analysis import STROKE
-        from klack.analyses.stroke.record import IncompleteStrokeError
-        from klack.analyses.stroke.run import run_stroke
+        with show_progress(asked.quiet):
+            from klack.analyses.stroke.analysis import STROKE
+            from klack.analyses.stroke.record import IncompleteStrokeError
+            from klack.analyses.stroke.run import run_stroke
 
-        after = STROKE.load(continued) if continued is not None else None
-    incomplete: Exception | None = None
-    with show_progress(asked.quiet) as progress:
-        try:
-            study = run_stroke(
-                checked, variants=wanted, after=after, progress=progress, threads=asked.threads
-            )
-        except IncompleteStrokeError as error:
-            study, incomplete = error.study, error
-    return ending.end(STROKE, study, incomplete=incomplete)
+            after = STROKE.load(continued) if continued is not None else None
+        incomplete: Exception | None = None
+        with show_progress(asked.quiet) as progress:
+            try:
+                study = run_stroke(
+                    checked, variants=wanted, after=after, progress=progress, threads=asked.threads
+                )
+            except IncompleteStrokeError as error:
+                study, incomplete = error.study, error
+        return ending.end(STROKE, study, incomplete=incomplete)
 
 
 def _checked_case(

@@ -6,8 +6,9 @@ fast path), which is exact up to 15 digits and right to two units in the last pl
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from klack.compiling.jit import inner, njit
 
 __all__ = ["BAD_CELL", "TOO_MANY", "WHITESPACE", "parse_rows"]
 
@@ -22,7 +23,7 @@ _ZERO, _NINE, _PLUS, _MINUS = 48, 57, 43, 45
 _MOST_DIGITS = 18  # fit into 64 bits
 
 
-@njit(cache=True)
+@inner
 def _skip(data: NDArray[np.uint8], at: int, end: int, separator: int) -> int:
     """Next byte that is neither blank nor quote; a separating tab stays."""
     while at < end:
@@ -34,14 +35,14 @@ def _skip(data: NDArray[np.uint8], at: int, end: int, separator: int) -> int:
     return at
 
 
-@njit(cache=True)
+@inner
 def _line_end(data: NDArray[np.uint8], at: int, end: int) -> int:
     while at < end and data[at] != _LF and data[at] != _CR:
         at += 1
     return at
 
 
-@njit(cache=True)
+@inner
 def _joined(mantissa: int, power: int) -> float:
     if mantissa == 0 or power < -330:
         return 0.0
@@ -52,7 +53,7 @@ def _joined(mantissa: int, power: int) -> float:
     return mantissa / _POWERS[308] / _POWERS[-power - 308]
 
 
-@njit(cache=True)
+@inner
 def _number(data: NDArray[np.uint8], at: int, end: int, decimal: int) -> tuple[float, int]:
     """Value and the byte behind it; the same byte if there is no number."""
     begin = at
@@ -100,7 +101,7 @@ def _number(data: NDArray[np.uint8], at: int, end: int, decimal: int) -> tuple[f
     return (-value if negative else value), at
 
 
-@njit(cache=True)
+@inner
 def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
     """True for nan, na, n/a, null, inf, - and the like, in any case."""
     if at < stop and (data[at] == _PLUS or data[at] == _MINUS):
@@ -124,7 +125,7 @@ def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
     )
 
 
-@njit(cache=True)
+@njit
 def parse_rows(
     data: NDArray[np.uint8],
     at: int,

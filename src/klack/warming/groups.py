@@ -1,0 +1,89 @@
+"""Groups of functions that are compiled together, each by a small calculation that needs them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+__all__ = ["GROUPS", "Group"]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Functions that belong together.
+
+    Parameters
+    ----------
+    words : str
+        What they do, for the table of ``klack warm``.
+    compute : callable
+        Small calculation that calls each of them with the types of a real one.
+    """
+
+    words: str
+    compute: Callable[[], None]
+
+
+def _loop() -> None:
+    from klack.simulation.network_run import simulate_network
+    from klack.warming.small_valve import small_valve
+
+    case = small_valve()
+    run = case.run
+    rows = case.network.network().rows()
+    simulate_network(rows, duration=run.duration, step=run.step, record=run.record, start="free")
+
+
+def _rest() -> None:
+    from klack.simulation.network_run import simulate_network
+    from klack.warming.small_valve import small_valve
+
+    case = small_valve()
+    rows = case.network.network().rows()
+    simulate_network(rows, duration=case.run.duration, step=case.run.step, record=case.run.record)
+
+
+def _components() -> None:
+    import sys
+
+    from klack.network.catalogue import component_classes
+    from klack.network.step_function import compile_step, is_step_function
+
+    modules = {kind.__module__ for kind in component_classes()}
+    found = {
+        step
+        for name in modules
+        for step in vars(sys.modules[name]).values()
+        if is_step_function(step)
+    }
+    for step in found:
+        compile_step(step)
+
+
+def _valve() -> None:
+    from klack.analyses.stroke.run import run_stroke
+    from klack.case.shipped import find_case
+    from klack.case.valve_reader import load_valve_case
+
+    case = load_valve_case(find_case("demo-stroke"))
+    short = case.run.model_copy(update={"duration": 2e-6})
+    run_stroke(case.model_copy(update={"run": short}))
+
+
+def _impact() -> None:
+    from klack.analyses.impact.run import run_impact
+    from klack.case.reader import load_case
+    from klack.case.shipped import find_case
+
+    run_impact(load_case(find_case("witness")), levels=("reduced", "interface"))
+
+
+GROUPS: Mapping[str, Group] = MappingProxyType(
+    {
+        "loop": Group("time loop of a network", _loop),
+        "valve": Group("meshes, bodies and contacts of a valve", _valve),
+        "components": Group("steps of all components", _components),
+        "rest": Group("static equilibrium", _rest),
+        "impact": Group("impacts between bodies", _impact),
+    }
+)
+"""All groups, those first that take longest."""

@@ -1,0 +1,79 @@
+"""``klack warm``: truth = the number of functions that a command compiles after it."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from klack.cli.main import main
+
+STROKES = ("demo-stroke", "measured")
+COUNT = """
+import sys
+from klack.warming.counted import counted
+from klack.cli.main import main
+with counted() as count:
+    code = main(sys.argv[1:])
+print(code, count.functions)
+"""
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """Run it once, with whatever the store of this machine holds already."""
+    file = tmp_path_factory.mktemp("warm") / "warm.json"
+    command = [sys.executable, "-m", "klack", "warm", "--json", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(file.read_text()), done.stdout
+
+
+def compiled_by(*words, out):
+    command = [sys.executable, "-c", COUNT, *map(str, words), "--no-report", "--quiet"]
+    done = subprocess.run(
+        [*command, "--out", str(out)], capture_output=True, text=True, env=os.environ, check=True
+    )
+    code, functions = done.stdout.split()[-2:]
+    assert code == "0", done.stderr
+    return int(functions)
+
+
+def test_it_says_what_was_compiled_and_where(warm):
+    numbers, said = warm
+
+    assert numbers["schema"] == "klack-warm/1"
+    assert numbers["folder"] in said
+    assert numbers["count"] > 150
+    assert numbers["size_B"] > 1e6
+    assert set(numbers["groups"]) == {"loop", "rest", "components", "valve", "impact"}
+
+
+def test_a_second_time_compiles_nothing(warm, capsys):
+    assert main(["warm", "--json", "-"]) == 0
+
+    again = json.loads(capsys.readouterr().out)
+    assert [group["compiled"] for group in again["groups"].values()] == [0] * 5
+    assert again["count"] == warm[0]["count"]
+
+
+@pytest.mark.parametrize("case", STROKES)
+def test_strokes_of_shipped_cases_compile_nothing(warm, tmp_path, case):
+    assert compiled_by("stroke", case, "--duration", "0.1 ms", out=tmp_path / "out") == 0
+
+
+def test_impacts_compile_nothing(warm, tmp_path):
+    words = ("impact", "two-rods", "--level", "reduced,interface")
+    assert compiled_by(*words, out=tmp_path / "out") == 0
+
+
+def test_no_folder_is_a_clear_error(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+
+    assert main(["warm"]) == 2
+
+    problem = capsys.readouterr().err
+    assert str(tmp_path / "file") in problem
+    assert "NUMBA_CACHE_DIR" in problem

@@ -1,0 +1,221 @@
+"""The store of compiled functions: what is loaded, what is compiled anew, and who waits for whom.
+
+Truth: the results of plain Python, and the number of functions that numba compiles.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CALLED = """
+from klack.compiling.jit import inner
+SCALE = {scale}
+
+@inner
+def part(x):
+    return SCALE * x
+"""
+CALLS = """
+from klack.compiling.jit import njit
+import called
+
+@njit
+def whole(x):
+    {text}return part(x, ) + 1.0
+
+part = called.part
+"""
+RUN = """
+import json, sys, warnings
+sys.path.insert(0, {folder!r})
+from klack.warming.counted import counted
+from numba.core import event
+warnings.simplefilter("always")
+import calls
+with counted() as count, warnings.catch_warnings(record=True) as said:
+    warnings.simplefilter("always")
+    value = calls.whole(2.0)
+print(json.dumps([value, COUNT[0], [str(one.message) for one in said]]))
+"""
+COUNTING = """
+COUNT = [0]
+class L(event.Listener):
+    def on_start(self, event): COUNT[0] += 1
+    def on_end(self, event): pass
+event.register("numba:compile", L())
+"""
+
+
+@pytest.fixture
+def program(tmp_path):
+    write(tmp_path)
+    return tmp_path
+
+
+def write(folder: Path, scale: float = 3.0, text: str = "") -> None:
+    (folder / "called.py").write_text(CALLED.format(scale=scale))
+    (folder / "calls.py").write_text(CALLS.format(text=text))
+    script = RUN.format(folder=str(folder)).replace("import calls\n", COUNTING + "import calls\n")
+    (folder / "run.py").write_text(script)
+
+
+def start(folder: Path, **env: str) -> "subprocess.Popen[str]":
+    given = os.environ | {"NUMBA_CACHE_DIR": str(folder / "store")} | env
+    return subprocess.Popen(
+        [sys.executable, str(folder / "run.py")],
+        env=given,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def end(process: "subprocess.Popen[str]") -> list:
+    out, problem = process.communicate(timeout=300)
+    assert process.returncode == 0, problem
+    return json.loads(out)
+
+
+def files(folder: Path, kind: str = "*.code") -> list[Path]:
+    return sorted((folder / "store" / "klack-compiled").glob(kind))
+
+
+def test_a_second_process_compiles_nothing(program):
+    assert end(start(program)) == [7.0, 2, []]
+    assert end(start(program)) == [7.0, 0, []]
+    assert len(files(program)) == 2
+    assert files(program, "*.lock") == files(program, "*.part") == []
+    assert (program / "store" / "klack-compiled").stat().st_mode & 0o077 == 0
+
+
+def test_code_from_another_file_is_never_stale(program):
+    """Numba itself would give 7 again: it looks at the file of the caller only."""
+    assert end(start(program)) == [7.0, 2, []]
+
+    write(program, scale=5.0)
+
+    assert end(start(program)) == [11.0, 2, []]
+
+
+def test_a_text_that_changes_compiles_nothing(program):
+    write(program, text='"""One."""\n    ')
+    assert end(start(program)) == [7.0, 2, []]
+
+    write(program, text='"""Two."""\n    ')
+
+    assert end(start(program)) == [7.0, 0, []]
+
+
+def test_two_processes_that_start_together_compile_each_function_once(program):
+    both = [start(program), start(program)]
+    (one, compiled, _), (other, also_compiled, _) = (end(process) for process in both)
+
+    assert one == other == 7.0
+    assert compiled + also_compiled == 2
+    assert files(program, "*.lock") == []
+
+
+def test_code_of_another_processor_is_not_run(program):
+    """It is left where it is: machines may share a home."""
+    assert end(start(program)) == [7.0, 2, []]
+    assert end(start(program, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES=""))[:2] == [7.0, 2]
+    assert len(files(program)) == 4
+    assert end(start(program)) == [7.0, 0, []]
+
+
+@pytest.mark.parametrize("damage", [b"", b"klack code 1\n", None])
+def test_damaged_code_is_compiled_again(program, damage):
+    end(start(program))
+    for file in files(program):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(bytes(content) if damage is None else damage)
+
+    assert end(start(program))[:2] == [7.0, 2]
+    assert end(start(program)) == [7.0, 0, []]
+
+
+def test_code_that_others_may_write_is_not_run(program):
+    end(start(program))
+    files(program)[0].parent.chmod(0o777)
+
+    value, compiled, said = end(start(program))
+
+    assert (value, compiled) == (7.0, 2)
+    assert "other users may write to it" in said[0]
+    assert len(said) == 1
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for the administrator")
+def test_a_read_only_store_is_read(program):
+    end(start(program))
+    folder = files(program)[0].parent
+    folder.chmod(0o500)
+    try:
+        assert end(start(program)) == [7.0, 0, []]
+        write(program, scale=5.0)
+        value, compiled, said = end(start(program))
+    finally:
+        folder.chmod(0o700)
+    assert (value, compiled) == (11.0, 2)
+    assert "read-only" in said[0]
+
+
+def test_without_a_folder_everything_works(program):
+    (program / "store").write_text("a file")
+
+    value, compiled, said = end(start(program))
+
+    assert (value, compiled) == (7.0, 2)
+    assert len(said) == 1
+    assert "compiled functions are not cached" in said[0]
+
+
+def test_a_killed_process_leaves_no_lock_behind(program, tmp_path):
+    """Its lock file stays, but the system has given the lock back."""
+    from klack.compiling.turn import take_turn
+
+    lock, done = tmp_path / "f.lock", tmp_path / "f.code"
+    text = (
+        "import sys, time; from pathlib import Path; from klack.compiling.turn import take_turn\n"
+        f"turn = take_turn(Path({str(lock)!r}), Path({str(done)!r})); print('has it', flush=True)\n"
+        "time.sleep(600)"
+    )
+    other = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE)
+    assert other.stdout is not None
+    assert other.stdout.readline() == b"has it\n"
+    other.kill()
+    other.wait()
+
+    assert lock.exists()
+    turn = take_turn(lock, done, patience=10.0)
+    assert turn is not None
+    turn.end()
+    assert not lock.exists()
+
+
+def test_who_waits_too_long_compiles_itself(tmp_path):
+    from klack.compiling.turn import take_turn
+
+    lock, done = tmp_path / "f.lock", tmp_path / "f.code"
+    first = take_turn(lock, done)
+    second = take_turn(lock, done, patience=0.1)
+    assert first is not None
+    assert second is not None
+    second.end()
+    assert lock.exists()  # still that of the first
+    done.touch()
+    assert take_turn(lock, done) is None
+    first.end()
+
+
+def test_no_function_goes_past_the_store():
+    root = Path(__file__).parents[2] / "src" / "klack"
+    for file in root.rglob("*.py"):
+        if file.parent.name != "compiling":
+            assert "numba import njit" not in file.read_text("utf-8"), file
+            assert "numba.njit" not in file.read_text("utf-8").replace(":func:`numba.njit`", "")
