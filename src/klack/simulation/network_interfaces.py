@@ -64,7 +64,7 @@ _YOUNG = 0.5e-6  # [s] a contact just closed
 _FALLS = (
     1.5  # times the force at the end of the macro step: it had so much before, and releases soon
 )
-_SHAKEN = 0.01  # of the force of a contact at rest: its change in a macro step
+_SHAKEN = 0.05  # of the force of a contact at rest: its change in a macro step
 _SMOOTH = 0.05  # of a gap and its cut-off: way in a middle step that the film follows
 _FAR = 1e-4  # of a small film force, even if the gap closed at
 _FASTEST = 5.0  # [m/s]

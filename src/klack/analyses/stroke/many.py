@@ -357,7 +357,7 @@ def _crew(asked: _Asked, built: _Built, places: Sequence[int], threads: int | No
             return 1
         run = valve.case.run
         records = run.duration / run.record
-        steps = min(run.duration / run.step, _MOST_FINE) * len(rows.interfaces)
+        steps = min(run.duration / run.fine_step, _MOST_FINE) * len(rows.interfaces)
         require_memory(
             "run_many: threads",
             crew * (8.0 * records * recorded_columns(rows) + _FINE * steps + _AROUND),
