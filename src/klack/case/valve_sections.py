@@ -16,8 +16,8 @@ from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
+from klack.network.accuracy import Accuracy, fine_step
 from klack.network.declaration import NetworkSection
-from klack.simulation.step_sizes import Accuracy, fine_step
 from klack.units import Force, Length, Speed, Time, format_si
 
 __all__ = [

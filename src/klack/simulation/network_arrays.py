@@ -198,6 +198,7 @@ class Interfaces(NamedTuple):
     film_small: Vector  # film force that a coarse step may begin with; it may end with twice of it
     film_felt: Vector  # film force from which on fine steps are recorded
     rest: Vector  # closed for so long: at rest [s]
+    fastest: float  # speed that nothing reaches [m/s]
 
 
 class InterfaceState(NamedTuple):

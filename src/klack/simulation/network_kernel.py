@@ -342,14 +342,12 @@ def _settle(
         left, work = cost_of_catching_up(contacts, bodies.at)
         if not matters(bodies, step.level, share, energy, left, work):
             return STATUS_DONE
-        if fine:
+        if not finite(bodies):
+            break
+        if fine and attempt >= _FEW_REPEATS:
             moved = largest_missed(bodies)
-            if attempt >= _FEW_REPEATS and moved <= _moved_by_round_off(
-                G, bodies.ports, loop.elements, loop.fluid, contacts
-            ):
+            if moved <= _moved_by_round_off(G, bodies.ports, loop.elements, loop.fluid, contacts):
                 return STATUS_DONE
-            if attempt == 0 and not finite(bodies):
-                break
     if fine:
         report[0], report[2] = largest_missed(bodies), step.t
         return STATUS_FORCES

@@ -59,6 +59,7 @@ __all__ = [
 
 _LONGER = 4.0  # times the steps before
 _OWED = 1e-4  # of the largest force of elements and fluid: most that repays
+_NUDGE = 1e-3  # of the way of a step: most that the repaying force may add to it
 _UNSEEN = 1e-10  # of the displacements by all forces of a step: no smaller change is asked for
 _ROUND_OFF = 4e-16  # of the displacements themselves
 
@@ -288,7 +289,7 @@ def finite(bodies: Any) -> bool:
     """Whether all ports are somewhere; looked at while it can be seen which part is to blame."""
     total = 0.0
     for p in range(bodies.ports):
-        total += bodies.at[Y1 + p]
+        total += bodies.at[Y1 + p] + bodies.at[AHEAD + p]
     return abs(total) < np.inf
 
 
@@ -298,6 +299,7 @@ def repay(bodies: Any, G: Any) -> None:
 
     Elements, fluid and interfaces see what was missed a step late, at the forces of that step.  The
     force acts where the way is longest, and is limited: then the rest is left for the next step.
+    About a body at rest it must not nudge more than it repays.
     """
     S = bodies.at
     port, longest, largest = 0, 0.0, 0.0
@@ -306,14 +308,12 @@ def repay(bodies: Any, G: Any) -> None:
         if way > longest:
             port, longest = p, way
         largest = max(largest, abs(S[ANSWER + p]))
-    excess = abs(S[EXCESS])
-    if excess > _OWED * largest * longest:
-        excess = _OWED * largest * longest
-    if excess > 0.0:
+    own = G[port * PORTS + port]
+    most = min(_OWED * largest, _NUDGE * longest / own) if own > 0.0 else 0.0
+    if most > 0.0 and S[EXCESS] != 0.0:
         way = S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port]
-        force = excess / way
-        if S[EXCESS] > 0.0:
-            force = -force
+        force = -S[EXCESS] / way
+        force = min(max(force, -most), most)
         S[MISSED + port] += force
         for i in range(bodies.first[port], bodies.last[port]):
             S[AHEAD + i] += G[i * PORTS + port] * force

@@ -33,6 +33,7 @@ _MOST_NEWTON = 80
 _FULL_NEWTON = 15  # of them with whole steps
 _PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
+_LEAST_THETA = 0.51  # what the implicit step loses outweighs what the curved law could give back
 _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
 _MOST_OF = 0.9  # longest step within this interval
@@ -79,8 +80,8 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
     """
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     for i in range(nodes.volumes):
-        theta, balanced = 0.5, state.rate[i] * H
-        if balanced > 2.0:
+        theta, balanced = _LEAST_THETA, state.rate[i] * H
+        if balanced > 1.0 / (1.0 - _LEAST_THETA):
             theta = 1.0 - 1.0 / balanced
         trial.theta[i] = theta
         trial.end[i] = state.p[i]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from klack import energy_balance
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
+from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.first_record import values_now
@@ -20,6 +21,7 @@ from klack.simulation.network_arrays import (
     PORTS,
     STORE,
     WORK,
+    WORK_BEGIN,
     Y0,
     Y1,
     Recording,
@@ -37,7 +39,7 @@ from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult, StepCounts
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
-from klack.simulation.step_sizes import Accuracy, StepSizes, step_sizes
+from klack.simulation.step_sizes import StepSizes, step_sizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -553,7 +555,8 @@ def _put_back(kept: Kept) -> None:
 
 def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
     saved = {name: array.copy() for name, array in _changing(network, clock).items()}
-    saved["bodies.at"][WORK : WORK + PORTS] = 0.0  # counts from the start of each run
+    for row in (WORK, WORK_BEGIN):  # count from the start of each run
+        saved["bodies.at"][row : row + PORTS] = 0.0
     return saved
 
 

@@ -2,22 +2,14 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
 
 from klack.errors import InputError
+from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
 from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
 from klack.simulation.rest import bounce_time
 
-__all__ = ["ACCURACIES", "Accuracy", "StepSizes", "fine_step", "step_sizes"]
-
-Accuracy = Literal["normal", "fine"]
-
-ACCURACIES: dict[Accuracy, tuple[float, float]] = {
-    "normal": (20e-9, 0.64e-6),
-    "fine": (5e-9, 0.32e-6),
-}
-"""Fine step and macro step in flight [s]."""
+__all__ = ["StepSizes", "step_sizes"]
 
 _MOST_COARSE = 256
 _MIDDLE = 4  # fine steps of a sub-step while contact forces are smooth
@@ -51,11 +43,6 @@ class StepSizes:
         """Lengths [s] in the order of the sizes of the time loop."""
         whole = (1, self.coarse, self.near, self.middle)
         return (*(count * self.step for count in whole), self.step / PARTS)
-
-
-def fine_step(accuracy: Accuracy, step: float | None = None) -> float:
-    """Fine step [s]: the one that is stated, or that of the accuracy."""
-    return ACCURACIES[accuracy][0] if step is None else step
 
 
 def step_sizes(

@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.compiling.ahead import LOOP_AND_REST, compiling_ahead
+from klack.network.accuracy import Accuracy
 from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
@@ -32,7 +33,18 @@ _Duration = Annotated[
     _Text, Parameter(name="--duration", help='Time to compute, "5 ms". [default: as in the case]')
 ]
 _Step = Annotated[
-    _Text, Parameter(name="--step", help='Fine time step, "20 ns". [default: as in the case]')
+    _Text,
+    Parameter(
+        name="--step",
+        help='Fine time step, "20 ns", in place of that of the accuracy. [default: as in the case]',
+    ),
+]
+_Accuracy = Annotated[
+    Accuracy | None,
+    Parameter(
+        name="--accuracy",
+        help="normal, or fine with steps a quarter to half as long. [default: as in the case]",
+    ),
 ]
 _Continue = Annotated[
     Path | None,
@@ -50,27 +62,30 @@ def stroke(
     variant: _Variants = None,
     duration: _Duration = None,
     step: _Step = None,
+    accuracy: _Accuracy = None,
     continued: _Continue = None,
     component: Components = None,
     asked: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
+    from klack.case.shipped import find_case
+
+    with show_progress(asked.quiet):
+        case_file, components = find_case(case), imported(component)
+        checked = _checked_case(case_file, duration, step, accuracy, components)
+    # both "--variant a,b" and "--variant a --variant b"
+    wanted = tuple(name for item in variant or () for name in item.split(",") if name)
+    wanted = checked.require_variants(wanted or checked.run.variants)
+    ending = Ending.of(asked, checked.name)
+
+    with show_progress(asked.quiet):
+        from klack.analyses.stroke.analysis import STROKE
+
+        after = STROKE.load(continued) if continued is not None else None
     with compiling_ahead(LOOP_AND_REST, asked.threads, quiet=asked.quiet):
-        from klack.case.shipped import find_case
+        from klack.analyses.stroke.record import IncompleteStrokeError
+        from klack.analyses.stroke.run import run_stroke
 
-        with show_progress(asked.quiet):
-            checked = _checked_case(find_case(case), duration, step, imported(component))
-        # both "--variant a,b" and "--variant a --variant b"
-        wanted = tuple(name for item in variant or () for name in item.split(",") if name)
-        wanted = checked.require_variants(wanted or checked.run.variants)
-        ending = Ending.of(asked, checked.name)
-
-        with show_progress(asked.quiet):
-            from klack.analyses.stroke.analysis import STROKE
-            from klack.analyses.stroke.record import IncompleteStrokeError
-            from klack.analyses.stroke.run import run_stroke
-
-            after = STROKE.load(continued) if continued is not None else None
         incomplete: Exception | None = None
         with show_progress(asked.quiet) as progress:
             try:
@@ -86,17 +101,20 @@ def _checked_case(
     path: Path,
     duration: str | None,
     step: str | None,
+    accuracy: Accuracy | None,
     components: "tuple[type[Component], ...]",
 ) -> "ValveCase":
-    """Read the case; duration and step of the command line replace its own."""
+    """Read the case; duration, step and accuracy of the command line replace its own."""
     from klack.case.valve_reader import load_valve_case
 
     case = load_valve_case(path, components)
-    changes = {
+    changes: dict[str, float | str] = {
         key: _time(f"--{key}", text)
         for key, text in (("duration", duration), ("step", step))
         if text is not None
     }
+    if accuracy is not None:
+        changes["accuracy"] = accuracy
     if not changes:
         return case
 

@@ -1,0 +1,18 @@
+"""The one choice between speed and accuracy of a stroke, and the steps that it begins with."""
+
+from typing import Literal
+
+__all__ = ["ACCURACIES", "Accuracy", "fine_step"]
+
+Accuracy = Literal["normal", "fine"]
+
+ACCURACIES: dict[Accuracy, tuple[float, float]] = {
+    "normal": (20e-9, 0.64e-6),
+    "fine": (5e-9, 0.32e-6),
+}
+"""Fine step and macro step in flight [s]."""
+
+
+def fine_step(accuracy: Accuracy, step: float | None = None) -> float:
+    """Fine step [s]: the one that is stated, or that of the accuracy."""
+    return ACCURACIES[accuracy][0] if step is None else step
