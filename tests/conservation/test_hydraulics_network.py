@@ -148,6 +148,7 @@ def test_a_column_without_friction_gives_back_what_it_took(excess):
     result = run(parts, connections, "liquid", duration=5e-4, step=0.25e-6)
 
     start = result.books.stores_before["room compression"]
-    assert result.books.losses["room implicit step"] > 0.1 * start
+    # the mean pressure acts: next to nothing is lost by the step, 0.51 of its end
+    assert 0.0 <= result.books.losses["room implicit step"] < 0.1 * start
     assert abs(result.books.losses["neck flow"]) < 1e-11 * start
     assert result.books.relative_residual < 1e-9

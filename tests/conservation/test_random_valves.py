@@ -50,8 +50,8 @@ def test_a_magnet_that_pulls_through_its_stop_ends_the_run_with_gap_and_time():
     case = read_valve_case(DRAWS["draw"](744), Path("draw744.yaml"))
 
     with (
-        pytest.warns(AccuracyWarning, match="'coil': at 116.2 us the gap leaves the range"),
-        pytest.raises(IncompleteRunError, match=r"coil: the gap is -14.* um at 118.* us, far out"),
+        pytest.warns(AccuracyWarning, match="'coil': at 116.5 us the gap leaves the range"),
+        pytest.raises(IncompleteRunError, match=r"coil: the gap is -16.* um at 119.* us, far out"),
     ):
         DRAWS["residuals"](case)
 

@@ -61,7 +61,7 @@ def test_impacts_and_rest_do_not_depend_on_the_step(kind):
         assert result.coarse_steps > 0
         record = result.interfaces["seat"]
         before_rest = record.time < last.time + last.contact_time
-        assert np.max(record.step[before_rest]) < 1.1 * result.step
+        assert np.max(record.step[before_rest]) < 4.1 * result.step  # four while it is smooth
         closed = record.contact_force > 0.0
         time = np.sum(record.step[closed & (record.time > last.time)])
         assert time == pytest.approx(last.separation_time - last.time, rel=0.05)

@@ -24,7 +24,9 @@ from klack.simulation.network_result import (
     ImpactEvent,
     InterfaceRecord,
     NetworkResult,
+    StepCounts,
 )
+from klack.simulation.step_sizes import StepSizes
 
 PEAK, DURATION, STEP = 300.0, 40e-6, 20e-9
 
@@ -146,9 +148,8 @@ def stroke_with_rest() -> NetworkResult:
         },
         events=(),
         books=EnergyBooks(supplies={}, losses={}, stores_before={}, stores_after={}),
-        step=STEP,
-        fine_steps=1,
-        coarse_steps=1,
+        sizes=StepSizes(step=STEP, coarse=1, near=1, middle=1),
+        steps=StepCounts(fine=1),
         wall_time=0.0,
         state={"fine": fine},
     )

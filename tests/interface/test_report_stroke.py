@@ -38,7 +38,9 @@ from klack.simulation.network_result import (
     ImpactEvent,
     InterfaceRecord,
     NetworkResult,
+    StepCounts,
 )
+from klack.simulation.step_sizes import StepSizes
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 STEP, RECORD, END = 20e-9, 1e-6, 2e-3
@@ -116,9 +118,8 @@ def variant(name: str, *, peak: float, late: float) -> StrokeVariant:
             impact("seat", back, 0.5 * peak, 30e-6, 0.7),
         ),
         books=books(wet),
-        step=STEP,
-        fine_steps=9000,
-        coarse_steps=5000,
+        sizes=StepSizes(step=STEP, coarse=32, near=16, middle=4),
+        steps=StepCounts(flight=4000, near=1000, sub=8000, sub_fine=5000),
         wall_time=0.05,
         state={},
     )
@@ -461,7 +462,7 @@ def test_numbers_of_a_study_are_pure_json(study: StrokeStudy):
     whole = stroke_to_json(study)
     assert whole["variant"] == "wet"
     assert whole["opening_time_s"] == TOUCH["opening"] + 10e-6
-    assert whole["steps"] == 14000
+    assert whole["steps"] == 5000
     assert whole["real_time_factor"] == pytest.approx(0.05 / END, rel=1e-9)
     assert whole["energy_residual"] == pytest.approx(0.0, abs=1e-12)
     event = whole["variants"]["dry"]["events"][1]

@@ -40,7 +40,9 @@ from klack.simulation.network_result import (
     ImpactEvent,
     InterfaceRecord,
     NetworkResult,
+    StepCounts,
 )
+from klack.simulation.step_sizes import StepSizes
 
 TITLE = "Ventil für <Öl> & Wasser, 80 µm"
 STEP = 1e-6
@@ -97,6 +99,8 @@ def stroke_study() -> StrokeStudy:
             stores_before={"spring energy": 0.0},
             stores_after={"spring energy": 1e-6},
         ),
+        sizes=StepSizes(step=20e-9, coarse=32, near=16, middle=4),
+        steps=StepCounts(flight=300, near=40, sub=200, sub_fine=80),
         state={},
     )
     times = LiftTimes(

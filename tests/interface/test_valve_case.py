@@ -44,7 +44,7 @@ def test_values_arrive_in_si():
     assert (case.stops["opening"].speed, case.stops["opening"].force) == (1.2, 40.0)
     assert case.network.components["opening"].gap == 1e-4
     assert case.network.ambient.temperature == 293.15
-    assert (case.run.duration, case.run.step, case.run.coarse) == (1e-3, 2e-8, 16)
+    assert (case.run.duration, case.run.fine_step, case.run.coarse) == (1e-3, 2e-8, None)
     assert case.run.variants == ("dry", "dry-lumped")
 
 

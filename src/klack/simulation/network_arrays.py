@@ -174,6 +174,7 @@ class NodeState(NamedTuple):
     before: Vector
     g: Vector
     rate: Vector  # at which flows balance the pressure of a volume [1/s]
+    slope: Vector  # of the density over the pressure
     hint: Index
 
 
@@ -198,7 +199,6 @@ class Interfaces(NamedTuple):
     film_small: Vector  # film force that a coarse step may begin with; it may end with twice of it
     film_felt: Vector  # film force from which on fine steps are recorded
     rest: Vector  # closed for so long: at rest [s]
-    fastest: float  # speed that nothing reaches [m/s]
 
 
 class InterfaceState(NamedTuple):

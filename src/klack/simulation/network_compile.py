@@ -58,7 +58,6 @@ Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _FLIGHT_SPEED = 0.5  # [m/s] over the stroke: a film force is judged by what it moves in this time
-_FASTEST_STROKE = 20e-6  # [s] for the whole stroke: 5 m/s over 0.1 mm
 _FILM_SMALL = 1.64e-2  # [m/s] mean speed of a gap under a small force: 0.5 N on a needle of 3 g
 _FILM_FELT = 6.55e-4  # [m/s] the same for one that is worth a record: 0.02 N
 
@@ -394,6 +393,7 @@ def _nodes(
         before=p.copy(),
         g=g,
         rate=np.full(count, np.inf),
+        slope=np.zeros(count),
         hint=hint,
     )
     return nodes, state
@@ -443,7 +443,6 @@ def _interfaces(
         film_small=_FILM_SMALL * force,
         film_felt=_FILM_FELT * force,
         rest=np.array(rest, dtype=float),
-        fastest=stroke / _FASTEST_STROKE,
     )
     state = InterfaceState(
         hint=np.zeros(count, np.int64),

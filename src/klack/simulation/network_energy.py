@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from klack.simulation.delay_line import LINE_LOSSES, line_store
 from klack.simulation.interface_step import interface_store
 from klack.simulation.network_arrays import (
+    EXCESS,
     LAST,
     PORTS,
     SEEN,
@@ -50,12 +51,14 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
 def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     """Energy [J] that each part holds now, by name.
 
-    Of a body without the work that elements have still to see.
+    Of a body without the work that elements have still to see; of the first one also without what
+    bodies got beyond their due, which the next steps take back.
     """
     rows, nodes, state = network.rows, network.nodes, network.node_state
     interfaces, touching = network.interfaces, network.interface_state
     stores = {}
     unseen, place = _unseen_work(network), 0
+    unseen[0] += network.bodies.at[EXCESS]
     for b, row in enumerate(rows.bodies):
         kinetic, strain = body_energy(row.body, *modal_state(network, b))
         ahead = float(unseen[place : place + len(row.ports)].sum())

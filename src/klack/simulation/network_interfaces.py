@@ -60,13 +60,14 @@ _ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over 
 _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
 _ROUND_OFF = 4e-16  # of a displacement
 _MOST_SWEEPS = 200
-_YOUNG = 0.5e-6  # [s] a contact just closed
+_YOUNG = 1.5  # macro steps: a contact just closed
 _FALLS = (
     1.5  # times the force at the end of the macro step: it had so much before, and releases soon
 )
 _SHAKEN = 0.04  # of the force of a contact at rest: its change in a macro step
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
 _FAR = 1e-4  # of a small film force, even if the gap closed at
+_FASTEST = 5.0  # [m/s]
 _NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 
@@ -308,18 +309,17 @@ def smooth_contacts(contacts: Any, now: float, H: float, middle: float) -> bool:
         x = state.gap[c] - 3.0 * rate * H
         trial.far[c] = 0.0
         if state.since[c] < np.inf:
-            if now - state.since[c] < _YOUNG or _FALLS * state.force[c] <= state.force_before[c]:
+            if (
+                now - state.since[c] < _YOUNG * H
+                or _FALLS * state.force[c] <= state.force_before[c]
+            ):
                 smooth = False
             continue
         if x <= 0.0:
             smooth = False
             continue
         film = rate * (rows.cubic[c] / x**3 + rows.linear[c] / x)
-        if (
-            film < _FAR * rows.film_small[c]
-            and state.gap[c] > rows.fastest * H
-            and state.e[c] == 0.0
-        ):
+        if film < _FAR * rows.film_small[c] and state.gap[c] > _FASTEST * H and state.e[c] == 0.0:
             trial.far[c] = 1.0
         elif rate * middle > _SMOOTH * (x + rows.cut_off[c]):
             smooth = False

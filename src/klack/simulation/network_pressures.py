@@ -31,8 +31,11 @@ __all__ = [
 
 _MOST_NEWTON = 80
 _FULL_NEWTON = 15  # of them with whole steps
-_PRESSURE_LEFT = 3e-5  # last Newton step over the pressure; what is left of it is its square
+_PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
+_CURVED = (
+    0.1  # of the slope of the density: change in a step that the mean pressure does not follow
+)
 _LEAST_THETA = 0.51  # what the implicit step loses outweighs what the curved law could give back
 _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
@@ -422,6 +425,9 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
         state.mass[i] = mass
         state.held[i] = V[i]
         state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
+        if abs(trial.slope[i] - state.slope[i]) > _CURVED * trial.slope[i]:
+            state.rate[i] = np.inf  # boiling, or about to fill
+        state.slope[i] = trial.slope[i]
     for i in range(nodes.volumes, nodes.nodes):
         accounts.supply[i - nodes.volumes] -= g[i] * inflow[i]
     for i in range(nodes.nodes):

@@ -115,7 +115,8 @@ def _middle(rows: Rows, h: float, near: int) -> int:
     shortest = inf
     for row in rows.interfaces:
         if row.law is not None:
-            shortest = min(shortest, bounce_time(row, (owner.get(row.upper), owner.get(row.lower))))
+            bodies = (owner.get(row.upper), owner.get(row.lower))
+            shortest = min(shortest, bounce_time(row, bodies))
     most = min(_MIDDLE, near // 2, int(_OF_BOUNCE * min(shortest, 1.0) / h))
     return _largest_divisor(near, max(1, most))
 

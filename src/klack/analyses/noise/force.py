@@ -27,6 +27,9 @@ _AT_REST = 0.05  # net force over the peak of the last impact
 _LONG = 5.0  # contact times of earlier impacts after which a contact is rest, though it rings
 
 
+_ROUND_OFF = 1e-3  # of a fine step, whose parts are longer
+
+
 def impact_force(history: ImpactHistory) -> TimeSeries:
     """Contact force of an impact [N], means over its intervals, with a zero before the start."""
     series = force_series(history)
@@ -93,13 +96,14 @@ def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
     size = round(spacing / step)  # fine steps of a record
     count = (result.time.size - 1) * size
     record = result.interfaces[stop]
-    place = np.round((record.time - start) / step).astype(np.int64)
+    place = np.floor((record.time - start) / step + _ROUND_OFF).astype(np.int64)
     length = np.maximum(1, np.round(record.step / step).astype(np.int64))
-    force = record.contact_force + record.film_force
+    # of a fine step that was cut, each part has its share
+    force = (record.contact_force + record.film_force) * np.minimum(record.step / step, 1.0)
     values, known = np.zeros(count), np.zeros(count, dtype=bool)
     for offset in range(int(length.max(initial=1))):
         seen = (length > offset) & (place + offset >= 0) & (place + offset < count)
-        values[place[seen] + offset] = force[seen]
+        np.add.at(values, place[seen] + offset, force[seen])
         known[place[seen] + offset] = True
     mean = _record_means(result, stop)
     if mean is not None:
