@@ -150,5 +150,6 @@ def test_a_column_without_friction_gives_back_what_it_took(excess):
     start = result.books.stores_before["room compression"]
     # the mean pressure acts: next to nothing is lost by the step, 0.51 of its end
     assert 0.0 <= result.books.losses["room implicit step"] < 0.1 * start
-    assert abs(result.books.losses["neck flow"]) < 1e-11 * start
+    # round-off of the pressure energy that is left of its change by 3 Pa
+    assert abs(result.books.losses["neck flow"]) < 1e-10 * start
     assert result.books.relative_residual < 1e-9

@@ -430,7 +430,8 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
         end_nodes(fluid, H, accounts)
-    repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
+    if step.level != FINE:  # fine steps owe nothing but round-off
+        repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
     catch_up(bodies, level, step.level, parts == 1)
     bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, H)
     end_ports(bodies)
