@@ -82,7 +82,7 @@ def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[flo
 
 @step_function
 def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow at the lift of the end of the step, and the forces of the flow.
+    """Flow at the mean lift of the step, and the forces of the flow.
 
     ``par``: 0 kind, 1 radius, 2-3 shape, 4 lift at the start, 5 largest area, 6 ``C_q``, 7
     ``12 mu w/(pi d)``, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour pressure, 11-13 leak

@@ -15,8 +15,9 @@ pointers to ``float64``.
 ``t`` [s] is the start of the step and ``h`` [s] its length; ``y0`` and ``y1`` [m] are the
 displacements of a port at both ends of the step, along +z.  A force [N] is the mean over the step,
 positive along +z, *on the body*: the work done on the body is exactly ``F (y1 - y0)``.  Pressures
-[Pa] are absolute, densities [kg/m^3] belong to them, both *at the end* of the step (implicit); the
-mass flow ``mdot`` [kg/s] runs from a to b.
+[Pa] are absolute, densities [kg/m^3] belong to them, both as they *act in the step*: between its
+middle and its end, implicit; the mass flow ``mdot`` [kg/s], the mean over the step, runs from a to
+b.
 
 Energies [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
 outside during it; a *loss* what was turned into heat.  An element must satisfy, to round-off,
