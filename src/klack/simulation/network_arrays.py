@@ -33,7 +33,6 @@ __all__ = [
     "PORTS",
     "ROWS_AT",
     "SEEN",
-    "SIZES",
     "STORE",
     "SUPPLY",
     "WORK",
@@ -70,11 +69,9 @@ PORTS = 64
 """Length of a row of port numbers; one less is the most a network can have."""
 
 FINE, COARSE, NEAR, MIDDLE, CUT = 0, 1, 2, 3, 4
-"""Sizes of step: the fine one; macro steps of many of them, in flight and about a touch; sub-steps
-of a few of them, for smooth contact forces; and parts of a fine step in which a contact closes or
-opens."""
+"""The fine step; macro steps of many of them, in flight and about a touch; sub-steps of a few, for
+smooth contact forces; and parts of a fine step in which a contact closes or opens."""
 
-SIZES = 5
 
 PARTS = 8
 """Parts of a fine step that is cut."""
