@@ -25,6 +25,7 @@ from klack.case.valve_sections import Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
 from klack.progress import Progress, silent
+from klack.simulation.step_sizes import step_sizes
 from klack.stages import collected_warnings
 
 __all__ = ["advise_stroke", "first_impacts", "step_ladder", "stroke_measures"]
@@ -56,12 +57,14 @@ def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArr
     ----------
     valve : Valve
     step : float, optional [s]
-        Of the network; that of the case without.
+        Of the network; that of the case without.  Macro steps change in proportion.
     """
     case = valve.case
+    rows, run = variant_network(valve, _variant(case)).rows(), case.run
     if step is not None:
-        case = case.model_copy(update={"run": case.run.model_copy(update={"step": step})})
-    result = run_variant(case, variant_network(valve, _variant(case)).rows())
+        sizes = step_sizes(rows, run.accuracy, step=run.step, coarse=run.coarse)
+        run = run.model_copy(update={"step": step, "coarse": sizes.coarse})
+    result = run_variant(case.model_copy(update={"run": run}), rows)
     found: dict[str, NDArray[np.float64]] = {}
     for event in result.events:
         if event.stop not in found:
