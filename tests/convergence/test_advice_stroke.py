@@ -36,7 +36,9 @@ def test_expected_error_of_the_step_bounds_that_against_an_eighth_of_it():
     expected = step_ladder(valve, now, stroke_measures(0.02)).ladder.error(1.0)[1]
 
     assert list(fine) == ["opening"]  # the only stop within this time
-    assert true <= expected <= 10.0 * true
+    # peaks scatter by 1e-4 with the phase of macro steps
+    assert true <= max(expected, 1e-4)
+    assert expected <= 10.0 * max(true, 1e-4)
 
 
 def test_three_levels_of_every_setting_and_a_check():
