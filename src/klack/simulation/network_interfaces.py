@@ -32,28 +32,13 @@ __all__ = [
     "far_ones_stay",
     "forget_interfaces",
     "keep_dissipation",
-    "level_of_step",
+    "may_fly",
     "none_far",
     "push_by_guess",
     "smooth_contacts",
     "solve_interfaces",
     "take_back_interfaces",
 ]
-
-
-@phase
-def begin_interfaces(contacts: Any, peaks: Any) -> None:
-    """Begin a run with the forces of the last step."""
-    forget_interfaces(contacts)
-    for c in range(contacts.rows.interfaces):
-        peaks[c] = 0.0
-
-
-@phase
-def forget_interfaces(contacts: Any) -> None:
-    """Forces of the last step, where a step was discarded."""
-    for c in range(contacts.rows.interfaces):
-        contacts.trial.force[c] = contacts.state.force[c]
 
 
 _ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over the work of the step
@@ -72,34 +57,49 @@ _NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 
 @phase
+def begin_interfaces(contacts: Any, peaks: Any) -> None:
+    """Begin a run with the forces of the last step."""
+    forget_interfaces(contacts)
+    for c in range(contacts.rows.interfaces):
+        peaks[c] = 0.0
+
+
+@phase
+def forget_interfaces(contacts: Any) -> None:
+    """Forces of the last step, where a step was discarded."""
+    for c in range(contacts.rows.interfaces):
+        contacts.trial.force[c] = contacts.state.force[c]
+
+
+@phase
 def _steady(before: float, now: float) -> bool:
     """Whether a contact at rest carries a force that macro steps follow."""
     return abs(now - before) <= _SHAKEN * max(abs(now), abs(before))
 
 
 @phase
-def level_of_step(contacts: Any, now: float, length: float) -> int:
-    """1 if a coarse step of this length may be tried: all interfaces far apart or at rest."""
+def may_fly(contacts: Any, now: float, length: float) -> bool:
+    """Whether one step of this length may be tried: all interfaces far apart or at rest."""
     rows, state = contacts.rows, contacts.state
-    level = 1
+    quiet = True
     for c in range(rows.interfaces):
         rate = abs(state.rate[c])
         if state.since[c] < np.inf:
             if now - state.since[c] < rows.rest[c]:
-                level = 0
+                quiet = False
             if not _steady(state.force_before[c], state.force[c]):
-                level = 0
+                quiet = False
             continue
         x = state.gap[c] - 3.0 * rate * length
         creeping = rate * length < 1e-3 * (max(state.gap[c], 0.0) + rows.cut_off[c])
         if x <= 0.0:
             if not (creeping and rows.cubic[c] > 0.0):
-                level = 0
+                quiet = False
         elif rows.cubic[c] > 0.0:
             film = rate * (rows.cubic[c] / x**3 + rows.linear[c] / x)
             if film > rows.film_small[c] and not creeping:
-                level = 0
-    return level
+                quiet = False
+    return quiet
 
 
 @phase

@@ -59,7 +59,7 @@ from klack.simulation.network_interfaces import (
     end_macro_interfaces,
     far_ones_stay,
     keep_dissipation,
-    level_of_step,
+    may_fly,
     none_far,
     push_by_guess,
     smooth_contacts,
@@ -117,7 +117,7 @@ CLOCK = 8
 """Time in fine steps, size of the last step, then
 :class:`klack.simulation.network_result.StepCounts`."""
 
-_SETTLED = 5e-5  # displacement by what the guess missed over the longest way of a port, fine steps
+_SETTLED = 5e-5  # of the longest way of a port: displacement by the missed force, fine steps
 _SETTLED_MACRO = 2e-4  # the same of macro steps
 _ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
 _ENERGY_MACRO = 1e-6  # the same of macro steps
@@ -170,15 +170,11 @@ def run_network(
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
     now, last_level, at = clock[0], clock[1], FINE
-    last_steps = 1
-    if last_level == COARSE:
-        last_steps = M
-    elif last_level == NEAR:
-        last_steps = near
+    last_steps = _steps_of(last_level, M, near)
     in_record, record, record_time = 0, 0, 0.0
     for _macro in range(macros):
         together = allow_macro
-        flight = together and level_of_step(contacts, now * h, M * h) == COARSE
+        flight = together and may_fly(contacts, now * h, M * h)
         smooth = R > 1
         done = 0
         while done < M:
@@ -193,11 +189,7 @@ def run_network(
                     parts = near // R if smooth else near
             if of_sub != MIDDLE:
                 none_far(contacts)
-            steps = 1
-            if level == COARSE:
-                steps = M
-            elif level == NEAR:
-                steps = near
+            steps = _steps_of(level, M, near)
             step = Step(level, steps, now * h, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, now * h, steps // parts * h, parts / (steps * h))
             if at != of_sub:
@@ -268,6 +260,14 @@ def run_network(
     return STATUS_DONE
 
 
+@phase
+def _steps_of(level: int, M: int, near: int) -> int:
+    """Fine steps of a step that elements and fluid answer once."""
+    if level == COARSE:
+        return M
+    return near if level == NEAR else 1
+
+
 @unfolded
 def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _Loop:
     """Begin a run: no force is pending, no density known, nothing summed."""
@@ -334,9 +334,6 @@ def _settle(
         if status == STATUS_DONE:
             status = _push_by_rows(step, bodies, loop.elements, loop.fluid, report)
         if status != STATUS_DONE:
-            report[0], report[2] = (
-                (0.0, step.t) if status == STATUS_FORCES else (report[0], report[2])
-            )
             return status
         miss(bodies, G)
         left, work = cost_of_catching_up(contacts, bodies.at)

@@ -121,13 +121,19 @@ def keep_for_cut(bodies: Any) -> None:
 
 
 @phase
+def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int) -> float:
+    """Let the forces of a row have acted over a step of size ``of``; the energy that this adds."""
+    block, step = _block(bodies, k, level), _block(bodies, k, of)
+    port0, port1 = bodies.port0[k], bodies.port1[k]
+    return kick(block, step, bodies.modes[k], shift(bodies.at, forces), port0, port1)
+
+
+@phase
 def begin_cut(bodies: Any) -> None:
     """Begin a fine step once more, in parts, with the forces that were pending."""
     S = bodies.at
     for k in range(bodies.blocks):
-        block, of_fine = _block(bodies, k, CUT), _block(bodies, k, FINE)
-        port0, port1 = bodies.port0[k], bodies.port1[k]
-        kick(block, of_fine, bodies.modes[k], shift(S, PENDING), port0, port1)
+        _kick_block(bodies, k, CUT, FINE, PENDING)
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
 
@@ -340,10 +346,8 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
     else:
         bring(bodies, level, level)
         for k in range(bodies.blocks):
-            block, of_macro = _block(bodies, k, level), _block(bodies, k, macro)
-            port0, port1 = bodies.port0[k], bodies.port1[k]
-            energy = kick(block, of_macro, bodies.modes[k], shift(S, MISSED), port0, port1)
-            S[WORK + port0] += energy
+            energy = _kick_block(bodies, k, level, macro, MISSED)
+            S[WORK + bodies.port0[k]] += energy
             excess += energy
         for p in range(bodies.ports):
             way, d = S[Y1 + p] - S[BEGIN + p], S[AHEAD + p]

@@ -41,7 +41,7 @@ from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult, StepCounts
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.static_start import start_at_rest
-from klack.simulation.step_sizes import StepSizes, step_sizes
+from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -228,9 +228,9 @@ class _Grid:
 def _grid(duration: float, sizes: StepSizes, record: float) -> _Grid:
     step, block = sizes.step, sizes.coarse
     if block == 1:  # no macro steps: as many fine ones at a time as divide a record
-        block = _largest_divisor(max(1, round(record / step)), _BLOCK)
+        block = largest_divisor(max(1, round(record / step)), _BLOCK)
     of_record = max(1, round(record / (block * step)))
-    look = _largest_divisor(of_record, int(_LOOK / (block * step)))
+    look = largest_divisor(of_record, int(_LOOK / (block * step)))
     return _Grid(
         sizes=sizes,
         block=block,
@@ -238,10 +238,6 @@ def _grid(duration: float, sizes: StepSizes, record: float) -> _Grid:
         looks=of_record // look,
         records=max(1, int(np.ceil(duration / (of_record * block * step) - 1e-9))),
     )
-
-
-def _largest_divisor(number: int, most: int) -> int:
-    return next((size for size in range(most, 1, -1) if number % size == 0), 1)
 
 
 def has_python_steps(rows: Rows) -> bool:

@@ -9,7 +9,7 @@ from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
 from klack.simulation.rest import bounce_time
 
-__all__ = ["StepSizes", "step_sizes"]
+__all__ = ["StepSizes", "largest_divisor", "step_sizes"]
 
 _MOST_COARSE = 256
 _MIDDLE = 4  # fine steps of a sub-step while contact forces are smooth
@@ -84,7 +84,7 @@ def step_sizes(
         )
     h = fine_step(accuracy, step)
     chosen = _chosen(rows, ACCURACIES[accuracy][1], h) if coarse is None else coarse
-    near = _largest_divisor(chosen, max(1, chosen // 2))
+    near = largest_divisor(chosen, max(1, chosen // 2))
     return StepSizes(step=h, coarse=chosen, near=near, middle=_middle(rows, h, near))
 
 
@@ -118,8 +118,9 @@ def _middle(rows: Rows, h: float, near: int) -> int:
             bodies = (owner.get(row.upper), owner.get(row.lower))
             shortest = min(shortest, bounce_time(row, bodies))
     most = min(_MIDDLE, near // 2, int(_OF_BOUNCE * min(shortest, 1.0) / h))
-    return _largest_divisor(near, max(1, most))
+    return largest_divisor(near, max(1, most))
 
 
-def _largest_divisor(number: int, most: int) -> int:
+def largest_divisor(number: int, most: int) -> int:
+    """Largest divisor of a number that is at most this; 1 if there is no other."""
     return next((size for size in range(most, 1, -1) if number % size == 0), 1)
