@@ -1,7 +1,6 @@
-"""Order two in the step, through boost, peak, fall, two-point hold and decay."""
+"""Convergence with the step, through boost, peak, fall, two-point hold and decay."""
 
 import numpy as np
-import pytest
 
 from klack.magnetics.peak_hold import PeakHold
 from klack.verification.drivers import injector, opening
@@ -31,11 +30,20 @@ def values(steps):
     return np.array([r.flux[-1], r.work, r.electric])
 
 
-def test_flux_work_and_supply_converge_with_order_two():
+def test_long_steps_are_cut_where_the_fluxes_bend():
+    """Saturation, switchings, eddy currents; uncut, the supply is 30 times as far off."""
+    errors = np.abs(values(156) / values(128000) - 1.0)  # steps of 1.28 us
+
+    assert np.all(errors < [1e-4, 3e-4, 3e-4])
+
+
+def test_flux_work_and_supply_converge():
+    """Steps that are not cut have order two; of cut ones the allowed error falls with the square."""
     counts = np.array([400, 800, 1600, 3200])
-    errors = np.abs([values(n) - values(128000) for n in counts])
+    errors = np.abs(np.array([values(n) / values(128000) - 1.0 for n in counts]))
 
     orders = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
     # switchings fall anywhere inside the steps: the constant wobbles, the order does not
-    assert orders == pytest.approx([2.0, 2.0, 2.0], abs=0.2)
+    assert np.all(orders > 1.3)
+    assert np.all(errors[-1] < 1.5e-6)  # uncut steps of 62.5 ns: 2e-6 to 1e-5

@@ -1,7 +1,9 @@
 r"""The step of a solenoid: its driver, its coil, its magnetic circuit, its force.
 
 Within a step the driver may switch, the diode may block, the voltage may bend: the step is cut
-there, and each piece solved by itself (:mod:`klack.magnetics.flux_kernel`).  Instants of the
+there, and each piece solved by itself (:mod:`klack.magnetics.flux_kernel`).  It is also cut where
+the fluxes bend: a piece whose change differs from what the rates so far tell, by more than a small
+share of the flux, is halved; after a switch pieces begin short and may double.  Instants of the
 clock are known beforehand; instants of the current are found by repeating the piece with other
 lengths until its end current is the wanted one, to 1e-12.  The armature moves evenly through all
 pieces, so the force of the step is the mean of theirs, weighted by their lengths, and the energy
@@ -49,7 +51,7 @@ from klack.magnetics.map_kernel import (
     map_numbers,
     map_step,
 )
-from klack.magnetics.quiet_step import DIODE, FRONT, quiet_step
+from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend, quiet_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
@@ -100,6 +102,8 @@ _TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
 _MOST_EVENTS = 30
 _LOCATED = 1e-12
 _TELLS = 1e-6  # of a step: shorter pieces say nothing of the rates of the fluxes
+_FIRST = 1 / 4  # of a step: piece after a switch
+_LEAST = 1 / 64  # ... no piece is cut further for its bend
 _FRONT, _DIODE = FRONT, DIODE
 _NONE, _BLOCKS = -1, -2
 _MAP = MAP
@@ -243,7 +247,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     mode, entered, cycle = state[0], state[1], state[2]
     is_open, current, last = state[3] != 0.0, state[4], state[7]
     # on the stack, where nothing else can be meant: the compiler keeps what it has read
-    phi, rate, bend, change = stack(6), stack(6), stack(6), stack(6)
+    phi, rate, bend, change, told_of = stack(6), stack(6), stack(6), stack(6), stack(6)
     hints = stack(_SPOTS)
     middle, final, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
     for j in range(loops):
@@ -257,6 +261,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     done = 0.0
     events = 0
     blocked = False  # the diode has blocked at this very instant
+    longest, largest, bend_left = h, state[size - 1], allowed_bend(h)
     per_step = 1.0 / h if h > 0.0 else 0.0
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
@@ -282,6 +287,9 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         whole = due >= piece - close
         if not whole:
             piece = due
+        longest = min(longest, max(2.0 * last if last > 0.0 else _FIRST * h, _LEAST * h))
+        if longest < piece - close:
+            piece, whole = longest, False
         if piece != h:
             per_time = 1.0 / piece
         xa = x0 if done == 0.0 else x0 + speed * done
@@ -289,13 +297,21 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         voltage = state_voltage(par, block, now + 0.5 * piece - cycle)
         ahead = 0.5 * (last + piece)
         for j in range(loops):
-            change[j] = piece * (rate[j] + bend[j] * ahead)
+            told_of[j] = change[j] = piece * (rate[j] + bend[j] * ahead)
         _gaps(par, at, hints, xa, xb, middle, final, slope)
         found, mean = _advance(
             par, at, hints, phi, change, middle, final, per_time, voltage, not is_open
         )
         if not found:
             return 1
+        untold = 0.0
+        for j in range(loops):
+            untold = max(untold, abs(change[j] - told_of[j]))
+            largest = max(largest, abs(phi[j] + change[j]))
+        if last > 0.0 and untold > bend_left * largest and piece > _LEAST * h:
+            longest = 0.5 * piece
+            continue
+        longest = 2.0 * piece
         through = linked(par, at, change)
         if is_open and not blocked and voltage > through * per_time + _DIODE:
             is_open = False
@@ -385,6 +401,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     for j in range(spots):
         out[2 + _FRONT + 3 * loops + j] = hints[j]
     books = 2 + size
+    out[books - 1] = largest
     out[books], out[books + 1], out[books + 2], out[books + 3] = supply, ohmic, eddy, energy
     return 0
 
@@ -401,7 +418,7 @@ def flux_numbers(
     require_positive("coil resistance", resistance, "ohm")
     numbers = map_numbers(plant) if isinstance(plant, FluxMap) else circuit_numbers(plant)
     program = driver.numbers()
-    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1])
+    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + 1
     head = [0.0, resistance, gap, -1.0 if closing else 1.0]
     head += [_HEADER, _HEADER + numbers.size, size, 0.0]
     return np.concatenate((head, numbers, program))
@@ -419,6 +436,7 @@ def flux_state(
     state[4] = current
     phi = np.array(fluxes, dtype=float).ravel()
     state[_FRONT : _FRONT + phi.size] = phi
+    state[-1] = np.max(np.abs(phi), initial=0.0)
     return state
 
 

@@ -134,7 +134,7 @@ def run_coil(
     status = _march(address_of(magnet_step), par, np.append(start, 0.0), y, step, log, sums)
     if status != 0:
         raise ConvergenceError(f"coil: {FAILURES[status]}.")
-    loops = (start.size - _FRONT) // 3 if isinstance(plant, FluxMap) else plant.loops.shape[1]
+    loops = 1 if isinstance(plant, FluxMap) else plant.loops.shape[1]
     return CoilRun(
         time=np.asarray(step * np.arange(y.size), dtype=float),
         current=log[:, 5],
