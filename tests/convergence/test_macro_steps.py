@@ -13,7 +13,7 @@ from klack.simulation.network_run import simulate_network
 from klack.simulation.step_sizes import step_sizes
 from klack.verification.whole_valve import peak_and_hold, whole_valve
 
-MACRO = 0.64e-6
+MACRO = 1.28e-6
 
 
 def stroke(kind: str, shift: float, **steps) -> NetworkResult:
@@ -46,12 +46,12 @@ def test_first_impacts_do_not_depend_on_the_phase_of_the_grid(kind):
         times = np.array([impacts[stop][1] for impacts in found]) - time
         # the same scheme with backward Euler, the lift at the end of a step, or uncut steps: 0.2 us
         assert np.abs(peaks).max() < 5e-4, stop
-        assert np.abs(times).max() < 0.06e-6, stop
+        assert np.abs(times).max() < 0.05e-6, stop
     for run in runs:
         assert run.steps.fine == 0
-        assert run.steps.flight > 500
+        assert run.steps.flight > 300
         assert run.steps.near > 100
-        assert run.steps.repeats < 0.1 * run.coarse_steps
+        assert run.steps.repeats < 0.2 * run.coarse_steps
         assert run.books.relative_residual < 1e-11
 
 
@@ -83,8 +83,8 @@ def test_macro_steps_are_as_long_as_lines_and_exchanges_allow():
         found = step_sizes(rows, "normal", **more)
         return found.coarse, found.near
 
-    assert sizes(valve().rows()) == (32, 16)
-    assert sizes(valve().rows(), step=50e-9) == (8, 4)
+    assert sizes(valve().rows()) == (64, 32)
+    assert sizes(valve().rows(), step=50e-9) == (16, 8)
     assert sizes(valve().rows(), step=5e-6) == (1, 1)
     assert sizes(valve().rows(), coarse=10) == (10, 5)
     assert sizes(with_line(1e-6, 3)) == (16, 8)  # 333 ns

@@ -7,7 +7,7 @@ __all__ = ["ACCURACIES", "Accuracy", "fine_step"]
 Accuracy = Literal["normal", "fine"]
 
 ACCURACIES: dict[Accuracy, tuple[float, float]] = {
-    "normal": (20e-9, 0.64e-6),
+    "normal": (20e-9, 1.28e-6),
     "fine": (5e-9, 0.32e-6),
 }
 """Fine step and macro step in flight [s]."""

@@ -47,7 +47,7 @@ from klack.contact.step_constants import (
 )
 from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
 
-__all__ = ["film_force", "interface_store", "solve_interface"]
+__all__ = ["film_force", "interface_store", "open_film", "solve_interface"]
 
 Vector = NDArray[np.float64]
 Step = tuple[float, float, float, float, int, float, float]
@@ -210,6 +210,45 @@ def solve_interface(
         guess,
         hint,
     )
+
+
+@inner(error_model="numpy", _nrt=False, forceinline=True)
+def open_film(
+    cubic: float,
+    linear: float,
+    cut_off: float,
+    suction: float,
+    h: float,
+    series: float,
+    g0: float,
+    g1: float,
+    e0: float,
+    guess: float,
+) -> tuple[float, float, float]:
+    """Film of an interface that stays open while its bodies go a known way.
+
+    Parameters
+    ----------
+    cubic, linear, cut_off, suction, h, series, e0, guess
+        As of :func:`solve_interface`.
+    g0, g1 : float [m]
+        Gap of the bodies at the start and at the end, with the compression above 0.
+
+    Returns
+    -------
+    film_force : float [N]
+        Mean over the step.
+    e1 : float [m]
+        Compression at the end.
+    film_loss : float [J]
+    """
+    z0, theta = g0 + e0, 0.5
+    if series > 0.0:
+        theta = _relaxing(cubic, linear, cut_off, h, series, z0, g1 - e0)
+    S, base = _line(0.0, series, theta, g1, e0)
+    film, _ = _film_alone(cubic, linear, cut_off, suction, h, S, z0, base, guess)
+    e1, relaxed = _compressed(series, theta, film, e0)
+    return film, e1, film * (z0 - (g1 + e1)) + relaxed
 
 
 @njit(inline="always", error_model="numpy")

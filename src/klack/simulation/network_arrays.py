@@ -212,6 +212,7 @@ class InterfaceState(NamedTuple):
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
     pulled: Vector  # 1 of a film that pulls as much as it can
     force_before: Vector  # force at the end of the macro step before the last
+    far: Vector  # 1 of an interface whose film acts among elements
 
 
 class Accounts(NamedTuple):
@@ -287,7 +288,6 @@ class InterfaceTrial(NamedTuple):
     gap: Vector  # that film and dashpot saw
     contact_loss: Vector
     film_loss: Vector
-    far: Vector  # 1 of an interface that the sub-steps of this macro step leave out
     least: Vector  # force in this macro step and at its start
     most: Vector
     chi: Vector  # dissipation factor at the start of the step

@@ -456,6 +456,7 @@ def _interfaces(
         film_before=np.zeros(count),
         pulled=np.zeros(count),
         force_before=np.zeros(count),
+        far=np.zeros(count),
     )
     return interfaces, state
 

@@ -27,15 +27,16 @@ __all__ = [
     "coarse_step_holds",
     "contacts_hold",
     "cost_of_catching_up",
+    "end_force",
     "end_interfaces",
     "end_macro_interfaces",
-    "far_ones_stay",
     "forget_interfaces",
+    "gap_between",
     "keep_dissipation",
     "may_fly",
-    "none_far",
+    "may_touch",
     "push_by_guess",
-    "smooth_contacts",
+    "smooth_films",
     "solve_interfaces",
     "take_back_interfaces",
 ]
@@ -51,9 +52,6 @@ _FALLS = (
 )
 _SHAKEN = 0.04  # of the force of a contact at rest: its change in a macro step
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
-_FAR = 1e-4  # of a small film force, even if the gap closed at
-_FASTEST = 5.0  # [m/s]
-_NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 
 @phase
@@ -115,7 +113,7 @@ def push_by_guess(contacts: Any, bodies: Any) -> None:
 
 
 @phase
-def _gap(rows: Any, S: Any, c: int) -> float:
+def gap_between(rows: Any, S: Any, c: int) -> float:
     """Gap between the bodies at the end of the step."""
     return rows.gap0[c] + S[Y1 + rows.upper[c]] - S[Y1 + rows.lower[c]]
 
@@ -132,11 +130,11 @@ def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
     bool
         Whether what is left of that change matters no more.
     """
-    rows, trial, S = contacts.rows, contacts.trial, bodies.at
+    rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
     for _sweep in range(_MOST_SWEEPS):
         moved = 0.0
         for c in range(rows.interfaces):
-            if trial.far[c] != 0.0:
+            if state.far[c] != 0.0:
                 continue
             u, low = rows.upper[c], rows.lower[c]
             _solve_interface(contacts, S, c, step)
@@ -150,10 +148,10 @@ def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
         left, work, distance = 0.0, 0.0, 0.0
         for c in range(rows.interfaces):
             if trial.force[c] != 0.0:
-                gap = _gap(rows, S, c)
-                change = abs(trial.force[c] - contacts.state.force[c])
+                gap = gap_between(rows, S, c)
+                change = abs(trial.force[c] - state.force[c])
                 left += (change + _LEAST_CHANGE * abs(trial.force[c])) * abs(gap - trial.gap[c])
-                work += abs(trial.force[c] * (gap - contacts.state.gap[c]))
+                work += abs(trial.force[c] * (gap - state.gap[c]))
                 distance = max(distance, abs(S[Y1 + rows.upper[c]]), abs(S[Y1 + rows.lower[c]]))
         if left <= _ENERGY_LEFT * work or moved <= _ROUND_OFF * distance:
             return True
@@ -176,7 +174,7 @@ def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
     """Force, compression and losses of one interface over the step."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     G, g0 = rows.G[step.level * rows.interfaces + c], state.gap[c]
-    gap_free = _gap(rows, S, c) - G * trial.force[c]
+    gap_free = gap_between(rows, S, c) - G * trial.force[c]
     trial.gap[c] = gap_free
     if rows.dry[c] and g0 >= 0.0 and gap_free >= 0.0 and state.e[c] == 0.0:
         trial.contact[c] = trial.film[c] = trial.e[c] = 0.0
@@ -260,10 +258,12 @@ def begin_macro_interfaces(
 @phase
 def begin_attempt(contacts: Any, c: int) -> None:
     """Nothing has acted yet; the last force is the first guess."""
-    trial, force = contacts.trial, contacts.state.force[c]
+    state, trial = contacts.state, contacts.trial
+    force = state.force[c]
     trial.force[c] = trial.least[c] = trial.most[c] = force
     trial.first[c] = 0.0
-    if trial.far[c] != 0.0:
+    if state.far[c] != 0.0:  # it acts among elements
+        trial.first[c] = force
         trial.force[c] = trial.contact[c] = trial.film[c] = 0.0
         trial.contact_loss[c] = trial.film_loss[c] = 0.0
 
@@ -296,54 +296,38 @@ def take_back_interfaces(
 
 
 @phase
-def smooth_contacts(contacts: Any, now: float, H: float, middle: float) -> bool:
-    """Whether contacts and films follow steps of ``middle`` [s] for the next ``H`` [s].
+def smooth_films(contacts: Any, H: float, middle: float) -> bool:
+    """Whether films follow steps of ``middle`` [s] for the next ``H`` [s].
 
-    A contact may neither close nor be about to open, a film may not change by much.  Interfaces so
-    far apart that nothing can bring them near are marked, to be left out meanwhile.
+    Not where the gap changes much meanwhile, nor about a release: the film that begins then decides
+    how fast the bodies part.
     """
-    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    rows, state = contacts.rows, contacts.state
     smooth = True
     for c in range(rows.interfaces):
+        if state.far[c] != 0.0 or rows.dry[c] != 0:
+            continue
         rate = abs(state.rate[c])
-        x = state.gap[c] - 3.0 * rate * H
-        trial.far[c] = 0.0
         if state.since[c] < np.inf:
-            if (
-                now - state.since[c] < _YOUNG * H
-                or _FALLS * state.force[c] <= state.force_before[c]
-            ):
-                smooth = False
-            continue
-        if x <= 0.0:
-            smooth = False
-            continue
-        film = rate * (rows.cubic[c] / x**3 + rows.linear[c] / x)
-        if film < _FAR * rows.film_small[c] and state.gap[c] > _FASTEST * H and state.e[c] == 0.0:
-            trial.far[c] = 1.0
-        elif rate * middle > _SMOOTH * (x + rows.cut_off[c]):
-            smooth = False
+            smooth = smooth and _FALLS * state.force[c] > state.force_before[c]
+        else:
+            x = max(state.gap[c] - 3.0 * rate * H, 0.0) + rows.cut_off[c]
+            smooth = smooth and rate * middle <= _SMOOTH * x
     return smooth
 
 
 @phase
-def far_ones_stay(contacts: Any, S: Any) -> bool:
-    """Whether interfaces that were left out are still far apart."""
-    stay = True
-    for c in range(contacts.rows.interfaces):
-        if (
-            contacts.trial.far[c] != 0.0
-            and _gap(contacts.rows, S, c) <= _NEAR * contacts.state.gap[c]
-        ):
-            stay = False
-    return stay
-
-
-@phase
-def none_far(contacts: Any) -> None:
-    """Look at all interfaces in the next step."""
-    for c in range(contacts.rows.interfaces):
-        contacts.trial.far[c] = 0.0
+def may_touch(contacts: Any, H: float) -> bool:
+    """Whether a contact may close or open in the next ``H`` [s], or a film begin to cavitate."""
+    rows, state = contacts.rows, contacts.state
+    may = False
+    for c in range(rows.interfaces):
+        if state.far[c] == 0.0:
+            if abs(state.gap[c]) <= 3.0 * abs(state.rate[c]) * H or state.pulled[c] != 0.0:
+                may = True
+            if state.force[c] < -0.5 * rows.suction[c]:
+                may = True
+    return may
 
 
 @phase
@@ -375,9 +359,11 @@ def keep_dissipation(contacts: Any) -> None:
 @phase
 def begin_cut_contacts(contacts: Any) -> None:
     """Begin a step once more."""
+    state, trial = contacts.state, contacts.trial
     for c in range(contacts.rows.interfaces):
-        contacts.state.chi[c] = contacts.trial.chi[c]
-        contacts.trial.force[c] = contacts.state.force[c]
+        state.chi[c] = trial.chi[c]
+        if state.far[c] == 0.0:
+            trial.force[c] = state.force[c]
 
 
 @phase
@@ -393,8 +379,8 @@ def cost_of_catching_up(contacts: Any, S: Any) -> tuple[float, float]:
 
 
 @phase
-def end_macro_interfaces(contacts: Any, S: Any, H: float) -> float:
-    """End a macro step of interfaces; far ones learn where they are.
+def end_macro_interfaces(contacts: Any, S: Any) -> float:
+    """End a macro step of interfaces.
 
     Returns
     -------
@@ -409,10 +395,6 @@ def end_macro_interfaces(contacts: Any, S: Any, H: float) -> float:
         state.force_before[c] = begin
         behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
         excess += (begin - trial.first[c]) * (behind - trial.kept[KEPT * c + 1])
-        if trial.far[c] != 0.0:
-            gap = _gap(rows, S, c)
-            state.rate[c] = (gap - state.gap[c]) / H
-            state.gap[c] = gap
     return excess
 
 
@@ -433,25 +415,19 @@ def end_interfaces(
     """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
-        if trial.far[c] != 0.0:
+        if state.far[c] != 0.0:
             continue
-        was_closed = state.since[c] < np.inf
         acted = trial.contact[c] != 0.0 or trial.film[c] != 0.0 or trial.contact_loss[c] != 0.0
-        gap = _gap(rows, S, c)
-        if acted or was_closed:
+        gap = gap_between(rows, S, c)
+        if acted or state.since[c] < np.inf:
             gap = trial.gap[c]  # what the others move after that it sees in the next step
-            _end_force(contacts, c, step.t, was_closed, accounts)
-            force = trial.force[c]
-            sums[2 * c] += step.H * trial.contact[c]
-            sums[2 * c + 1] += step.H * trial.film[c]
-            peaks[c] = max(peaks[c], force)
+            end_force(contacts, c, step, gap, accounts, recording, sums, peaks)
             if first:
-                trial.first[c] = force
-            trial.least[c] = min(trial.least[c], force)
-            trial.most[c] = max(trial.most[c], force)
-            felt = step.level != COARSE and abs(trial.film[c]) > rows.film_felt[c]
-            if felt or was_closed or trial.contact[c] > 0.0:
-                _record_step(recording, c, step, trial.contact[c], trial.film[c], gap)
+                trial.first[c] = trial.force[c]
+            trial.least[c] = min(trial.least[c], trial.force[c])
+            trial.most[c] = max(trial.most[c], trial.force[c])
+        else:
+            state.force[c] = 0.0
         state.pulled[c] = 1.0 if _pulls(contacts, c) else 0.0
         state.rate[c] = (gap - state.gap[c]) * step.rate
         state.gap[c] = gap
@@ -462,20 +438,37 @@ def end_interfaces(
 
 
 @phase
-def _end_force(contacts: Any, c: int, now: float, was_closed: bool, accounts: Any) -> None:
-    """Take over what one interface did, with its losses."""
-    state, trial = contacts.state, contacts.trial
+def end_force(
+    contacts: Any,
+    c: int,
+    step: Step,
+    gap: float,
+    accounts: Any,
+    recording: Recording,
+    sums: Any,
+    peaks: Any,
+) -> None:
+    """Take over what one interface did in a step that ends at this gap, with its losses."""
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    contact, film = trial.contact[c], trial.film[c]
+    was_closed = state.since[c] < np.inf
     state.e[c] = trial.e[c]
     state.force[c] = trial.force[c]
     accounts.contact[c] += trial.contact_loss[c]
     accounts.film[c] += trial.film_loss[c]
     state.film_before[c] = 0.0
-    if trial.contact[c] > 0.0:
+    if contact > 0.0:
         if not was_closed:
-            state.since[c] = now
-            state.film_before[c] = trial.film[c]
+            state.since[c] = step.t
+            state.film_before[c] = film
     else:
         state.since[c] = np.inf
+    sums[2 * c] += step.H * contact
+    sums[2 * c + 1] += step.H * film
+    peaks[c] = max(peaks[c], trial.force[c])
+    felt = step.level != COARSE and abs(film) > rows.film_felt[c]
+    if felt or was_closed or contact > 0.0:
+        _record_step(recording, c, step, contact, film, gap)
 
 
 @phase

@@ -48,6 +48,13 @@ from klack.simulation.network_arrays import (
     StepRows,
 )
 from klack.simulation.network_elements import end_elements, push_by_elements
+from klack.simulation.network_far_films import (
+    end_far_films,
+    far_ones_stay,
+    mark_far_ones,
+    mark_none_far,
+    push_by_far_films,
+)
 from klack.simulation.network_interfaces import (
     begin_cut_contacts,
     begin_interfaces,
@@ -57,12 +64,11 @@ from klack.simulation.network_interfaces import (
     cost_of_catching_up,
     end_interfaces,
     end_macro_interfaces,
-    far_ones_stay,
     keep_dissipation,
     may_fly,
-    none_far,
+    may_touch,
     push_by_guess,
-    smooth_contacts,
+    smooth_films,
     solve_interfaces,
     take_back_interfaces,
 )
@@ -175,21 +181,23 @@ def run_network(
     for _macro in range(macros):
         together = allow_macro
         flight = together and may_fly(contacts, now * h, M * h)
-        smooth = R > 1
+        smooth, apart = R > 1, True
         done = 0
         while done < M:
             # what acts: one step, or sub-steps
-            level, of_sub, parts = FINE, FINE, 1
+            level = FINE
             if together:
-                level = of_sub = COARSE
-                if not flight:
-                    level = NEAR
-                    smooth = smooth and smooth_contacts(contacts, now * h, near * h, R * h)
-                    of_sub = MIDDLE if smooth else FINE
-                    parts = near // R if smooth else near
-            if of_sub != MIDDLE:
-                none_far(contacts)
+                level = COARSE if flight else NEAR
             steps = _steps_of(level, M, near)
+            if together and apart:
+                mark_far_ones(contacts, bodies, level, steps * h)
+            else:
+                mark_none_far(contacts, bodies)
+            of_sub, parts = level, 1
+            if level == NEAR:
+                smooth = smooth and smooth_films(contacts, near * h, R * h)
+                of_sub = MIDDLE if smooth else FINE
+                parts = near // R if smooth else near
             step = Step(level, steps, now * h, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, now * h, steps // parts * h, parts / (steps * h))
             if at != of_sub:
@@ -222,7 +230,7 @@ def run_network(
                 elif flight:
                     flight = False
                 else:
-                    smooth = False
+                    smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
             _end_step(step, of_sub, parts, loop)
@@ -237,21 +245,23 @@ def run_network(
                 clock[4] += 1
                 clock[5] += parts
                 clock[6] += parts if of_sub == FINE else 0
-                smooth = R > 1
+                smooth, apart = R > 1, True
         in_record += 1
         record_time += M * h
         if in_record == per_record:
-            bring(bodies, at, FINE)
-            at = FINE
+            bring(bodies, at, at)
             record_means(recording, record, record_time, loop.sums, loop.peaks)
             record_points(
                 recording,
                 record,
-                network.bodies,
-                network.node_state.p,
-                network.elements.state,
-                network.branches.state,
-                network.interface_state.gap,
+                bodies,
+                at,
+                loop.elements.state,
+                loop.fluid.state.p,
+                loop.fluid.nodes.nodes,
+                loop.fluid.branches.state,
+                contacts.state.gap,
+                contacts.rows.interfaces,
             )
             record += 1
             in_record, record_time = 0, 0.0
@@ -332,7 +342,7 @@ def _settle(
             clock[7] += 1
         status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop, report)
         if status == STATUS_DONE:
-            status = _push_by_rows(step, bodies, loop.elements, loop.fluid, report)
+            status = _push_by_rows(step, bodies, loop.elements, loop.fluid, contacts, report)
         if status != STATUS_DONE:
             return status
         miss(bodies, G)
@@ -364,16 +374,18 @@ def _act(
         settle in a fine step.
     """
     bodies, contacts = loop.bodies, loop.contacts
-    done, cut = 0, 0
+    done, cut, kept = 0, 0, False
+    all_parts = PARTS * sub.steps
     while done < parts:
         now = Step(sub.level, sub.steps, sub.t + done * sub.H, sub.H, sub.rate)
         if cut > 0:
-            H = sub.H / PARTS
-            now = Step(CUT, 0, now.t + (PARTS - cut) * H, H, sub.rate * PARTS)
+            H = sub.H / all_parts
+            now = Step(CUT, 0, now.t + (all_parts - cut) * H, H, sub.rate * all_parts)
         elif move:
             keep_dissipation(contacts)
-            if now.level == FINE and parts > 1:
-                keep_for_cut(bodies)
+            kept = parts > 1 and (now.level == FINE or may_touch(contacts, now.H))
+            if kept:
+                keep_for_cut(bodies, now.level)
         G = shift(bodies.G, now.level * PORTS * PORTS)
         if move:
             move_free(bodies, now.level)
@@ -385,17 +397,17 @@ def _act(
         if flight and not coarse_step_holds(contacts):
             return STATUS_MET
         if parts > 1 and cut == 0 and not contacts_hold(contacts):
-            if now.level == MIDDLE:
+            if not kept:
                 return STATUS_MET
-            begin_cut(bodies)
+            begin_cut(bodies, sub.level)
             begin_cut_contacts(contacts)
-            cut = PARTS
+            cut = all_parts
             continue
         end_interfaces(
             contacts,
             bodies.at,
             now,
-            done == 0 and (cut == 0 or cut == PARTS),
+            done == 0 and (cut == 0 or cut == all_parts),
             loop.accounts,
             loop.recording,
             _interface_sums(loop),
@@ -407,11 +419,9 @@ def _act(
         else:
             cut -= 1
             if cut == 0:
-                bring(bodies, CUT, FINE)
+                bring(bodies, CUT, sub.level)
                 done += 1
-    if sub.level == MIDDLE and not far_ones_stay(contacts, bodies.at):
-        return STATUS_MET
-    return STATUS_DONE
+    return STATUS_DONE if far_ones_stay(contacts, bodies.at) else STATUS_MET
 
 
 @unfolded
@@ -427,10 +437,11 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
         end_nodes(fluid, H, accounts)
+    end_far_films(loop.contacts, step, accounts, loop.recording, _interface_sums(loop), loop.peaks)
     if step.level != FINE:  # fine steps owe nothing but round-off
         repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
     catch_up(bodies, level, step.level, parts == 1)
-    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, H)
+    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at)
     end_ports(bodies)
 
 
@@ -442,8 +453,10 @@ def _interface_sums(loop: Any) -> Any:
 
 
 @phase
-def _push_by_rows(step: Step, bodies: Any, elements: Any, fluid: Any, report: Any) -> int:
-    """Forces of elements and fluid for the way that their ports went."""
+def _push_by_rows(
+    step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, report: Any
+) -> int:
+    """Forces of elements, fluid and far films for the way that their ports went."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[ANSWER + i] = 0.0
@@ -451,6 +464,7 @@ def _push_by_rows(step: Step, bodies: Any, elements: Any, fluid: Any, report: An
     if status == STATUS_DONE and fluid.nodes.nodes > 0:
         status = solve_pressures(fluid, S, step, report)
         push_by_fluid(fluid, S)
+    push_by_far_films(contacts, S, step)
     S[ANSWER + bodies.ports] = 0.0  # what pushes the ground moves nothing
     return status
 

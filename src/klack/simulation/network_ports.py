@@ -37,6 +37,7 @@ __all__ = [
     "begin_cut",
     "begin_macro_step",
     "begin_ports",
+    "block_of",
     "bring",
     "catch_up",
     "end_ports",
@@ -79,14 +80,15 @@ def begin_ports(bodies: Any) -> None:
 
 
 @phase
-def _block(bodies: Any, k: int, level: int) -> Any:
+def block_of(bodies: Any, k: int, level: int) -> Any:
+    """Numbers of a block of modes, with the matrices of a size of step."""
     return shift(bodies.laid_out, level * bodies.size + bodies.start[k])
 
 
 @phase
 def _copy_state(bodies: Any, source: int, target: int) -> None:
     for k in range(bodies.blocks):
-        a, b = _block(bodies, k, source), _block(bodies, k, target)
+        a, b = block_of(bodies, k, source), block_of(bodies, k, target)
         copy_state(a, b, bodies.modes[k])
 
 
@@ -95,7 +97,7 @@ def bring(bodies: Any, source: int, target: int) -> None:
     """Bring the modes from one size of step to another, with the forces that are pending."""
     S = bodies.at
     for k in range(bodies.blocks):
-        block = _block(bodies, k, source)
+        block = block_of(bodies, k, source)
         apply_forces(block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k])
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
@@ -115,25 +117,25 @@ def _kept_at(level: int) -> int:
 
 
 @phase
-def keep_for_cut(bodies: Any) -> None:
-    """Keep the state of the modes where a fine step begins, for the parts it may be cut into."""
-    _copy_state(bodies, FINE, CUT)
+def keep_for_cut(bodies: Any, level: int) -> None:
+    """Keep the state of the modes where a sub-step begins, for the parts it may be cut into."""
+    _copy_state(bodies, level, CUT)
 
 
 @phase
 def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int) -> float:
     """Let the forces of a row have acted over a step of size ``of``; the energy that this adds."""
-    block, step = _block(bodies, k, level), _block(bodies, k, of)
+    block, step = block_of(bodies, k, level), block_of(bodies, k, of)
     port0, port1 = bodies.port0[k], bodies.port1[k]
     return kick(block, step, bodies.modes[k], shift(bodies.at, forces), port0, port1)
 
 
 @phase
-def begin_cut(bodies: Any) -> None:
-    """Begin a fine step once more, in parts, with the forces that were pending."""
+def begin_cut(bodies: Any, level: int) -> None:
+    """Begin a sub-step once more, in parts, with the forces that were pending."""
     S = bodies.at
     for k in range(bodies.blocks):
-        _kick_block(bodies, k, CUT, FINE, PENDING)
+        _kick_block(bodies, k, CUT, level, PENDING)
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
 
@@ -168,7 +170,7 @@ def move_free(bodies: Any, level: int) -> None:
         S[FREE + i] = 0.0
     for k in range(bodies.blocks):
         port0, port1 = bodies.port0[k], bodies.port1[k]
-        block = _block(bodies, k, level)
+        block = block_of(bodies, k, level)
         advance(block, bodies.modes[k], shift(S, PENDING), port0, port1, shift(S, FREE))
 
 

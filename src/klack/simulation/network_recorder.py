@@ -17,7 +17,7 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
 from klack.simulation.network_compile import CompiledNetwork
-from klack.simulation.network_record import record_points
+from klack.simulation.network_record import record_start
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder", "recorded_columns"]
@@ -128,16 +128,7 @@ class Recorder:
 
     def start(self, time: float, finder: ImpactFinder, *, fresh: bool) -> None:
         """Record the present state as that before the first step."""
-        network = self.network
-        record_points(
-            self.recording,
-            0,
-            network.bodies,
-            network.node_state.p,
-            network.elements.state,
-            network.branches.state,
-            network.interface_state.gap,
-        )
+        record_start(self.recording, self.network.arrays)
         self._points[:, 0] = self.recording.points[0]
         if fresh:  # a run that goes on knows this moment
             none = [np.empty((0, _FINE))] * len(self._fine)
