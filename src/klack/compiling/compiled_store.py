@@ -20,6 +20,7 @@ from numba.core.serialize import dumps
 
 from klack.compiling.code_key import code_key
 from klack.compiling.compiled_folder import compiled_folder, is_trusted, warn_once
+from klack.compiling.inner_code import InnerCode
 from klack.compiling.turn import Turn, take_turn
 from klack.errors import InputError
 from klack.own_file import caller
@@ -111,7 +112,10 @@ class CompiledStore(_Cache):
         if content is None:
             return None
         try:
-            return CompileResult._rebuild(target_context, *pickle.loads(content))
+            state = pickle.loads(content)
+            if InnerCode.is_stored_in(state):
+                return InnerCode.restored(target_context, state)
+            return CompileResult._rebuild(target_context, *state)
         except (AttributeError, ImportError, LookupError, TypeError, ValueError, EOFError):
             return None  # of another numba that calls itself the same
 
