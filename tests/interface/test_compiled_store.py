@@ -3,6 +3,7 @@
 Truth: the results of plain Python, and the number of functions that numba compiles.
 """
 
+import hashlib
 import json
 import os
 import subprocess
@@ -25,17 +26,20 @@ import called
 
 @njit
 def whole(x):
-    {text}return part(x, ) + 1.0
+    {text}return part(x, ) + {added}
 
 part = called.part
 """
 RUN = """
-import json, sys, warnings
+import json, os, sys, warnings
 sys.path.insert(0, {folder!r})
 from klack.warming.counted import counted
 from numba.core import event
 warnings.simplefilter("always")
 import calls
+if "FILE_LIMIT" in os.environ:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(os.environ["FILE_LIMIT"]),) * 2)
 with counted() as count, warnings.catch_warnings(record=True) as said:
     warnings.simplefilter("always")
     value = calls.whole(2.0)
@@ -56,9 +60,9 @@ def program(tmp_path):
     return tmp_path
 
 
-def write(folder: Path, scale: float = 3.0, text: str = "") -> None:
+def write(folder: Path, scale: float = 3.0, text: str = "", added: float = 1.0) -> None:
     (folder / "called.py").write_text(CALLED.format(scale=scale))
-    (folder / "calls.py").write_text(CALLS.format(text=text))
+    (folder / "calls.py").write_text(CALLS.format(text=text, added=added))
     script = RUN.format(folder=str(folder)).replace("import calls\n", COUNTING + "import calls\n")
     (folder / "run.py").write_text(script)
 
@@ -101,6 +105,23 @@ def test_code_from_another_file_is_never_stale(program):
     assert end(start(program)) == [11.0, 2, []]
 
 
+def test_an_inner_function_from_the_store_is_linked_into_a_new_caller(program):
+    end(start(program))
+
+    write(program, added=2.0)
+
+    assert end(start(program)) == [8.0, 1, []]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for the machine code of Linux")
+def test_only_entries_have_machine_code(program):
+    end(start(program))
+    inner, entry = (file.read_bytes() for file in files(program))
+
+    assert b"\x7fELF" not in inner
+    assert b"\x7fELF" in entry
+
+
 def test_a_text_that_changes_compiles_nothing(program):
     write(program, text='"""One."""\n    ')
     assert end(start(program)) == [7.0, 2, []]
@@ -127,7 +148,10 @@ def test_code_of_another_processor_is_not_run(program):
     assert end(start(program)) == [7.0, 0, []]
 
 
-@pytest.mark.parametrize("damage", [b"", b"klack code 1\n", None])
+NOT_PICKLED = b"klack code 1\n" + hashlib.sha256(b"code").digest() + b"code"
+
+
+@pytest.mark.parametrize("damage", [b"", b"klack code 1\n", b"klack code 0\n", NOT_PICKLED, None])
 def test_damaged_code_is_compiled_again(program, damage):
     end(start(program))
     for file in files(program):
@@ -150,8 +174,15 @@ def test_code_that_others_may_write_is_not_run(program):
     assert len(said) == 1
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for the administrator")
-def test_a_read_only_store_is_read(program):
+def _writes_everywhere(folder: Path) -> bool:
+    closed = folder / "closed"
+    closed.mkdir(mode=0o500)
+    return os.access(closed, os.W_OK)
+
+
+def test_a_read_only_store_is_read(program, tmp_path):
+    if _writes_everywhere(tmp_path):
+        pytest.skip("nothing is read-only for the administrator")
     end(start(program))
     folder = files(program)[0].parent
     folder.chmod(0o500)
@@ -163,6 +194,17 @@ def test_a_read_only_store_is_read(program):
         folder.chmod(0o700)
     assert (value, compiled) == (11.0, 2)
     assert "read-only" in said[0]
+
+
+def test_a_full_disk_is_one_warning(program):
+    """As a limit of the size of files, which the system reports in the same way."""
+    value, compiled, said = end(start(program, FILE_LIMIT="100"))
+
+    assert (value, compiled) == (7.0, 2)
+    assert len(said) == 1
+    assert "compiled functions are not cached" in said[0]
+    assert files(program, "*") == []
+    assert end(start(program)) == [7.0, 2, []]
 
 
 def test_without_a_folder_everything_works(program):

@@ -69,7 +69,6 @@ class WarmedJson(TypedDict):
 
     compiled: Annotated[int, Field(description="Functions; 0 if all were there.")]
     compile_time_s: float
-    wall_time_s: float
 
 
 class WarmJson(TypedDict):

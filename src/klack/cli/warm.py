@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED, Wanted
+from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import WarmJson
@@ -19,11 +19,11 @@ def warm(
     clear: Annotated[
         bool, Parameter(negative="", help="Delete what is there, and compile all of it.")
     ] = False,
-    wanted: Wanted = WANTED,
+    wanted: Shown = SHOWN,
 ) -> int:
     """Compile ahead what strokes and impacts need, once for each processor and version.
 
-    Without it the first command compiles, for a minute or less.
+    Without it the first command compiles, for half a minute or so.
     What is there already is not compiled again.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """
@@ -34,7 +34,6 @@ def warm(
         is_usable,
         stored,
     )
-    from klack.cores import available_cores
     from klack.errors import InputError
     from klack.memory import in_words
     from klack.terminal.tables import TextTable
@@ -59,11 +58,10 @@ def warm(
                 expected="files that may be deleted",
                 hint=f"check who owns the folder, or set {FOLDER_VARIABLE} to another one.",
             ) from error
-    processes = min(wanted.threads or available_cores(), len(GROUPS))
     done: list[Warmed] = []
     with show_progress(wanted.quiet) as progress:
         progress("compile", 0.0)
-        for group in warm_groups(tuple(GROUPS), processes):
+        for group in warm_groups(tuple(GROUPS)):
             done.append(group)
             progress("compile", len(done) / len(GROUPS))
     count, size = stored(folder)
@@ -73,7 +71,7 @@ def warm(
             str(group.functions) if group.functions else "-",
             f"{group.seconds:.1f} s" if group.functions else "was there",
         ]
-        for group in sorted(done, key=lambda group: tuple(GROUPS).index(group.name))
+        for group in done
     ]
     wanted.show(
         [
@@ -96,7 +94,6 @@ def _numbers(done: "list[Warmed]", folder: str, count: int, size: int) -> "WarmJ
             group.name: {
                 "compiled": group.functions,
                 "compile_time_s": group.seconds,
-                "wall_time_s": group.wall_time,
             }
             for group in done
         },

@@ -28,6 +28,7 @@ _SETTINGS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "LLVM_REFPRUNE_PASS", "BOUNDSCHECK"),
     *("DEBUGINFO_DEFAULT", "ENABLE_AVX", "DISABLE_INTEL_SVML", "CPU_NAME", "CPU_FEATURES"),
 )
+_COMPILERS = ("klack.compiling.compilers", "klack.compiling.inner_code")
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
@@ -70,7 +71,7 @@ def _surroundings() -> str:
     """Versions and settings that decide which code is made."""
     settings = {name: repr(getattr(config, name, None)) for name in _SETTINGS}
     versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
-    return repr((versions, settings))
+    return repr((versions, settings, *map(_file_digest, _COMPILERS)))
 
 
 def _type_words(kind: Any) -> str:

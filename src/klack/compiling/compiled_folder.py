@@ -80,7 +80,7 @@ def clear_folder(folder: Path) -> None:
     """
     with suppress(FileNotFoundError):
         for entry in os.scandir(folder):
-            if entry.name.endswith((".code", ".ready", ".part")):
+            if entry.name.endswith((".code", ".part")):
                 Path(entry.path).unlink(missing_ok=True)
 
 

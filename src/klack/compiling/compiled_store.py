@@ -29,6 +29,10 @@ __all__ = ["CompiledStore"]
 
 _CHECKSUM = 32  # bytes
 _FORMAT = b"klack code 1\n"
+_UNREADABLE = (
+    *(AttributeError, ImportError, LookupError, TypeError, ValueError, EOFError),
+    *(RuntimeError, pickle.PickleError),  # of LLVM, of pickle
+)
 
 
 class CompiledStore(_Cache):
@@ -116,7 +120,7 @@ class CompiledStore(_Cache):
             if InnerCode.is_stored_in(state):
                 return InnerCode.restored(target_context, state)
             return CompileResult._rebuild(target_context, *state)
-        except (AttributeError, ImportError, LookupError, TypeError, ValueError, EOFError):
+        except _UNREADABLE:
             return None  # of another numba that calls itself the same
 
 

@@ -32,17 +32,28 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
             yield bar
     else:
         lines = _Lines()
-        yield lines
+        try:
+            yield lines
+        finally:
+            lines.compiling.forget()
         lines.finish()
 
 
 class _Lines:
-    """One line on stderr for each stage that took its time."""
+    """One line on stderr for each stage that took its time, and one if something is compiled."""
 
     def __init__(self) -> None:
         self.stage, self.start = "", time.perf_counter()
+        self.compiling = _Compiling(self._tell)
+        self._has_told = False
+
+    def _tell(self, on: bool) -> None:
+        if on and not self._has_told:
+            self._has_told = True
+            print("compiling (once); 'klack warm' does it ahead", file=sys.stderr, flush=True)
 
     def __call__(self, stage: str, fraction: float) -> None:
+        self.compiling.watch()
         if stage != self.stage:
             self.finish()
             self.stage, self.start = stage, time.perf_counter()

@@ -1,1 +1,1 @@
-"""Compile ahead: what a command will need, in processes of their own."""
+"""Compile ahead what a command will need."""

@@ -1,15 +1,15 @@
-"""Compile all groups, several at a time, each in a process of its own."""
+"""Compile all groups, one after another."""
 
-import subprocess
-import sys
+import os
+import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from time import perf_counter
 
-from klack.compiling.ahead import start_compiling, stop_compiling
-from klack.errors import ConvergenceError
+from klack.cache.setting import FOLDER_VARIABLE
+from klack.errors import CacheWarning
+from klack.warming.counted import counted
+from klack.warming.groups import GROUPS
 
 __all__ = ["Warmed", "warm"]
 
@@ -24,56 +24,38 @@ class Warmed:
     functions : int
         Functions of klack that had to be compiled for it; 0 if all were there.
     seconds : float [s]
-        Spent on compiling.
-    wall_time : float [s]
-        From the start of its process to the end, waiting for others included.
+        Spent on compiling, waiting for other processes included.
     """
 
     name: str
     functions: int
     seconds: float
-    wall_time: float
 
 
-def warm(groups: Sequence[str], processes: int) -> Iterator[Warmed]:
+def warm(groups: Sequence[str]) -> Iterator[Warmed]:
     """Compile groups of functions; yield each when it is done.
 
-    Raises
-    ------
-    ConvergenceError
-        If the calculation of a group fails: with the last line of what it wrote.
+    In one process: groups share most of their functions, and what two processes compile at the
+    same time costs more than it saves unless two cores are free.
     """
-    running: list[subprocess.Popen[bytes]] = []
-    with ThreadPoolExecutor(processes) as pool:
-        try:
-            for future in as_completed([pool.submit(_warm, name, running) for name in groups]):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in running:
-                stop_compiling(process)
+    for name in groups:
+        with _computed_anew(), counted() as count:
+            GROUPS[name].compute()
+        yield Warmed(name=name, functions=count.functions, seconds=count.seconds)
 
 
-def _warm(name: str, running: "list[subprocess.Popen[bytes]]") -> Warmed:
-    begin = perf_counter()
-    process = start_compiling([name], output=subprocess.PIPE)
-    running.append(process)
-    assert process.stdout is not None
-    assert process.stderr is not None
-    with ThreadPoolExecutor(1) as pool:
-        said = pool.submit(process.stderr.read)
-        words = process.stdout.read().split()
-        problem = said.result().decode(errors="replace").strip().splitlines()
-    code = process.wait()
-    if code != 0 or len(words) != 3:
-        last = problem[-1] if problem else f"exit code {code}"
-        raise ConvergenceError(
-            f"group '{name}' was not compiled: {last}\n"
-            f"Try: {Path(sys.executable).name} -P -m klack.warming {name}, which shows all of it."
-        )
-    return Warmed(
-        name=name,
-        functions=int(words[2]),
-        seconds=float(words[1]),
-        wall_time=perf_counter() - begin,
-    )
+@contextmanager
+def _computed_anew() -> Iterator[None]:
+    """Without stored results, which need no functions, and without words about the cases."""
+    before = os.environ.get(FOLDER_VARIABLE)
+    os.environ[FOLDER_VARIABLE] = "off"
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", category=UserWarning)
+            warnings.filterwarnings("always", category=CacheWarning)
+            yield
+    finally:
+        if before is None:
+            del os.environ[FOLDER_VARIABLE]
+        else:
+            os.environ[FOLDER_VARIABLE] = before

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.compiling.ahead import LOOP_AND_REST, compiling_ahead
 from klack.network.accuracy import Accuracy
 from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
@@ -82,19 +81,18 @@ def stroke(
         from klack.analyses.stroke.analysis import STROKE
 
         after = STROKE.load(continued) if continued is not None else None
-    with compiling_ahead(LOOP_AND_REST, asked.threads, quiet=asked.quiet):
-        from klack.analyses.stroke.record import IncompleteStrokeError
-        from klack.analyses.stroke.run import run_stroke
+    from klack.analyses.stroke.record import IncompleteStrokeError
+    from klack.analyses.stroke.run import run_stroke
 
-        incomplete: Exception | None = None
-        with show_progress(asked.quiet) as progress:
-            try:
-                study = run_stroke(
-                    checked, variants=wanted, after=after, progress=progress, threads=asked.threads
-                )
-            except IncompleteStrokeError as error:
-                study, incomplete = error.study, error
-        return ending.end(STROKE, study, incomplete=incomplete)
+    incomplete: Exception | None = None
+    with show_progress(asked.quiet) as progress:
+        try:
+            study = run_stroke(
+                checked, variants=wanted, after=after, progress=progress, threads=asked.threads
+            )
+        except IncompleteStrokeError as error:
+            study, incomplete = error.study, error
+    return ending.end(STROKE, study, incomplete=incomplete)
 
 
 def _checked_case(
