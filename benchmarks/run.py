@@ -30,7 +30,7 @@ from number import Number, Size, number_of
 __all__ = ["PARTS", "changes", "main", "measure"]
 
 PARTS = {
-    "start_up": "klack --help, import, first small impact",
+    "start_up": "klack --help, import, first small impact, first stroke",
     "kernel": "the reduced time integration, beside its error",
     "modes": "the kernel over the number of modes",
     "limit": "bytes moved against the bandwidth of the machine",

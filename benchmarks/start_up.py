@@ -1,4 +1,4 @@
-"""Time until klack answers: its help, its import, a first small impact."""
+"""Time until klack answers: its help, its import, a first small impact, a first stroke."""
 
 import os
 import subprocess
@@ -35,7 +35,25 @@ def numbers(size: Size) -> list[Number]:
         with tempfile.TemporaryDirectory() as cache:
             seconds = _with_output(impact, 1, NUMBA_CACHE_DIR=cache)
         found.append(Number(name="the same with nothing compiled yet", value=seconds, unit="s"))
+        found += _strokes(repeats)
     return found
+
+
+def _strokes(repeats: int) -> list[Number]:
+    """The first stroke of an account, which meshes and compiles, and those after it."""
+    stroke = [*_KLACK, "stroke", "demo-stroke", "--variant", "wet", "--quiet"]
+    bare = [*stroke, "--no-report"]
+    with tempfile.TemporaryDirectory() as cache:
+        variables = {"NUMBA_CACHE_DIR": cache, "KLACK_CACHE": str(Path(cache) / "results")}
+        first = _with_output(bare, 1, **variables)
+        second = _with_output(bare, repeats, **variables)
+        reported = _with_output(stroke, repeats, **variables)
+    name = "klack stroke demo-stroke, wet"
+    return [
+        Number(name=f"{name}, nothing compiled yet", value=first, unit="s", goal=30.0),
+        Number(name=f"{name}, second call", value=second, unit="s", goal=5.0),
+        Number(name=f"{name}, second call with the report", value=reported, unit="s"),
+    ]
 
 
 def _best(command: list[str], repeats: int, **variables: str) -> float:
