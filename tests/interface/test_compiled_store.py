@@ -240,6 +240,26 @@ def test_a_killed_process_leaves_no_lock_behind(program, tmp_path):
     assert not lock.exists()
 
 
+def test_a_function_that_cannot_be_compiled_says_so_each_time(program):
+    """The second try must not wait for the lock of the first."""
+    (program / "run.py").write_text(f"""
+import sys
+sys.path.insert(0, {str(program)!r})
+import calls
+for _ in range(2):
+    try:
+        calls.whole("text")
+    except Exception as error:
+        print(type(error).__name__)
+""")
+    process = start(program)
+    try:
+        told, _ = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert told.split() == ["TypingError"] * 2
+
+
 def test_who_waits_too_long_compiles_itself(tmp_path):
     from klack.compiling.turn import take_turn
 

@@ -74,6 +74,8 @@ class CompiledStore(_Cache):
             return None
         target_context.refresh()
         path = self._path(folder, sig, target_context.codegen())
+        if path.name in self._turns:  # compiled here before, and failed
+            return None
         found = self._read(path, target_context)
         if found is not None or not _prepared(folder):
             return found
