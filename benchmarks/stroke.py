@@ -32,7 +32,7 @@ from klack.verification.whole_valve import peak_and_hold, whole_valve
 
 __all__ = ["books_rows", "cvode_rows", "main", "numbers", "speed_rows", "step_rows"]
 
-STEP, COARSE, RECORD = 20e-9, 32, 1.28e-6
+STEP, COARSE, RECORD = 20e-9, 64, 1.28e-6
 STROKE = 10e-3
 STEPS = (80e-9, 40e-9, 20e-9, 10e-9, 5e-9)
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
