@@ -70,11 +70,11 @@ PORTS = 64
 
 FINE, COARSE, NEAR, MIDDLE, CUT = 0, 1, 2, 3, 4
 """The fine step; macro steps of many of them, in flight and about a touch; sub-steps of a few, for
-smooth contact forces; and parts of a fine step in which a contact closes or opens."""
+smooth films; and parts of a sub-step in which a contact closes or opens."""
 
 
 PARTS = 8
-"""Parts of a fine step that is cut."""
+"""Parts of each fine step in a sub-step that is cut."""
 
 # Rows at constant distances: the compiler knows that none overlaps another.
 Y0 = 0 * PORTS  # displacements at the start of the step

@@ -4,8 +4,8 @@ One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 
 1. **Guess** the forces of elements and fluid, constant over the macro step.
 2. **Act**: modes move exactly, contacts and films find their mean forces.  Far from each other or
-   at rest, in one step of ``H``; else in sub-steps, the fine ones ``h`` about first touch and
-   release, and some of them together while contact forces are smooth.
+   at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of one where films
+   change fast.  A sub-step in which a contact closes or opens is cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the way that their ports went.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
    are linear, so that adding the response is exact.  Elements, fluid and interfaces see the
@@ -169,8 +169,8 @@ def run_network(
 ) -> int:
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
-    ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while contact
-    forces are smooth.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row of a failure,
+    ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while films are
+    smooth.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row of a failure,
     its status and its time.
     """
     loop = _begin(network, recording, scratch)

@@ -12,7 +12,7 @@ from klack.simulation.rest import bounce_time
 __all__ = ["StepSizes", "largest_divisor", "step_sizes"]
 
 _MOST_COARSE = 256
-_MIDDLE = 4  # fine steps of a sub-step while contact forces are smooth
+_MIDDLE = 4  # fine steps of a sub-step while films are smooth
 _OF_BOUNCE = 0.01  # such a sub-step over the time of an impact: 4e-5 of the peak force
 _WHOLE = 1e-6  # of a step
 
@@ -24,13 +24,13 @@ class StepSizes:
     Parameters
     ----------
     step : float [s]
-        Fine step of bodies, contacts and films, about first touch and release.
+        Fine step of bodies, contacts and films, where films change fast.
     coarse : int
         Fine steps of a macro step in flight, after which elements and fluid answer; 1 for none.
     near : int
         Fine steps of a macro step about a touch; divides ``coarse``.
     middle : int
-        Fine steps of a sub-step while contact forces are smooth; divides ``near``.
+        Fine steps of a sub-step while films are smooth; divides ``near``.
     """
 
     step: float
