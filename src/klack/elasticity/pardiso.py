@@ -84,6 +84,11 @@ class PardisoFactorization(Closing):
         analysis, permanent, factor = (int(v) for v in self._settings[14:17])
         return 1024 * max(analysis, permanent + factor)
 
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the numbers of the factor."""
+        return np.dtype(self._type)
+
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B for one or several columns."""
         return self._substitute(_SOLVE, B)
