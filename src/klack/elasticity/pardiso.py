@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy.sparse import triu
 
 from klack.closing import Closing
-from klack.elasticity.factor_memory import out_of_memory, require_factor_memory
+from klack.elasticity.budget import WITHOUT, Budget
+from klack.elasticity.factor_memory import out_of_memory
 from klack.elasticity.factorization import Precision, not_positive_definite
 from klack.errors import ConvergenceError
 
@@ -43,6 +44,7 @@ class PardisoFactorization(Closing):
         precision: Precision = "double",
         *,
         definite: bool = True,
+        budget: Budget = WITHOUT,
     ) -> None:
         self._mkl = _library()
         self._kind = _SPD if definite else _INDEFINITE
@@ -60,14 +62,14 @@ class PardisoFactorization(Closing):
             self, _free, self._mkl, self._handle, self._settings, self._kind, self.size
         )
         try:
-            self._factorise(A.nnz)
+            self._factorise(A.nnz, precision, budget)
         except BaseException:
             self.close()
             raise
         self.nonzeros: int | None = int(self._settings[17])
         self.memory: int | None = self._told_memory()
 
-    def _factorise(self, entries: int) -> None:
+    def _factorise(self, entries: int, precision: Precision, budget: Budget) -> None:
         """Order the matrix and count the entries of its factor; then, if they fit, compute them."""
         empty = np.zeros(self.size, dtype=self._type)
         for phase in (_ANALYSE, _FACTOR):
@@ -77,7 +79,8 @@ class PardisoFactorization(Closing):
             if error:
                 raise _failure(error)
             if phase == _ANALYSE:
-                require_factor_memory(self.backend, self.size, entries, self._told_memory())
+                needed = self._told_memory()
+                budget.require(self.backend, self.size, entries, needed, precision)
 
     def _told_memory(self) -> int:
         """Peak memory [byte] as MKL reports it after its analysis: iparm(15) to iparm(17)."""
