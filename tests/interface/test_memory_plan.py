@@ -86,7 +86,7 @@ def test_where_double_precision_does_not_fit_single_precision_is_refined(machine
 
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
     assert len(lines) == 2
-    assert "in single precision instead" in lines[0]
+    assert "taken in single precision, and solutions are refined" in lines[0]
     assert "factor in single precision" in lines[1]
 
 

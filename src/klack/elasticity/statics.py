@@ -104,7 +104,10 @@ class Flexibility(Closing):
             if chosen_backend(backend) != "pardiso":
                 raise
             refused = error
-        budget.tell(f"memory of '{budget.name}': {refused.got}: in single precision instead")
+        budget.tell(
+            f"memory of '{budget.name}': got {refused.got}, expected {refused.expected}: the "
+            "factor is taken in single precision, and solutions are refined"
+        )
         try:
             rough = factorize(
                 K, backend=backend, threads=threads, precision="single", budget=budget
