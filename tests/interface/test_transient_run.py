@@ -156,6 +156,7 @@ def test_mobility_adds_up_all_directions():
 
     dense = np.linalg.solve(a.M.toarray()[np.ix_(a.free, a.free)], G.T)
     np.testing.assert_allclose(columns, (G @ dense)[:, points], rtol=1e-9)
+    np.testing.assert_allclose(inverse.whole_mobility(csr_array(G)), G @ dense, rtol=1e-9)
     np.testing.assert_allclose(inverse.solve(G.T), dense, rtol=0, atol=1e-9 * abs(dense).max())
     inverse.close()
 

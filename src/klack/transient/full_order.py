@@ -329,6 +329,7 @@ class _Motion:
         self.G_transposed = csr_array(self.G.T)
         self.G_axis = self.G @ self.axis
         self.mobility = np.zeros((self.G.shape[0],) * 2)
+        self.mobility_known = False
         S = self.M * (4.0 / step**2) + self.K
         if self.damping is not None:
             self.C = DampingMatrix.of(self.damping, self.body, csr_array(M))
@@ -349,10 +350,15 @@ class _Motion:
     def learn(self, points: NDArray[np.int64]) -> None:
         """Compute the response to contact points that come near for the first time."""
         self.solve.learn(points)
-        if self.inverse_mass is not None:
-            columns = self.inverse_mass.mobility(self.G, points)
-            self.mobility[:, points] = columns
-            self.mobility[points] = columns.T
+        if self.inverse_mass is None or self.mobility_known:
+            return
+        self.mobility_known = 2 * len(points) >= len(self.mobility)
+        if self.mobility_known:  # half the work for each point
+            self.mobility = self.inverse_mass.whole_mobility(self.G)
+            return
+        columns = self.inverse_mass.mobility(self.G, points)
+        self.mobility[:, points] = columns
+        self.mobility[points] = columns.T
 
     def close(self) -> None:
         """Give the memory of the factors back."""
