@@ -57,7 +57,7 @@ _PROFILE = (
 _RIBS, _BOLTS = 6, 4
 
 
-def ribbed_housing(folder: Path, size: float) -> Case:
+def ribbed_housing(folder: Path, size: float, contact: float = 0.04) -> Case:
     """Needle of the demo valve over a cup with six ribs and a flange held at four bolt holes.
 
     Elements of 0.75 mm give 250 000 degrees of freedom.
@@ -68,10 +68,14 @@ def ribbed_housing(folder: Path, size: float) -> Case:
         Gets the STEP file and the case.
     size : float [mm]
         Of the elements of the housing, away from the contact.
+    contact : float [mm]
+        Of the elements at the contact.
     """
     _write_housing(folder / "housing.step")
     file = folder / "case.yaml"
-    file.write_text(_CASE.replace("SIZE", f"{size:g}"), encoding="utf-8")
+    file.write_text(
+        _CASE.replace("SIZE", f"{size:g}").replace("0.04 mm", f"{contact:g} mm"), encoding="utf-8"
+    )
     return load_case(file)
 
 

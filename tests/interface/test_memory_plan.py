@@ -123,9 +123,16 @@ def test_a_body_too_slender_for_single_precision_names_what_double_takes(machine
 
 
 def test_other_solvers_have_one_precision(machine, block):
-    machine.available = 1e3
+    machine.available = 10e6  # copies of the matrix fit
     with pytest.raises(FactorMemoryError, match=r"\(superlu\) that takes"):
         Flexibility(block, backend="superlu")
+
+
+def test_copies_of_the_matrix_are_counted_first(machine, block):
+    """On the way into the solver, before its symbolic phase can count."""
+    machine.available = 1e6
+    with pytest.raises(InputError, match=r"factorisation of body 'block': got the stiffness of"):
+        Flexibility(block)
 
 
 def test_matrices_that_do_not_fit_are_refused(machine, block):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import triu
+from scipy.sparse import triu, vstack
 
 from klack.closing import Closing
 from klack.elasticity.budget import WITHOUT, Budget
@@ -30,6 +30,7 @@ _SPD, _INDEFINITE = 2, -2
 _ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 _ERRORS = {-3: "reordering failed", -8: "more than 2^31 entries"}
 _NO_MEMORY = (-2, -9)
+_ROWS = 2**16
 
 
 class PardisoFactorization(Closing):
@@ -52,7 +53,10 @@ class PardisoFactorization(Closing):
         self._type = np.float32 if precision == "single" else np.float64
         self._handle = np.zeros(64, dtype=np.int64)
         self._settings = _settings(precision, definite)
-        upper = triu(A, format="csr")
+        # some rows at a time: the whole would pass through coordinates, twice its size
+        blocks = [triu(A[at : at + _ROWS], k=at) for at in range(0, A.shape[0], _ROWS)]
+        upper = vstack(blocks, format="csr")
+        del blocks
         upper.sort_indices()
         self._values = np.ascontiguousarray(upper.data, dtype=self._type)
         self._indices = upper.indices.astype(np.int32, copy=False)

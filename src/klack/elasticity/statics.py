@@ -37,10 +37,12 @@ from klack.elasticity.factor_memory import FactorMemoryError
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
 from klack.elasticity.refined import RefinedFactorization
 from klack.errors import InputError
+from klack.memory import require_memory
 
 __all__ = ["Flexibility"]
 
 _CHUNK = 64
+_COPIES = 2 * 12.0  # bytes for each entry of K: a copy, and what it passes through
 _POSITIVE = Entry(arrays={}, text="positive definite")
 
 Result = TypeVar("Result")
@@ -91,6 +93,12 @@ class Flexibility(Closing):
         if self._closed:
             raise RuntimeError("this factorisation has been closed")
         if self._factor is None:
+            require_memory(
+                f"factorisation of body '{self.body.name}'",
+                _COPIES * self.body.K.nnz,
+                what=f"the stiffness of {len(self._kept)} degrees of freedom in the solver",
+                hint="larger elements away from the contact, or a machine with more memory.",
+            )
             K = self.body.K[self._kept][:, self._kept]
             self._factor = self._factorised(K)
         return self._factor
