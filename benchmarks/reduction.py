@@ -15,7 +15,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.progress import silent
 
-__all__ = ["numbers"]
+__all__ = ["largest_residual", "numbers"]
 
 _MODES = 50
 
@@ -33,7 +33,7 @@ def numbers(size: Size) -> list[Number]:
     seconds = perf_counter() - begin
     peak = peak_gigabytes()
     bodies = (problem.pair.upper, problem.pair.lower)
-    residual = max(_residual(body, pools[body.name]) for body in bodies)
+    residual = max(largest_residual(body, pools[body.name]) for body in bodies)
     problem.close()
     goals = (60.0, 3.0) if size == "full" else (None, None)
     dofs = sum(body.dof_count for body in bodies)
@@ -51,7 +51,7 @@ def numbers(size: Size) -> list[Number]:
     ]
 
 
-def _residual(body: ElasticBody, modes: Modes) -> float:
+def largest_residual(body: ElasticBody, modes: Modes) -> float:
     """Largest residual of the eigenproblem on the free degrees of freedom, relative to K x."""
     shapes = modes.shapes
     elastic = (body.K @ shapes)[body.free]

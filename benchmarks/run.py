@@ -42,6 +42,7 @@ PARTS = {
     "many_strokes": "strokes per hour at many points, on threads",
     "accuracy": "reduced against full order on the shipped cases",
     "reduction": "from a case to two reduced bodies",
+    "big_body": "the same for a housing with ribs of up to a million degrees of freedom",
     "full_order": "the impact with every degree of freedom",
     "demo": "klack demo as a whole",
 }

@@ -10,7 +10,7 @@ import numpy as np
 
 from klack.cache.result_cache import ResultCache
 from klack.errors import AccuracyWarning, InputError, KlackError
-from klack.progress import Progress
+from klack.progress import Progress, remark
 
 Found = TypeVar("Found")
 
@@ -61,6 +61,10 @@ class StageClock:
             self._book()
             self._stage = stage
         self._progress(stage, fraction)
+
+    def remark(self, line: str) -> None:
+        """Pass a line of text on."""
+        remark(self._progress, line)
 
     def _book(self) -> None:
         now = perf_counter()

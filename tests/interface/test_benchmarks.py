@@ -16,7 +16,7 @@ from types import ModuleType
 import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-LONG = ("accuracy", "calculix", "demo", "full_order", "growth", "ngsolve_peer")
+LONG = ("accuracy", "big_body", "calculix", "demo", "full_order", "growth", "ngsolve_peer")
 PARTS = (
     *("start_up", "kernel", "modes", "limit", "reduced_peers", "stroke", "many_strokes"),
     "reduction",

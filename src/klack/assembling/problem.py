@@ -10,10 +10,15 @@ from klack.case.schema import Case
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.budget import Budget
+from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
-from klack.progress import Progress
+from klack.progress import Progress, remark
 
 __all__ = ["ContactProblem", "build_problem"]
+
+_USUAL_MODES = 50  # of a case that asks for a frequency
 
 _REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 
@@ -89,9 +94,13 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
     case = _with_drawn_gap(case, pair)
     progress("factorise", 0.0)
     cache = result_cache()
-    upper = Flexibility(pair.upper, threads=threads, cache=cache)
+    upper = Flexibility(
+        pair.upper, threads=threads, cache=cache, budget=_budget(case, pair.upper, progress)
+    )
     progress("factorise", 0.5)
-    lower = Flexibility(pair.lower, threads=threads, cache=cache)
+    lower = Flexibility(
+        pair.lower, threads=threads, cache=cache, budget=_budget(case, pair.lower, progress)
+    )
     progress("factorise", 1.0)
     static = static_ladder(
         pair,
@@ -110,6 +119,18 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
         flexibility_lower=lower,
         static=static,
         opposite=build_opposite(case, pair, upper, progress, threads=threads),
+    )
+
+
+def _budget(case: Case, body: ElasticBody, progress: Progress) -> Budget:
+    """Memory that the modes of a body take while its factor is held, for the memory plan."""
+    choice = case.reduction.choice(body.name)
+    count = choice.count or choice.pool or _USUAL_MODES
+    return Budget(
+        name=body.name,
+        later=mode_memory(body, count),
+        reason=f"{count} modes",
+        tell=lambda line: remark(progress, line),
     )
 
 

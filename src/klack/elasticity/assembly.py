@@ -19,9 +19,12 @@ from klack.elasticity.quadrature import Purpose, quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
 from klack.materials import Material
+from klack.memory import require_memory
 from klack.mesh.mesh import ElementBlock, Mesh
 
 __all__ = ["SMALLEST_JACOBIAN_RATIO", "assemble"]
+
+_ENTRY = 12.0  # bytes: value and column
 
 SMALLEST_JACOBIAN_RATIO = 1e-3
 """Least accepted smallest-to-largest Jacobian within one element [-]."""
@@ -100,6 +103,13 @@ def _graph(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
             expected="fewer than 2^31 matrix entries",
             hint="use a coarser mesh away from the contact.",
         )
+    entries = len(neighbours)
+    require_memory(
+        "assemble: mesh",
+        entries * (mesh.dimension**2 * _ENTRY + mesh.dimension * _ENTRY + 8.0),
+        what=f"stiffness and mass of {mesh.dof_count} degrees of freedom",
+        hint="larger elements away from the contact.",
+    )
     return start, neighbours
 
 

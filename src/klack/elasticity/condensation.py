@@ -8,7 +8,7 @@ half the work of whole solves.  Loads that lie close together reach only a part 
 :math:`\hat Y` (a path through the elimination tree); the others are not kept.
 """
 
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,11 @@ _LARGEST_HALF = 2**29
 @runtime_checkable
 class Halves(Protocol):
     """A factorisation L L^T that can substitute forwards and backwards apart."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the numbers of L."""
+        ...
 
     def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve L Y = B."""

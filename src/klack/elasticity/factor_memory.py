@@ -11,13 +11,17 @@ from math import log2
 from klack.errors import InputError
 from klack.memory import available_memory, in_words, require_memory
 
-__all__ = ["fill_memory", "out_of_memory", "require_factor_memory"]
+__all__ = ["FactorMemoryError", "fill_memory", "out_of_memory", "require_factor_memory"]
 
 # Entries per row of the matrix that tell space from plane: 10-node tetrahedra have 80, 6-node
 # triangles 23.
 _SPATIAL = 40.0
 _PLANE = {"superlu": 130.0, "ngsolve": 100.0}  # bytes
 _SPACE = {"superlu": 600.0, "ngsolve": 500.0}
+
+
+class FactorMemoryError(InputError):
+    """A factor that does not fit into memory."""
 
 
 def fill_memory(backend: str, size: int, nonzeros: int) -> float:
@@ -28,7 +32,15 @@ def fill_memory(backend: str, size: int, nonzeros: int) -> float:
     return _PLANE[backend] * size * log2(max(size, 2))
 
 
-def require_factor_memory(backend: str, size: int, nonzeros: int, needed: float) -> None:
+def require_factor_memory(
+    backend: str,
+    size: int,
+    nonzeros: int,
+    needed: float,
+    *,
+    beside: str = "",
+    precision: str = "double",
+) -> None:
     """Refuse a factorisation that does not fit.
 
     Parameters
@@ -37,22 +49,35 @@ def require_factor_memory(backend: str, size: int, nonzeros: int, needed: float)
     size, nonzeros : int
         Rows and entries of the matrix.
     needed : float [byte]
+    beside : str
+        What of it is for other things than the factor.
+    precision : str
+        Of the factor.
 
     Raises
     ------
-    InputError
+    FactorMemoryError
         With the element size that would fit: the memory grows with h^-4 in space and with h^-2 in
         the plane.
     """
     what, hint = _words(backend, size, nonzeros, needed)
-    require_memory("factorisation", needed, what=what, hint=hint)
+    if precision == "single":
+        what += ", in single precision"
+    if beside:
+        what += f" and with {beside},"
+    try:
+        require_memory("factorisation", needed, what=what, hint=hint)
+    except InputError as error:
+        raise FactorMemoryError(
+            error.where, got=error.got, expected=error.expected, hint=error.hint
+        ) from None
 
 
-def out_of_memory(backend: str, size: int, nonzeros: int, needed: float) -> InputError:
+def out_of_memory(backend: str, size: int, nonzeros: int, needed: float) -> FactorMemoryError:
     """Build the error of a factorisation that ran out of memory."""
     what, hint = _words(backend, size, nonzeros, needed)
     there = available_memory()
-    return InputError(
+    return FactorMemoryError(
         "factorisation",
         got=f"{what} that takes about {in_words(needed)} of memory, which was not available",
         expected=f"what fits into {in_words(there.size)} ({there.bound})",

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigvalsh_tridiagonal
 
+from klack.elasticity.budget import WITHOUT, Budget
 from klack.errors import InputError
 
 __all__ = [
@@ -36,6 +37,7 @@ Precision = Literal["double", "single"]
 _LARGEST_CONDITION = 1e14
 _LARGEST_RESIDUAL = {"double": 1e-10, "single": 1e-4}
 _DEFINITE_STEPS = 16
+_ROWS = 2**16  # at once
 _ROUNDING = 1e-11
 
 
@@ -95,6 +97,7 @@ def factorize(
     backend: Backend = "auto",
     threads: int | None = None,
     precision: Precision = "double",
+    budget: Budget = WITHOUT,
 ) -> Factorization:
     """Factorise a sparse symmetric positive definite matrix.
 
@@ -110,9 +113,13 @@ def factorize(
     precision : {"double", "single"}
         Of the factor; ``"single"`` (pardiso only, the others stay double) takes half the memory and
         0.6 of the time, with relative residuals of some 1e-6.
+    budget : Budget
+        What has to fit beside the factor, and who is told its memory before it is computed.
 
     Raises
     ------
+    FactorMemoryError
+        If it does not fit.
     InputError
         If the matrix is not positive definite, or singular to working precision.
 
@@ -138,7 +145,8 @@ def factorize(
         )
     name = chosen_backend(backend)
     single = precision == "single" and name == "pardiso"
-    factor = _load(name)(A, threads, "single") if single else _load(name)(A, threads)
+    given = (A, threads, "single") if single else (A, threads)
+    factor = _load(name)(*given, budget=budget)
     try:
         _check_condition(A, factor, _LARGEST_RESIDUAL["single" if single else "double"])
         if name != "pardiso":  # which notices a negative pivot itself
@@ -197,7 +205,7 @@ def chosen_backend(backend: str) -> str:
 def _check_condition(A: Any, factor: Factorization, largest_residual: float) -> None:
     """Two inverse iterations: a lower bound of the condition number, and the residual."""
     x = np.random.default_rng(1).standard_normal(A.shape[0])
-    scale = abs(A).sum(axis=1).max()
+    scale = _largest_row(A)
     for _ in range(2):
         b = x / np.linalg.norm(x)
         x = factor.solve(b)
@@ -209,6 +217,12 @@ def _check_condition(A: Any, factor: Factorization, largest_residual: float) -> 
     residual = np.linalg.norm(A @ x - b) / (scale * np.linalg.norm(x))
     if not residual < largest_residual:
         raise not_positive_definite(f"solutions leave a residual of {residual:.1e}")
+
+
+def _largest_row(A: Any) -> float:
+    """Largest sum of magnitudes in a row, some rows at a time: A may be a gigabyte."""
+    rows = range(0, A.shape[0], _ROWS)
+    return max(float(abs(A[at : at + _ROWS]).sum(axis=1).max()) for at in rows)
 
 
 def _check_definite(factor: Factorization) -> None:

@@ -74,6 +74,8 @@ def block_lanczos(
     start: Array,
     enough: Callable[[Array], bool],
     largest_subspace: int,
+    *,
+    expected: int = 0,
 ) -> tuple[Array, Array]:
     """Largest eigenvalues and vectors of an operator A that is symmetric in M.
 
@@ -88,6 +90,9 @@ def block_lanczos(
         Told the converged leading eigenvalues, descending; says whether they suffice.
     largest_subspace : int
         Most basis vectors.
+    expected : int
+        Basis vectors to make room for, so that the basis is not copied while it grows; memory is
+        taken when they are there.
 
     Returns
     -------
@@ -97,7 +102,7 @@ def block_lanczos(
         Orthonormal in M.
     """
     b = start.shape[1]
-    space = _Subspace(M, np.empty((len(start), 12 * b), order="F"), np.zeros((0, 0)))
+    space = _Subspace(M, np.empty((len(start), max(12 * b, expected)), order="F"), np.zeros((0, 0)))
     Q, _, _ = space.orthonormalised(start)
     T = np.zeros((0, 0))
     steps = 0

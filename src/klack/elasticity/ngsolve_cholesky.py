@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.closing import Closing
-from klack.elasticity.factor_memory import fill_memory, require_factor_memory
+from klack.elasticity.budget import WITHOUT, Budget
+from klack.elasticity.factor_memory import fill_memory
 
 __all__ = ["NgsolveFactorization"]
 
@@ -21,12 +22,12 @@ class NgsolveFactorization(Closing):
 
     backend = "ngsolve"
 
-    def __init__(self, A: Any, threads: int | None = None) -> None:
+    def __init__(self, A: Any, threads: int | None = None, *, budget: Budget = WITHOUT) -> None:
         import ngsolve
 
         self.size = A.shape[0]
         needed = fill_memory(self.backend, self.size, A.nnz)
-        require_factor_memory(self.backend, self.size, A.nnz, needed)
+        budget.require(self.backend, self.size, A.nnz, needed)
         entries = A.tocoo()
         rows, columns = entries.coords
         matrix = ngsolve.la.SparseMatrixd.CreateFromCOO(

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import triu
+from scipy.sparse import triu, vstack
 
 from klack.closing import Closing
-from klack.elasticity.factor_memory import out_of_memory, require_factor_memory
+from klack.elasticity.budget import WITHOUT, Budget
+from klack.elasticity.factor_memory import out_of_memory
 from klack.elasticity.factorization import Precision, not_positive_definite
 from klack.errors import ConvergenceError
 
@@ -29,6 +30,7 @@ _SPD, _INDEFINITE = 2, -2
 _ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 _ERRORS = {-3: "reordering failed", -8: "more than 2^31 entries"}
 _NO_MEMORY = (-2, -9)
+_ROWS = 2**16
 
 
 class PardisoFactorization(Closing):
@@ -43,6 +45,7 @@ class PardisoFactorization(Closing):
         precision: Precision = "double",
         *,
         definite: bool = True,
+        budget: Budget = WITHOUT,
     ) -> None:
         self._mkl = _library()
         self._kind = _SPD if definite else _INDEFINITE
@@ -50,7 +53,10 @@ class PardisoFactorization(Closing):
         self._type = np.float32 if precision == "single" else np.float64
         self._handle = np.zeros(64, dtype=np.int64)
         self._settings = _settings(precision, definite)
-        upper = triu(A, format="csr")
+        # some rows at a time: the whole would pass through coordinates, twice its size
+        blocks = [triu(A[at : at + _ROWS], k=at) for at in range(0, A.shape[0], _ROWS)]
+        upper = vstack(blocks, format="csr")
+        del blocks
         upper.sort_indices()
         self._values = np.ascontiguousarray(upper.data, dtype=self._type)
         self._indices = upper.indices.astype(np.int32, copy=False)
@@ -60,14 +66,14 @@ class PardisoFactorization(Closing):
             self, _free, self._mkl, self._handle, self._settings, self._kind, self.size
         )
         try:
-            self._factorise(A.nnz)
+            self._factorise(A.nnz, precision, budget)
         except BaseException:
             self.close()
             raise
         self.nonzeros: int | None = int(self._settings[17])
         self.memory: int | None = self._told_memory()
 
-    def _factorise(self, entries: int) -> None:
+    def _factorise(self, entries: int, precision: Precision, budget: Budget) -> None:
         """Order the matrix and count the entries of its factor; then, if they fit, compute them."""
         empty = np.zeros(self.size, dtype=self._type)
         for phase in (_ANALYSE, _FACTOR):
@@ -77,12 +83,18 @@ class PardisoFactorization(Closing):
             if error:
                 raise _failure(error)
             if phase == _ANALYSE:
-                require_factor_memory(self.backend, self.size, entries, self._told_memory())
+                needed = self._told_memory()
+                budget.require(self.backend, self.size, entries, needed, precision)
 
     def _told_memory(self) -> int:
         """Peak memory [byte] as MKL reports it after its analysis: iparm(15) to iparm(17)."""
         analysis, permanent, factor = (int(v) for v in self._settings[14:17])
         return 1024 * max(analysis, permanent + factor)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the numbers of the factor."""
+        return np.dtype(self._type)
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B for one or several columns."""

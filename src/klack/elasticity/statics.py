@@ -16,6 +16,7 @@ factorised before is factorised again only when something is asked for that the 
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -30,13 +31,18 @@ from klack.cache.remember import remembered
 from klack.cache.result_cache import ResultCache
 from klack.closing import Closing
 from klack.elasticity.body import ElasticBody
+from klack.elasticity.budget import WITHOUT, Budget
 from klack.elasticity.condensation import condensed_inverse
+from klack.elasticity.factor_memory import FactorMemoryError
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
+from klack.elasticity.refined import RefinedFactorization
 from klack.errors import InputError
+from klack.memory import require_memory
 
 __all__ = ["Flexibility"]
 
 _CHUNK = 64
+_COPIES = 2 * 12.0  # bytes for each entry of K: a copy, and what it passes through
 _POSITIVE = Entry(arrays={}, text="positive definite")
 
 Result = TypeVar("Result")
@@ -53,6 +59,10 @@ class Flexibility(Closing):
         See :func:`klack.elasticity.factorization.factorize`.
     cache : ResultCache, optional
         Keeps what :meth:`deflections` and :meth:`remembered` compute, for later runs.
+    budget : Budget
+        What has to fit beside the factor.  Where a factor in double precision does not, one in
+        single precision is taken and its solutions are refined (pardiso only;
+        :mod:`klack.elasticity.refined`).
     """
 
     def __init__(
@@ -62,8 +72,10 @@ class Flexibility(Closing):
         backend: Backend = "auto",
         threads: int | None = None,
         cache: ResultCache | None = None,
+        budget: Budget = WITHOUT,
     ) -> None:
         self.body, self.cache = body, cache
+        self._budget = replace(budget, name=budget.name or body.name)
         self._backend, self._threads = backend, threads
         self._factor: Factorization | None = None
         self._closed = False
@@ -81,9 +93,38 @@ class Flexibility(Closing):
         if self._closed:
             raise RuntimeError("this factorisation has been closed")
         if self._factor is None:
+            require_memory(
+                f"factorisation of body '{self.body.name}'",
+                _COPIES * self.body.K.nnz,
+                what=f"the stiffness of {len(self._kept)} degrees of freedom in the solver",
+                hint="larger elements away from the contact, or a machine with more memory.",
+            )
             K = self.body.K[self._kept][:, self._kept]
-            self._factor = factorize(K, backend=self._backend, threads=self._threads)
+            self._factor = self._factorised(K)
         return self._factor
+
+    def _factorised(self, K: csr_array) -> Factorization:
+        """Factor in the precision that fits."""
+        backend, threads, budget = self._backend, self._threads, self._budget
+        try:
+            return factorize(K, backend=backend, threads=threads, budget=budget)
+        except FactorMemoryError as error:
+            if chosen_backend(backend) != "pardiso":
+                raise
+            refused = error
+        budget.tell(
+            f"memory of '{budget.name}': got {refused.got}, expected {refused.expected}: the "
+            "factor is taken in single precision, and solutions are refined"
+        )
+        try:
+            rough = factorize(
+                K, backend=backend, threads=threads, precision="single", budget=budget
+            )
+        except FactorMemoryError:
+            raise
+        except InputError as error:  # rounding has made it indefinite
+            raise refused from error
+        return RefinedFactorization(K, rough)
 
     @cached_property
     def key(self) -> str:

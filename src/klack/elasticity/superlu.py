@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from klack.closing import Closing
-from klack.elasticity.factor_memory import fill_memory, out_of_memory, require_factor_memory
+from klack.elasticity.budget import WITHOUT, Budget
+from klack.elasticity.factor_memory import fill_memory, out_of_memory
 from klack.elasticity.factorization import not_positive_definite
 
 __all__ = ["SuperluFactorization"]
@@ -18,10 +19,10 @@ class SuperluFactorization(Closing):
 
     backend = "superlu"
 
-    def __init__(self, A: Any, threads: int | None = None) -> None:
+    def __init__(self, A: Any, threads: int | None = None, *, budget: Budget = WITHOUT) -> None:
         self.size = A.shape[0]
         needed = fill_memory(self.backend, self.size, A.nnz)
-        require_factor_memory(self.backend, self.size, A.nnz, needed)
+        budget.require(self.backend, self.size, A.nnz, needed)
         try:
             # symmetric mode pivots on the diagonal, so that the fill of the ordering is kept
             factor = splu(

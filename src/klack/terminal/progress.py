@@ -58,6 +58,10 @@ class _Lines:
             self.finish()
             self.stage, self.start = stage, time.perf_counter()
 
+    def remark(self, line: str) -> None:
+        """Print a line of text."""
+        print(line, file=sys.stderr, flush=True)
+
     def finish(self) -> None:
         """Report the stage that ends, if it took long."""
         elapsed = time.perf_counter() - self.start
@@ -94,6 +98,7 @@ def _bar() -> Iterator[Progress]:
             bar.reset(task, description=_described(stage, compiling.is_on), total=1.0)
         bar.update(task, completed=min(max(fraction, 0.0), 1.0))
 
+    update.remark = bar.console.print  # type: ignore[attr-defined]
     soon.start()
     try:
         yield update

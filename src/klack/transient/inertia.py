@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, kron, vstack
 
+from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factorization import Backend, Factorization, factorize
 from klack.errors import InputError
 
@@ -85,6 +86,13 @@ class InverseMass:
                 block = slice(start, start + _BLOCK)
                 columns[:, block] += part @ factor.solve(part[points[block]].toarray().T)
         return columns
+
+    def whole_mobility(self, G: csr_array) -> NDArray[np.float64]:
+        """G M^-1 G^T, shape (nc, nc) [1/kg]: half the work of all its columns."""
+        whole = np.zeros((G.shape[0],) * 2)
+        for places, factor in self._parts:
+            whole += condensed_inverse(factor, csr_array(G[:, places]))
+        return whole
 
     def close(self) -> None:
         """Give the memory back."""

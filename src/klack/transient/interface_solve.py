@@ -82,7 +82,8 @@ class SplitSolve:
         self._factorization = factorization
         self._G = G
         self._rows = reached_rows(factorization, G)
-        self._half = np.zeros((G.shape[0], len(self._rows)))  # memory is taken when written to
+        # in the precision of the factor; memory is taken when written to
+        self._half = np.zeros((G.shape[0], len(self._rows)), dtype=factorization.dtype)
         self._known = np.empty(0, dtype=np.int64)
         self.compliance = np.zeros((G.shape[0],) * 2)
         self._selected = self._half[self._known]
@@ -106,7 +107,7 @@ class SplitSolve:
     def predict(self, b: NDArray[np.float64]) -> None:
         """See :class:`InterfaceSolve`."""
         self._y = self._factorization.forward(b)
-        self._free = self._y[self._rows]
+        self._free = self._y[self._rows].astype(self._half.dtype, copy=False)
 
     def response(self) -> NDArray[np.float64]:
         """See :class:`InterfaceSolve`."""
@@ -116,7 +117,7 @@ class SplitSolve:
         """See :class:`InterfaceSolve`."""
         self._y[self._rows] = self._free
         if np.any(lam):
-            self._y[self._rows] += lam @ self._selected
+            self._y[self._rows] += lam.astype(self._half.dtype, copy=False) @ self._selected
         return self._factorization.backward(self._y)
 
 

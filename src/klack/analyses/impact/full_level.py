@@ -74,6 +74,7 @@ def simulate_in_full(
         spring_stiffness=stiffness,
         damping=(_damping(case, pair.upper, kept), _damping(case, pair.lower, kept)),
         longest_period=longest_period,
+        precision="single",
         threads=threads or 2,
         progress=lambda fraction: progress("full order", fraction),
         snapshots=snapshots,
