@@ -9,7 +9,7 @@ from klack.report.wording import count
 from klack.simulation.network_result import ImpactEvent
 from klack.units import format_si
 
-__all__ = ["EVENT_MEASURES", "NOT_REACHED", "VARIANT_MEASURES", "real_time_factor"]
+__all__ = ["EVENT_MEASURES", "NOT_REACHED", "VARIANT_MEASURES", "real_time_factor", "steps_told"]
 
 NOT_REACHED = "not reached"
 
@@ -21,14 +21,15 @@ def real_time_factor(variant: StrokeVariant) -> float:
     return variant.result.wall_time / simulated if simulated > 0.0 else float("nan")
 
 
-def _steps(variant: StrokeVariant) -> str:
+def steps_told(variant: StrokeVariant) -> str:
+    """Number and size of the steps of each kind, in words."""
     done, sizes = variant.result.steps, variant.result.sizes
     fine = format_si(sizes.step, "s", 3)
     if sizes.coarse == 1:
-        return f"\n{count(done.fine)} of {fine}"
+        return f"{count(done.fine)} of {fine}"
     flight, near = (format_si(sizes.step * steps, "s", 3) for steps in (sizes.coarse, sizes.near))
     return (
-        f"\n{count(done.flight)} of {flight}, {count(done.near)} of {near} about touches in "
+        f"{count(done.flight)} of {flight}, {count(done.near)} of {near} about touches in "
         f"{count(done.sub)} sub-steps, {count(done.fine)} of {fine}"
     )
 
@@ -238,7 +239,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         digits=3,
         page=True,
         title="time step",
-        remark=_steps,
+        remark=lambda variant: f"\n{steps_told(variant)}",
     ),
     Measure(
         key="wall_time",

@@ -11,7 +11,12 @@ from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
 from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
-from klack.analyses.stroke.measures import EVENT_MEASURES, NOT_REACHED, VARIANT_MEASURES
+from klack.analyses.stroke.measures import (
+    EVENT_MEASURES,
+    NOT_REACHED,
+    VARIANT_MEASURES,
+    steps_told,
+)
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.times import LiftTimes, Passage
@@ -144,6 +149,7 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
         title = "times at shares of the lift"
         yield TextTable(title=title, columns=TIME_COLUMNS, rows=times, left=3)
     for variant in study.variants.values():
+        yield f"{variant.name}: steps: {steps_told(variant)}"
         if begun := start_text(variant):
             yield f"{variant.name}: {begun}"
         title, total = f"{variant.name}: {variant.label}", len(variant.result.events)
