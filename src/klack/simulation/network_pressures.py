@@ -36,6 +36,8 @@ _LEAST_PRESSURE = 1.0  # [Pa]
 _CURVED = (
     0.1  # of the slope of the density: change in a step that the mean pressure does not follow
 )
+_FLOW_LEFT = 0.02  # of a flow: change in the last Newton step
+_MASS_LEFT = 1e-8  # of what a volume holds: that change of a flow over the step
 _LEAST_THETA = 0.51  # what the implicit step loses outweighs what the curved law could give back
 _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
@@ -120,8 +122,9 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
         if finite and worst < _PRESSURE_LEFT:
-            _step_by(fluid, 1.0)
-            break
+            if iteration >= _FULL_NEWTON or _flows_follow(fluid, step.H):
+                _step_by(fluid, 1.0)
+                break
         # a root-like law about no drop lets Newton's method swing across for ever
         share = 1.0 if iteration < _FULL_NEWTON else 0.5
         _step_by(fluid, share)
@@ -138,6 +141,29 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     for i in range(nodes.volumes):
         trial.V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
     return STATUS_DONE
+
+
+@phase
+def _flows_follow(fluid: Any, H: float) -> bool:
+    """Whether flows follow the last Newton step, which they take with their slopes.
+
+    Where a wide opening holds a small volume at a pressure, a step that is nothing beside the
+    pressure may be as large as the drop that drives the flow.
+    """
+    branches, flows, r = fluid.branches, fluid.flows, fluid.trial.r
+    volumes, mass, follow = fluid.nodes.volumes, fluid.state.mass, True
+    for k in range(branches.rows):
+        a, b = branches.a[k], branches.b[k]
+        change, least = 0.0, np.inf
+        if a < volumes:
+            change += flows.slope_a[k] * r[a]
+            least = mass[a]
+        if b < volumes:
+            change += flows.slope_b[k] * r[b]
+            least = min(least, mass[b])
+        if abs(change) > _FLOW_LEFT * abs(flows.mdot[k]) and abs(change) * H > _MASS_LEFT * least:
+            follow = False
+    return follow
 
 
 @phase
