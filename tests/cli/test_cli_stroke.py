@@ -286,7 +286,8 @@ def test_a_valve_that_does_not_open_says_so(tmp_path, capsys, recwarn, quiet):
     missing = re.search(r"and ([\d.]+) N were still missing", told)
     assert missing is not None
     # the magnet pulls at once, and the needle swings on its seat
-    assert float(missing[1]) == pytest.approx(least_force_on_the_seat(), rel=0.01)
+    # a mean over 1.28 us of a force that swings in 11 us
+    assert float(missing[1]) == pytest.approx(least_force_on_the_seat(), rel=0.02)
     assert "preload" in told
     assert (tmp_path / "out" / "report.html").is_file()
     if quiet:

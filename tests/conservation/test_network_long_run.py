@@ -22,7 +22,7 @@ from klack.simulation.network_run import simulate_network
 from klack.verification.whole_valve import peak_and_hold, whole_valve
 
 PERIOD, CYCLES = 1.5e-3, 4
-RECORD = 3.2e-6  # whole macro steps of both valves
+RECORD = 6.4e-6  # whole macro steps of both valves
 
 
 def switched_valve() -> Rows:

@@ -46,4 +46,4 @@ def test_flux_work_and_supply_converge():
 
     # switchings fall anywhere inside the steps: the constant wobbles, the order does not
     assert np.all(orders > 1.3)
-    assert np.all(errors[-1] < 1.5e-6)  # uncut steps of 62.5 ns: 2e-6 to 1e-5
+    assert np.all(errors[-1] < 2.5e-6)  # uncut steps of 62.5 ns: 2e-6 to 1.3e-5

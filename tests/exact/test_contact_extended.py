@@ -58,7 +58,7 @@ def test_the_full_order_goes_on_to_as_many_points_as_it_reaches():
 
     expected = run(problem.space).force
 
-    # the clock starts at the same placement; round-off of the solves, grown in some 250 steps
-    assert run(narrow).force == pytest.approx(expected, rel=1e-6, abs=1e-9 * expected.max())
+    # the clock starts at the same placement; round-off of factors in single precision, 250 steps
+    assert run(narrow).force == pytest.approx(expected, rel=1e-6, abs=3e-6 * expected.max())
     with pytest.raises(ReachError, match="at the edge of the candidate area, at"):
         run(narrow, reach=1e-6)

@@ -42,6 +42,8 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     unseen = np.asarray(force * (end - seen), dtype=float)
     ground = len(network.ports)
     for c in range(rows.interfaces):
+        if state.far[c] != 0.0:  # its force is among those of elements
+            continue
         upper, lower = rows.upper[c], rows.lower[c]
         behind = rows.gap0[c] + end[upper] - end[lower] - state.gap[c]
         unseen[upper if upper < ground else lower] += state.force[c] * behind

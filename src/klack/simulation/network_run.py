@@ -21,6 +21,7 @@ from klack.simulation.network_arrays import (
     EXCESS,
     PARTS,
     PORTS,
+    SEEN,
     STORE,
     WORK,
     WORK_BEGIN,
@@ -494,11 +495,14 @@ def _numbers(values: Vector) -> str:
     return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
 
 
-def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector) -> None:
-    """Ask all rows for a step that ends in the present state: see :func:`call_rows`."""
+def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
+    """Ask all rows for a step that ends in the present state: see :func:`call_rows`.
+
+    ``row`` of the ports holds their displacements.
+    """
     table, p = network.nodes.fluid, network.node_state.p
     rho = np.array([fluid_at(table, pressure, 0)[0] for pressure in p])
-    at = network.bodies.at[Y0 : Y0 + len(speeds)]
+    at = network.bodies.at[row : row + len(speeds)]
     for rows, status in (
         (network.elements, STATUS_ELEMENT),
         (network.branches, STATUS_BRANCH),
@@ -509,7 +513,8 @@ def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector) -> 
 
 
 def _read_stores(network: CompiledNetwork) -> None:
-    _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1))
+    # where elements saw their ports last, a little behind the bodies
+    _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1), SEEN)
     for rows in (network.elements, network.branches):
         for k in range(rows.rows):
             ports = rows.port0[k + 1] - rows.port0[k]
