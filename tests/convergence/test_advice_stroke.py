@@ -30,7 +30,8 @@ def opening() -> ValveCase:
 def test_expected_error_of_the_step_bounds_that_against_an_eighth_of_it():
     """Peak force of the first impact; events come in whole steps, so it scatters."""
     valve = build_valve(opening())
-    fine, now = (first_impacts(valve, step=f * valve.case.run.step) for f in (1 / 8, 1.0))
+    step = valve.case.run.fine_step
+    fine, now = (first_impacts(valve, step=f * step) for f in (1 / 8, 1.0))
     true = max(abs(now[stop][1] / fine[stop][1] - 1.0) for stop in fine)
 
     expected = step_ladder(valve, now, stroke_measures(0.02)).ladder.error(1.0)[1]
