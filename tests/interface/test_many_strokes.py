@@ -360,7 +360,8 @@ class TestInterruption:
     def test_ctrl_c_ends_all_threads_soon(self):
         """Of a process with thousands of points left."""
         script = f"""
-import time, klack
+import signal, klack
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a suite in the background ignores it
 points = {{{PRELOAD!r}: ["12 N", "13 N"] * 5000}}
 def progress(stage, fraction):
     if stage == "points" and fraction > 0.0:
