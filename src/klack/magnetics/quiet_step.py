@@ -24,8 +24,8 @@ so far."""
 DIODE = 1e-6
 """Voltage [V] by which a driver must offer more than an open coil induces."""
 
-_ROUGH = 3.1e3  # [1/s]
-_ROUGHEST = 4e-6
+_ROUGH = 3.1e3  # [1/s] its square times that of a step is the bend allowed in it
+_ROUGHEST = 4e-6  # bend allowed in any step
 
 _PHI = FRONT
 _RATE = FRONT + 2

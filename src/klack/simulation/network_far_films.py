@@ -21,7 +21,7 @@ from klack.simulation.network_arrays import (
     Recording,
     Step,
 )
-from klack.simulation.network_interfaces import end_force, gap_between
+from klack.simulation.network_interfaces import HELD, end_force, film_damping, gap_between
 from klack.simulation.phase import phase
 
 __all__ = ["end_far_films", "far_ones_stay", "mark_far_ones", "mark_none_far", "push_by_far_films"]
@@ -29,7 +29,6 @@ __all__ = ["end_far_films", "far_ones_stay", "mark_far_ones", "mark_none_far", "
 _FASTEST = 5.0  # [m/s]: no gap closes faster between two macro steps
 _GENTLE = 0.02  # of a gap and its cut-off: way in a macro step that its film follows
 _WEAK = 1e-3  # of a change of the film force: what it changes in the film force by moving the gap
-_HELD = 0.5  # of the suction: a film that pulls more may be about to cavitate
 _NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 
@@ -46,12 +45,12 @@ def mark_far_ones(contacts: Any, bodies: Any, level: int, H: float) -> None:
             far = state.e[c] == 0.0
         elif far:
             x = least + rows.cut_off[c]
-            damping = rows.cubic[c] / x**3 + rows.linear[c] / x
+            damping = film_damping(rows, c, x)
             G = rows.G[level * rows.interfaces + c] + rows.series[c]
             far = (
                 way <= _GENTLE * x
                 and damping * G <= _WEAK * H
-                and damping * way <= _HELD * rows.suction[c] * H
+                and damping * way <= HELD * rows.suction[c] * H
             )
         _take_turns(contacts, bodies.at, c, far)
 

@@ -21,6 +21,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.phase import phase
 
 __all__ = [
+    "HELD",
     "begin_cut_contacts",
     "begin_interfaces",
     "begin_macro_interfaces",
@@ -30,6 +31,7 @@ __all__ = [
     "end_force",
     "end_interfaces",
     "end_macro_interfaces",
+    "film_damping",
     "forget_interfaces",
     "gap_between",
     "keep_dissipation",
@@ -46,10 +48,8 @@ _ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over 
 _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
 _ROUND_OFF = 4e-16  # of a displacement
 _MOST_SWEEPS = 200
-_YOUNG = 1.5  # macro steps: a contact just closed
-_FALLS = (
-    1.5  # times the force at the end of the macro step: it had so much before, and releases soon
-)
+_FALLS = 1.5  # times the force now: a contact that had so much a macro step ago releases soon
+HELD = 0.5  # of the suction: a film that pulls more may begin to cavitate
 _SHAKEN = 0.04  # of the force of a contact at rest: its change in a macro step
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
 
@@ -76,6 +76,12 @@ def _steady(before: float, now: float) -> bool:
 
 
 @phase
+def film_damping(rows: Any, c: int, x: float) -> float:
+    """Film force per closing speed at a gap ``x`` [N s/m]."""
+    return rows.cubic[c] / x**3 + rows.linear[c] / x
+
+
+@phase
 def may_fly(contacts: Any, now: float, length: float) -> bool:
     """Whether one step of this length may be tried: all interfaces far apart or at rest."""
     rows, state = contacts.rows, contacts.state
@@ -94,8 +100,7 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
             if not (creeping and rows.cubic[c] > 0.0):
                 quiet = False
         elif rows.cubic[c] > 0.0:
-            film = rate * (rows.cubic[c] / x**3 + rows.linear[c] / x)
-            if film > rows.film_small[c] and not creeping:
+            if rate * film_damping(rows, c, x) > rows.film_small[c] and not creeping:
                 quiet = False
     return quiet
 
@@ -325,7 +330,7 @@ def may_touch(contacts: Any, H: float) -> bool:
         if state.far[c] == 0.0:
             if abs(state.gap[c]) <= 3.0 * abs(state.rate[c]) * H or state.pulled[c] != 0.0:
                 may = True
-            if state.force[c] < -0.5 * rows.suction[c]:
+            if state.force[c] < -HELD * rows.suction[c]:
                 may = True
     return may
 

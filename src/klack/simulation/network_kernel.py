@@ -123,7 +123,7 @@ CLOCK = 8
 """Time in fine steps, size of the last step, then
 :class:`klack.simulation.network_result.StepCounts`."""
 
-_SETTLED = 5e-5  # of the longest way of a port: displacement by the missed force, fine steps
+_SETTLED = 5e-5  # displacement by the missed force, over the longest way of a port; fine steps
 _SETTLED_MACRO = 2e-4  # the same of macro steps
 _ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
 _ENERGY_MACRO = 1e-6  # the same of macro steps

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, Protocol
 
 __all__ = ["Progress", "show_progress"]
@@ -98,7 +99,8 @@ def _bar() -> Iterator[Progress]:
             bar.reset(task, description=_described(stage, compiling.is_on), total=1.0)
         bar.update(task, completed=min(max(fraction, 0.0), 1.0))
 
-    update.remark = bar.console.print  # type: ignore[attr-defined]
+    # names of bodies may hold brackets, which rich would take for its own
+    update.remark = partial(bar.console.print, markup=False)  # type: ignore[attr-defined]
     soon.start()
     try:
         yield update
