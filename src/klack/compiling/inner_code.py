@@ -80,8 +80,11 @@ class InnerCode(CPUCodeLibrary):
         Without vectorising here the time loop is a third slower: loops that are put into a large
         function first are not vectorised there.
         """
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
+        match self._codegen._module_pass_manager():
+            case (passes, builder):
+                passes.run(self._final_module, builder)
+            case passes:  # LLVM 14, of numba 0.60
+                passes.run(self._final_module)
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
