@@ -23,7 +23,7 @@ def warm(
 ) -> int:
     """Compile ahead what strokes and impacts need, once for each processor and version.
 
-    Without it the first command compiles, for half a minute or so.
+    Without it the first command compiles, for half a minute to a minute.
     What is there already is not compiled again.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """
