@@ -44,7 +44,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("mechanics",),
     # in time, and what is made of it
     ("simulation",),
-    ("transient", "acoustics", "measurement"),
+    ("transient", "acoustics", "measurement", "studies"),
     # from a case to results
     ("case", "report"),
     ("assembling", "terminal"),

@@ -1,0 +1,1 @@
+"""Mathematics of studies: designs of points, sensitivity, search for optima, probabilities."""
