@@ -8,6 +8,7 @@ taken from short tables instead of by dimension, so that one cannot pass for the
 
 import re
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cache, lru_cache, partial
 from math import inf, isfinite, pi
 from typing import Annotated, Any
@@ -52,6 +53,7 @@ __all__ = [
     "Voltage",
     "Volume",
     "VolumeFlow",
+    "base_powers",
     "format_si",
     "parse_quantity",
 ]
@@ -334,6 +336,54 @@ def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
     except Exception:  # pint evaluates the text and lets errors of tokenize and others through
         hint = f"use one of: {', '.join(kind.common)} (upper and lower case matter)."
         raise QuantityError(where, value, kind, hint, f" with the unknown unit '{unit}'") from None
+
+
+_BASE = {
+    "[mass]": "kg",
+    "[length]": "m",
+    "[time]": "s",
+    "[current]": "A",
+    "[temperature]": "K",
+    "[substance]": "mol",
+    "[luminosity]": "cd",
+}
+
+
+@cache
+def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
+    """Powers of the SI base units in a coherent SI unit, ordered by name; ``"-"`` has none.
+
+    Hz is 1/s here and rad is 1: what these two mean beyond that is with whoever asks.
+
+    Raises
+    ------
+    InputError
+        If ``unit`` is unknown, or has a size other than 1 in base units (``mm``).
+
+    Examples
+    --------
+    >>> [f"{base}^{power}" for base, power in base_powers("N/m")]
+    ['kg^1', 's^-2']
+    """
+    if unit in ("", "-"):
+        return ()
+    hint = f"use an SI unit without prefix, e.g. {LENGTH.unit} or {STIFFNESS.unit}."
+    try:
+        size = _registry().Quantity(1.0, unit).to_base_units()
+        dimension = _registry().get_dimensionality(size.units)
+        coherent = abs(float(size.magnitude) - 1.0) < 1e-12
+    except Exception:  # pint evaluates the text and lets errors of tokenize and others through
+        raise InputError(
+            "unit", got=f"the unknown unit '{unit}'", expected="an SI unit", hint=hint
+        ) from None
+    if not coherent:
+        raise InputError(
+            "unit", got=f"'{unit}'", expected="a coherent SI unit (kg, m, s, A, K)", hint=hint
+        )
+    powers = {
+        _BASE[name]: Fraction(power).limit_denominator(12) for name, power in dimension.items()
+    }
+    return tuple(sorted(powers.items()))
 
 
 @lru_cache(maxsize=1000)
