@@ -1,0 +1,267 @@
+"""Designs of points in the unit cube: which points of a parameter space a study computes.
+
+A point is a row, a parameter is a column.  A coordinate is the probability below a value of its
+parameter: 0 and 1 are the ends of a range, 0.5 is its middle or the median of its distribution.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from inspect import signature
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from klack.errors import InputError
+
+__all__ = [
+    "balanced",
+    "even_levels",
+    "full_grid",
+    "latin_hypercube",
+    "one_at_a_time",
+    "sobol_sequence",
+]
+
+Floats = NDArray[np.float64]
+
+_MOST_NUMBERS = 10**8
+"""Coordinates of one design: 800 MB."""
+_BITS = 30
+_CENTRE = 0.5
+
+
+def even_levels(count: int, *, bounded: bool = True) -> Floats:
+    """Levels of one parameter at equal distances.
+
+    A bounded parameter has levels at both ends, ``k / (count - 1)``.  A distribution without ends
+    (normal) has none there: its levels are the middles of classes of equal probability,
+    ``(k + 1/2) / count``.  One level is the centre.
+
+    Parameters
+    ----------
+    count : int
+    bounded : bool
+        Whether the parameter has a value at 0 and at 1.
+
+    Returns
+    -------
+    array (count)
+
+    Raises
+    ------
+    InputError
+        If ``count`` is below 1.
+
+    Examples
+    --------
+    >>> even_levels(3).tolist(), even_levels(2, bounded=False).tolist()
+    ([0.0, 0.5, 1.0], [0.25, 0.75])
+    """
+    _require(count, "levels")
+    k = np.arange(count)
+    return k / (count - 1) if bounded and count > 1 else (k + 0.5) / count
+
+
+def full_grid(levels: Sequence[Floats]) -> Floats:
+    """Full factorial design: every combination of levels, the last parameter varies fastest.
+
+    Parameters
+    ----------
+    levels : sequence of array
+        Coordinates that each parameter takes, in [0, 1]; see :func:`even_levels`.
+
+    Returns
+    -------
+    array (product of the numbers of levels, parameters)
+
+    Raises
+    ------
+    InputError
+        For no parameter, no level, levels outside [0, 1], or too many points.
+
+    Examples
+    --------
+    >>> full_grid([even_levels(2), even_levels(3)])[:4].tolist()
+    [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0], [1.0, 0.0]]
+    """
+    _require_levels(levels)
+    _require_size(prod(len(own) for own in levels), len(levels))
+    return np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
+
+
+def one_at_a_time(levels: Sequence[Floats]) -> Floats:
+    """The centre, then each parameter over its levels while all others stay at the centre.
+
+    A level at the centre is not repeated: it is the first point.  This design shows no
+    interaction of parameters.
+
+    Parameters
+    ----------
+    levels : sequence of array
+        Coordinates that each parameter takes, in [0, 1]; see :func:`even_levels`.
+
+    Returns
+    -------
+    array (1 + number of levels off the centre, parameters)
+
+    Raises
+    ------
+    InputError
+        As for :func:`full_grid`.
+
+    Examples
+    --------
+    >>> one_at_a_time([even_levels(2), even_levels(3)]).tolist()
+    [[0.5, 0.5], [0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0]]
+    """
+    _require_levels(levels)
+    off = [own[own != _CENTRE] for own in levels]
+    count = 1 + sum(own.size for own in off)
+    _require_size(count, len(levels))
+    points = np.full((count, len(levels)), _CENTRE)
+    row = 1
+    for column, own in enumerate(off):
+        points[row : row + own.size, column] = own
+        row += own.size
+    return points
+
+
+def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
+    """Latin hypercube: in every parameter, each of ``count`` equal classes holds one point.
+
+    Not extensible: another count is another design.  Source: M. D. McKay, R. J. Beckman and
+    W. J. Conover (1979), Technometrics 21, 239-245.
+
+    Parameters
+    ----------
+    count, parameters : int
+    seed : int
+        The same seed gives the same points.
+
+    Returns
+    -------
+    array (count, parameters)
+        Above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        For a count, number of parameters or seed that cannot be used.
+    """
+    _require_size(count, parameters)
+    engine = qmc.LatinHypercube(parameters, **_random(seed))
+    # one draw in 2^53 is a bound, where a normal distribution has no value
+    return np.clip(engine.random(count), np.finfo(np.float64).eps, 1.0 - np.finfo(np.float64).eps)
+
+
+def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
+    """First points of a scrambled Sobol sequence, which fills the cube evenly.
+
+    The error of a mean falls with nearly 1/n instead of 1/sqrt(n), best where the number of points
+    is a power of two, see :func:`balanced`.  Extensible: the first n of 2n points are those of n.
+    The points stand in the middles of 2^30 classes.
+
+    Direction numbers: S. Joe and F. Y. Kuo (2008), SIAM J. Sci. Comput. 30, 2635-2654.  Scrambling:
+    random linear matrix and digital shift, J. Matousek (1998), J. Complexity 14, 527-556.
+
+    Parameters
+    ----------
+    count, parameters : int
+        At most 2^30 points, 21201 parameters.
+    seed : int
+        The same seed gives the same points.
+
+    Returns
+    -------
+    array (count, parameters)
+        Above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        For a count, number of parameters or seed that cannot be used.
+    """
+    _require_size(count, parameters)
+    if parameters > qmc.Sobol.MAXDIM:
+        raise InputError(
+            "design",
+            got=f"a Sobol sequence of {parameters} columns",
+            expected=f"at most {qmc.Sobol.MAXDIM}",
+            hint="use a Latin hypercube, or fewer parameters.",
+        )
+    engine = qmc.Sobol(parameters, scramble=True, bits=_BITS, **_random(seed))
+    whole = 1 << (int(count) - 1).bit_length()  # a power of two: SciPy warns of any other number
+    return engine.random(whole)[:count] + 0.5 / 2**_BITS
+
+
+def balanced(count: int) -> bool:
+    """Whether a Sobol sequence of so many points is balanced: the count is a power of two.
+
+    Other counts are allowed; their means converge less evenly.
+
+    Examples
+    --------
+    >>> balanced(4096), balanced(1000)
+    (True, False)
+    """
+    return count > 0 and count & (count - 1) == 0
+
+
+def _random(seed: int) -> dict[str, Any]:
+    """Argument of SciPy's samplers for a seed.
+
+    Always a generator: since SciPy 1.15 a whole number as ``rng`` gives other points than the same
+    number as ``seed``.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(
+            "seed",
+            got=f"{seed!r}",
+            expected="a whole number of 0 or more",
+            hint="any will do, e.g. 1; the same seed gives the same points.",
+        )
+    return {_random_keyword(): np.random.default_rng(int(seed))}
+
+
+@cache
+def _random_keyword() -> str:
+    """Name of the argument for random numbers: ``rng``, before SciPy 1.15 ``seed``."""
+    return "rng" if "rng" in signature(qmc.Sobol).parameters else "seed"
+
+
+def _require(count: int, what: str) -> None:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InputError(
+            "design",
+            got=f"{count!r} {what}",
+            expected="a whole number of 1 or more",
+            hint=f"give the number of {what}.",
+        )
+
+
+def _require_size(count: int, parameters: int) -> None:
+    _require(parameters, "parameters")
+    _require(count, "points")
+    if count * parameters > _MOST_NUMBERS:
+        raise InputError(
+            "design",
+            got=f"{count:.4g} points of {parameters} parameters",
+            expected=f"at most {_MOST_NUMBERS // parameters:.4g} points",
+            hint="use fewer levels, or a Sobol sequence, whose number of points is free.",
+        )
+
+
+def _require_levels(levels: Sequence[Floats]) -> None:
+    _require(len(levels), "parameters")
+    for own in levels:
+        _require(len(own), "levels")
+        if not np.all((own >= 0.0) & (own <= 1.0)):
+            raise InputError(
+                "design",
+                got=f"levels from {np.min(own):g} to {np.max(own):g}",
+                expected="levels between 0 and 1",
+                hint="give coordinates of the unit cube, not values.",
+            )

@@ -1,0 +1,156 @@
+"""Designs of points; truth: their definitions, and points as computed by several SciPy versions."""
+
+import warnings
+from hashlib import sha256
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from klack.errors import InputError
+from klack.studies.designs import (
+    balanced,
+    even_levels,
+    full_grid,
+    latin_hypercube,
+    one_at_a_time,
+    sobol_sequence,
+)
+
+
+def test_even_levels():
+    assert even_levels(5).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert even_levels(4, bounded=False).tolist() == [0.125, 0.375, 0.625, 0.875]
+    assert even_levels(1).tolist() == even_levels(1, bounded=False).tolist() == [0.5]
+
+
+def test_grid_is_the_product_of_levels():
+    levels = [even_levels(2), even_levels(3), even_levels(4, bounded=False)]
+
+    assert full_grid(levels).tolist() == [list(point) for point in product(*levels)]
+    assert full_grid([even_levels(3)]).tolist() == [[0.0], [0.5], [1.0]]
+
+
+def test_one_at_a_time_moves_one_parameter():
+    levels = [even_levels(4), even_levels(5), even_levels(1), even_levels(2, bounded=False)]
+    points = one_at_a_time(levels)
+
+    assert points.shape == (1 + 4 + 4 + 0 + 2, 4)
+    assert points[0].tolist() == [0.5] * 4
+    assert np.all(np.sum(points[1:] != 0.5, axis=1) == 1)
+    for column, own in enumerate(levels):
+        moved = points[1:, column]
+        assert moved[moved != 0.5].tolist() == [x for x in own if x != 0.5]
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 100])
+def test_each_class_of_a_latin_hypercube_holds_one_point(count):
+    points = latin_hypercube(count, 5, seed=3)
+
+    classes = np.sort(np.floor(points * count).astype(int), axis=0)
+    assert np.array_equal(classes, np.tile(np.arange(count)[:, None], 5))
+    assert np.all((points > 0) & (points < 1))
+
+
+@pytest.mark.parametrize("parameters", [1, 2, 8])
+def test_sobol_points_are_balanced(parameters):
+    """Of 2^m points, each of 2^m equal intervals of a parameter holds one."""
+    points = sobol_sequence(256, parameters, seed=11)
+
+    classes = np.sort(np.floor(points * 256).astype(int), axis=0)
+    assert np.array_equal(classes, np.tile(np.arange(256)[:, None], parameters))
+
+
+def test_two_sobol_parameters_fill_every_box():
+    """A (0, m, 2)-net: each box of area 2^-m holds one point, whatever its sides."""
+    points = sobol_sequence(64, 2, seed=4)
+
+    for power in range(7):
+        boxes = np.floor(points * [2**power, 2 ** (6 - power)]).astype(int)
+        assert len({tuple(box) for box in boxes}) == 64
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 64, 100, 1000, 1024])
+def test_sobol_points_are_extended_exactly(count):
+    assert np.array_equal(
+        sobol_sequence(2 * count, 6, seed=5)[:count], sobol_sequence(count, 6, seed=5)
+    )
+    assert np.array_equal(sobol_sequence(4096, 6, seed=5)[:count], sobol_sequence(count, 6, seed=5))
+
+
+def test_sobol_points_are_those_of_scipy_in_the_middle_of_their_class():
+    engine = qmc.Sobol(4, scramble=True, **{_keyword(): np.random.default_rng(3)})
+
+    assert np.array_equal(sobol_sequence(64, 4, seed=3), engine.random(64) + 2.0**-31)
+
+
+def _keyword():
+    """Name of the argument that this SciPy takes without a word."""
+    for keyword in ("rng", "seed"):
+        try:
+            qmc.Sobol(1, **{keyword: np.random.default_rng(0)})
+        except TypeError:
+            continue
+        return keyword
+    raise AssertionError
+
+
+def test_no_coordinate_is_a_bound():
+    """The unscrambled sequence begins with 0, where a normal distribution has no value."""
+    points = np.concatenate([sobol_sequence(4096, 3, seed) for seed in range(20)])
+
+    assert points.min() >= 2.0**-31
+    assert points.max() <= 1.0 - 2.0**-31
+
+
+def test_an_unbalanced_number_of_points_is_told_by_the_predicate_alone():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert sobol_sequence(1000, 3, seed=1).shape == (1000, 3)
+    assert [n for n in range(-1, 20) if balanced(n)] == [1, 2, 4, 8, 16]
+
+
+@pytest.mark.parametrize("design", [latin_hypercube, sobol_sequence])
+def test_the_seed_decides(design):
+    first = design(64, 3, seed=1)
+
+    assert np.array_equal(first, design(64, 3, seed=1))
+    assert not np.any(np.isin(first, design(64, 3, seed=2)))
+
+
+@pytest.mark.parametrize(
+    ("design", "digest"),
+    [(sobol_sequence, "603ff54985b72a1e"), (latin_hypercube, "9729117b0bdcd709")],
+)
+def test_points_are_those_of_other_versions(design, digest):
+    """Same bytes from SciPy 1.14.0, 1.15.0, 1.16.0 and 1.17.1 with NumPy 2.0.0 and 2.4.6."""
+    assert sha256(design(1000, 4, seed=3).tobytes()).hexdigest()[:16] == digest
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: even_levels(0), "0 levels"),
+        (lambda: even_levels(2.5), "2.5 levels"),
+        (lambda: full_grid([]), "0 parameters"),
+        (lambda: full_grid([even_levels(2), np.array([])]), "0 levels"),
+        (lambda: full_grid([np.array([0.5, 2.0])]), "levels from 0.5 to 2"),
+        (lambda: full_grid([np.array([np.nan])]), "levels from nan"),
+        (lambda: full_grid([even_levels(10)] * 20), r"1e\+20 points of 20 parameters"),
+        (lambda: one_at_a_time([]), "0 parameters"),
+        (lambda: latin_hypercube(0, 2, 1), "0 points"),
+        (lambda: latin_hypercube(True, 2, 1), "True points"),
+        (lambda: latin_hypercube(10, 0, 1), "0 parameters"),
+        (lambda: latin_hypercube(10**9, 2, 1), r"1e\+09 points"),
+        (lambda: sobol_sequence(-1, 2, 1), "-1 points"),
+        (lambda: sobol_sequence(2, 30000, 1), "30000 columns"),
+        (lambda: sobol_sequence(10**9, 1, 1), r"1e\+09 points"),
+        (lambda: sobol_sequence(8, 2, -1), "-1"),
+        (lambda: sobol_sequence(8, 2, 1.5), "1.5"),
+        (lambda: sobol_sequence(8, 2, None), "None"),
+    ],
+)
+def test_what_is_no_design_is_one_error(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
