@@ -1,0 +1,256 @@
+"""Best of many evaluated points: the non-dominated ones, a compromise, the volume they dominate.
+
+Objectives are minimised; a constraint is kept where it is zero or less.  A point with a value that
+is not finite (nan: its run failed) never counts as feasible.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+from klack.studies.values import values_of_points
+
+__all__ = ["Front", "compromise", "find_front", "hypervolume"]
+
+_PAIRS = 40_000
+"""Largest number of pairs of points that are compared directly, without another division."""
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """Points that no other one dominates.
+
+    Attributes
+    ----------
+    points : NDArray of int, shape (n,)
+        Their rows, ascending; of equal points the first.
+    feasible : bool
+        False if no point keeps all constraints; ``points`` are then those that violate them least.
+    """
+
+    points: NDArray[np.intp]
+    feasible: bool
+
+
+def find_front(objectives: ArrayLike, constraints: ArrayLike | None = None) -> Front:
+    """Non-dominated points under constraints.
+
+    Point *a* dominates *b* if ``a_i <= b_i`` in every objective and ``a_i < b_i`` in one.  Among
+    points of which one violates constraints, the smaller sum of violations wins (Deb's rule).  The
+    search divides the points at the median of one objective after the other (Kung, Luccio and
+    Preparata 1975): 100 000 points with 4 objectives take seconds.
+
+    Parameters
+    ----------
+    objectives : array_like, shape (points, objectives)
+        Numbers to minimise, any units.
+    constraints : array_like, shape (points, constraints), optional
+        Zero or less where kept.  Give them as ratios to their limits, because they are summed.
+
+    Returns
+    -------
+    Front
+        Without points if all failed.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit.
+
+    Notes
+    -----
+    Deb, Pratap, Agarwal and Meyarivan (2002), IEEE Trans. Evol. Comput. 6, 182-197; Kung, Luccio
+    and Preparata (1975), J. ACM 22, 469-476.
+    """
+    values = values_of_points(objectives, constraints)
+    usable = np.flatnonzero(~values.failed)
+    if not usable.size:
+        return Front(usable, feasible=False)
+    violation = values.violation[usable]
+    least = violation.min()
+    candidates = usable[violation == least]
+    kept = _non_dominated(values.objectives[candidates])
+    return Front(candidates[kept], feasible=bool(least == 0.0))
+
+
+def compromise(objectives: ArrayLike) -> int:
+    r"""Row of the point of a front nearest to the ideal one.
+
+    The point with the smallest
+
+    .. math:: \sum_i \left(\frac{f_i - f_i^{min}}{f_i^{max} - f_i^{min}}\right)^2
+
+    over the points given, so that each objective counts by its range on the front: the knee of a
+    convex front.  An objective that is equal in all points does not count; of equally near points
+    the first is taken.
+
+    Parameters
+    ----------
+    objectives : array_like, shape (points, objectives)
+        Those of the front only; points off the front would change the ranges.
+
+    Raises
+    ------
+    InputError
+        If there is no point, or a value is not finite.
+
+    Notes
+    -----
+    Yu (1973), Management Science 19, 936-946; Zeleny (1973), compromise programming.
+    """
+    values = _finite(objectives, "objectives of a front")
+    if not len(values):
+        raise InputError(
+            "objectives of a front",
+            got="no point",
+            expected="one point or more",
+            hint="take the points of a front that is not empty.",
+        )
+    low, high = values.min(axis=0), values.max(axis=0)
+    largest = np.maximum(np.abs(low), np.abs(high))
+    scale = np.where(largest > 0.0, largest, 1.0)  # ranges of huge numbers stay finite
+    span = high / scale - low / scale
+    span[span == 0.0] = 1.0
+    return int(np.argmin((((values / scale - low / scale) / span) ** 2).sum(axis=1)))
+
+
+def hypervolume(objectives: ArrayLike, reference: ArrayLike) -> float:
+    """Volume of the objective space that the points dominate, up to a reference point.
+
+    Exact, by slices along the last objective down to two objectives, where it is a sum of
+    rectangles.  Points that are not better than the reference in every objective add nothing.  The
+    time grows with ``n log n`` in two objectives, and by a factor ``n`` with each further one: made
+    for fronts of at most a thousand points in three.
+
+    Parameters
+    ----------
+    objectives : array_like, shape (points, objectives)
+        Numbers to minimise; rows with nan (failed points) are skipped.
+    reference : array_like, shape (objectives,)
+        Worst point that counts.
+
+    Returns
+    -------
+    float
+        In the product of the units of the objectives; compare only volumes of one reference.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, or the reference or an objective is infinite.
+
+    Notes
+    -----
+    Zitzler and Thiele (1998), PPSN V, 292-301.
+    """
+    values = values_of_points(objectives, None).objectives
+    corner = _finite(np.atleast_1d(np.asarray(reference, dtype=float))[None], "reference point")[0]
+    if corner.shape != (values.shape[1],):
+        raise InputError(
+            "reference point",
+            got=f"{corner.size} numbers",
+            expected=f"{values.shape[1]} numbers, one per objective",
+            hint="give one worst value per objective.",
+        )
+    values = _finite(values[~np.isnan(values).any(axis=1)], "objectives")
+    inside = values[np.all(values < corner, axis=1)]
+    return _volume(inside, corner) if len(inside) else 0.0
+
+
+def _finite(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Check for a table of finite numbers."""
+    values = values_of_points(numbers, None).objectives
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, column = bad[0]
+        raise InputError(
+            where,
+            got=f"{values[row, column]} in row {row}, column {column}",
+            expected="finite numbers",
+            hint="leave failed points out.",
+        )
+    return values
+
+
+def _volume(points: NDArray[np.float64], corner: NDArray[np.float64]) -> float:
+    """Dominated volume of points that are all better than the corner."""
+    if points.shape[1] == 1:
+        return float(corner[0] - points.min())
+    if points.shape[1] == 2:
+        points = points[np.argsort(points[:, 0], kind="stable")]
+        lowest = np.minimum.accumulate(np.concatenate((corner[1:], points[:, 1])))
+        return float(np.sum((corner[0] - points[:, 0]) * (lowest[:-1] - lowest[1:])))
+    points = points[_non_dominated(points)]
+    points = points[np.argsort(points[:, -1], kind="stable")]
+    depths = np.diff(points[:, -1], append=corner[-1])
+    total = 0.0
+    for count, depth in enumerate(depths, start=1):
+        if depth > 0.0:
+            total += depth * _volume(points[:count, :-1], corner[:-1])
+    return float(total)
+
+
+def _non_dominated(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows of the points that no other one dominates; of equal points the first."""
+    different, first = np.unique(values, axis=0, return_index=True)  # in lexicographic order
+    return np.sort(first[_among_sorted(different)])
+
+
+def _among_sorted(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Non-dominated rows of different points in lexicographic order: none beats an earlier one."""
+    count = len(values)
+    if count * count <= _PAIRS:
+        better = np.all(values[:, None, :] <= values[None, :, :], axis=2)
+        return np.flatnonzero(better.sum(axis=0) == 1)  # by itself
+    half = count // 2
+    early, late = _among_sorted(values[:half]), half + _among_sorted(values[half:])
+    beaten = _beaten(values[late, 1:], values[early, 1:])
+    return np.concatenate((early, late[~beaten]))
+
+
+def _beaten(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """For which rows one of the others is at most as large in every column."""
+    if not len(values) or not len(others):
+        return np.zeros(len(values), dtype=bool)
+    columns = values.shape[1]
+    if columns == 0:
+        return np.ones(len(values), dtype=bool)
+    if columns == 1:
+        return np.asarray(others.min() <= values[:, 0])
+    if columns == 2:
+        return _beaten_in_two(values, others)
+    if len(values) * len(others) <= _PAIRS:
+        return np.asarray(np.all(others[:, None, :] <= values[None, :, :], axis=2).any(axis=0))
+    return _beaten_by_division(values, others)
+
+
+def _beaten_in_two(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """As :func:`_beaten` with two columns: the lowest second one up to each first one."""
+    order = np.argsort(others[:, 0], kind="stable")
+    lowest = np.minimum.accumulate(others[order, 1])
+    before = np.searchsorted(others[order, 0], values[:, 0], side="right")
+    return np.asarray((before > 0) & (lowest[before - 1] <= values[:, 1]))
+
+
+def _beaten_by_division(
+    values: NDArray[np.float64], others: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """As :func:`_beaten`, divided at the median of the first column."""
+    numbers = np.sort(np.concatenate((values[:, 0], others[:, 0])))
+    middle = numbers[len(numbers) // 2]
+    if middle == numbers[-1]:  # both sides must get points
+        below = np.searchsorted(numbers, middle, side="left")
+        if below == 0:
+            return _beaten(values[:, 1:], others[:, 1:])
+        middle = numbers[below - 1]
+    low, other_low = values[:, 0] <= middle, others[:, 0] <= middle
+    beaten = np.zeros(len(values), dtype=bool)
+    beaten[low] = _beaten(values[low], others[other_low])
+    high = np.flatnonzero(~low)
+    high = high[~_beaten(values[high, 1:], others[other_low, 1:])]
+    rest = _beaten(values[high], others[~other_low])
+    beaten[~low] = True
+    beaten[high] = rest
+    return beaten

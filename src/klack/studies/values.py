@@ -1,0 +1,90 @@
+"""Objectives and constraints of evaluated points, checked; failures and violations among them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+
+__all__ = ["PointValues", "values_of_points"]
+
+
+@dataclass(frozen=True, slots=True)
+class PointValues:
+    """What was found at each point.
+
+    Attributes
+    ----------
+    objectives : NDArray of float, shape (points, objectives)
+        Numbers to minimise.
+    violation : NDArray of float, shape (points,)
+        Sum of what exceeds zero in the constraints; infinite where the point failed.
+    failed : NDArray of bool, shape (points,)
+        Where an objective or a constraint is not finite.
+    """
+
+    objectives: NDArray[np.float64]
+    violation: NDArray[np.float64]
+    failed: NDArray[np.bool_]
+
+
+def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> PointValues:
+    """Check the tables of objectives and constraints, and sum the violations.
+
+    Parameters
+    ----------
+    objectives : array_like, shape (points, objectives)
+    constraints : array_like, shape (points, constraints), optional
+        Zero or less where kept.
+
+    Raises
+    ------
+    InputError
+        If a table is not two-dimensional, holds no column of objectives, or the two differ in rows.
+    """
+    goals = _table(objectives, "objectives")
+    if goals.shape[1] == 0:
+        raise InputError(
+            "objectives",
+            got="no column",
+            expected="one column or more",
+            hint="name one measure to minimise.",
+        )
+    limits = (
+        np.empty((len(goals), 0)) if constraints is None else _table(constraints, "constraints")
+    )
+    if len(limits) != len(goals):
+        raise InputError(
+            "constraints",
+            got=f"{len(limits)} rows",
+            expected=f"{len(goals)} rows, as many as of objectives",
+            hint="give one row per point, nan where it failed.",
+        )
+    failed = np.logical_not(np.isfinite(np.hstack((goals, limits))).all(axis=1))
+    with np.errstate(over="ignore"):
+        violation = np.where(limits > 0.0, limits, 0.0).sum(axis=1)
+    largest = np.finfo(float).max
+    violation = np.where(failed, np.inf, np.minimum(violation, largest))
+    return PointValues(goals, violation, failed)
+
+
+def _table(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Numbers in rows and columns."""
+    try:
+        table = np.asarray(numbers, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            where,
+            got=f"{type(numbers).__name__} that is not a table of numbers ({error})",
+            expected="rows of numbers, one row per point",
+            hint="give every row the same number of columns, nan where a point failed.",
+        ) from None
+    if table.ndim != 2:
+        raise InputError(
+            where,
+            got=f"an array of {table.ndim} dimensions",
+            expected="rows and columns, one row per point",
+            hint="give a single objective as one column: values[:, None].",
+        )
+    return table
