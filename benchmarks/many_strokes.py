@@ -46,15 +46,15 @@ MEASURES = (
 )
 DURATION = 5e-3
 PARTS = {
-    "bodies, made once, their share": "klack.analyses.stroke.many.build_valve",
-    "case and network": "klack.analyses.stroke.many._valve_at",
+    "bodies, made once, their share": "klack.analyses.study.strokes.build_valve",
+    "case and network": "klack.analyses.study.strokes._valve_at",
     "rows": "klack.network.network.Network.rows",
     "layout": "klack.simulation.network_run.compile_network",
     "static start": "klack.simulation.network_run.start_at_rest",
     "time loop": "klack.simulation.network_run.run_network",
     "impact finder": "klack.simulation.impact_events.ImpactFinder.feed",
     "times of the lift": "klack.analyses.stroke.run.all_lift_times",
-    "measures": "klack.analyses.stroke.chosen_measures.ChosenMeasure.of",
+    "measures": "klack.analyses.study.chosen_measures.ChosenMeasure.of",
 }
 """Parts of a stroke, and the functions that take their time."""
 

@@ -33,7 +33,7 @@ from klack.case.reader import parse, text_of, validated
 from klack.case.schema import Case
 from klack.case.shipped import shipped_cases
 from klack.case.valve import ValveCase
-from klack.case.valve_sections import Variant
+from klack.case.variants import Variant
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         run_many,
         run_shots,
         run_stroke,
+        run_study,
     )
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "run_many",
     "run_shots",
     "run_stroke",
+    "run_study",
 ]
 
 __version__ = "0.1.0"

@@ -45,6 +45,7 @@ __all__ = [
     "run_many",
     "run_shots",
     "run_stroke",
+    "run_study",
 ]
 
 Checked = TypeVar("Checked", Case, ValveCase)
@@ -401,13 +402,51 @@ def run_many(
     demo-stroke, wet: 0 points
     opening_time [s]
     """
-    from klack.analyses.stroke.many import run_strokes
+    from klack.analyses.study.strokes import run_strokes
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
     checked = _of_kind(given, ValveCase, "a whole valve")
     return run_strokes(
         checked, given.tree, points, measures, variant=variant, threads=threads, progress=progress
     )
+
+
+def run_study(
+    case: Given,
+    study: str | Path | None = None,
+    *,
+    folder: str | Path | None = None,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Compute measures of a stroke at the points of a study, as ``klack study`` does.
+
+    Parameters
+    ----------
+    case : str, Path or CaseOnHand
+        Of a whole valve.
+    study : path, optional
+        File with a section ``study``; that of the case by default.
+    folder : path, optional
+        Where computed points are kept, so that an interrupted study resumes.
+    threads : int, optional
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        Before the first run, with file, line and key.
+    """
+    from klack.analyses.study.analysis import STUDY
+    from klack.analyses.study.run import run_study as run
+    from klack.case.study_source import study_of
+
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    checked = _of_kind(given, ValveCase, "a whole valve")
+    source = study_of(checked, given.tree, None if study is None else Path(study))
+    place = None if folder is None else Path(folder)
+    record = run(checked, given.tree, source, folder=place, threads=threads, progress=progress)
+    return Result(record, STUDY)
 
 
 def run_shots(

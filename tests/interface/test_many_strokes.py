@@ -311,7 +311,7 @@ class TestFailures:
         words: str,
         monkeypatch: pytest.MonkeyPatch,
     ):
-        monkeypatch.setattr("klack.analyses.stroke.many.one_variant", None)
+        monkeypatch.setattr("klack.analyses.study.strokes.one_variant", None)
         with pytest.raises(InputError, match=words):
             klack.run_many(small, points, measures)
 

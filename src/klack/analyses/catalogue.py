@@ -54,6 +54,7 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke demo-stroke --variant wet,dry",
     ),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
+    Entry("study.analysis:STUDY", "klack study of points", "klack study demo-stroke"),
     Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
     Entry(
         "reduction.analysis:REDUCTION",

@@ -20,6 +20,7 @@ from klack.units import format_si
 __all__ = [
     "Column",
     "Measure",
+    "Value",
     "cells",
     "described",
     "described_in",

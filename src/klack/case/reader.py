@@ -26,6 +26,7 @@ from klack.case.yaml_limits import UnboundedTree, bounded_yaml
 from klack.errors import InputError
 from klack.input.existing_file import instead_of_file
 from klack.input.problem import CaseProblem, Key, key_text, nearest
+from klack.input.section import Section
 from klack.units import QuantityError
 
 __all__ = [
@@ -39,7 +40,7 @@ __all__ = [
     "validated",
 ]
 
-_Kind = TypeVar("_Kind", bound=CaseFile)
+_Kind = TypeVar("_Kind", bound=Section)
 
 _LARGEST = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
 _LARGEST_NUMBER = 1e15  # nothing with a meaning comes near, and arithmetic ends far beyond
@@ -291,7 +292,7 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
 
 
 def _first_error(
-    case: type[CaseFile], error: ValidationError, data: Any, lines: Lines, path: Path
+    case: type[Section], error: ValidationError, data: Any, lines: Lines, path: Path
 ) -> InputError:
     """Convert the first error of pydantic, and count the others."""
     details = error.errors(include_url=False)
@@ -321,7 +322,7 @@ def _existing(data: Any, location: Sequence[str | int]) -> Key:
     return tuple(key)
 
 
-def _problem(details: ErrorDetails, data: Any, case: type[CaseFile]) -> CaseProblem:
+def _problem(details: ErrorDetails, data: Any, case: type[Section]) -> CaseProblem:
     """Message of klack for one error of pydantic."""
     own = details.get("ctx", {}).get("error")
     if isinstance(own, CaseProblem):

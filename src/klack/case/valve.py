@@ -8,11 +8,8 @@ from pydantic import model_validator
 from klack.case.free_parameters import free_parameters
 from klack.case.noise_consistency import check_noise
 from klack.case.valve_consistency import check_valve
-from klack.case.valve_sections import (
-    VARIANTS,
-    ValveSections,
-    Variant,
-)
+from klack.case.valve_sections import ValveSections
+from klack.case.variants import VARIANTS, Variant
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.own_component import source_digests

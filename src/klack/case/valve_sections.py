@@ -14,6 +14,8 @@ from klack.case.calibration import CaseCalibration
 from klack.case.impact_sections import Lumped
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
+from klack.case.study import CaseStudy
+from klack.case.variants import Variant
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.network.accuracy import Accuracy, fine_step
@@ -21,17 +23,13 @@ from klack.network.declaration import NetworkSection
 from klack.units import Force, Length, Speed, Time, format_si
 
 __all__ = [
-    "VARIANTS",
     "BodyPort",
     "CaseStop",
     "StrokeRun",
     "ValveBody",
     "ValveSections",
-    "Variant",
 ]
 
-Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]
-VARIANTS: tuple[Variant, ...] = ("wet", "dry", "wet-lumped", "dry-lumped")
 _MOST_STEPS = 20_000_000_000
 _MOST_RECORDS = 2_000_000
 
@@ -164,4 +162,7 @@ class ValveSections(CaseFile):
     noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
     calibration: CaseCalibration | None = Field(
         default=None, description="What klack calibrate fits to measured strokes."
+    )
+    study: CaseStudy | None = Field(
+        default=None, description="What klack study varies, and what it computes."
     )

@@ -138,7 +138,7 @@ def _with_measurement(
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
     """Files by variant; all of them must be there."""
-    from klack.case.valve_sections import VARIANTS
+    from klack.case.variants import VARIANTS
 
     files: dict[str, list[Path]] = {}
     for text in given:

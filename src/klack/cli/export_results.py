@@ -8,6 +8,7 @@ from klack.terminal.output import Written, staged_folder
 from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
+    from klack.analyses.study.record import StudyRecord
     from klack.case.schema import Case
     from klack.case.valve import ValveCase
 
@@ -15,11 +16,14 @@ __all__ = ["export_fields", "export_result", "run_and_export"]
 
 
 def export_result(study: Any, to: str, folder: Path) -> Written:
-    """Write the histories of a stored study."""
+    """Write the histories of a stored result, or the points of a study."""
     from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.stroke.record import StrokeStudy
+    from klack.analyses.study.record import StudyRecord
     from klack.exchange.results.study_table import result_table
 
+    if isinstance(study, StudyRecord) and to == "csv":
+        return _export_points(study, folder)
     if not isinstance(study, ImpactStudy | StrokeStudy):
         raise InputError(
             "the stored result",
@@ -46,6 +50,14 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
             from klack.exchange.results.csv_files import write_csv
 
             write_csv(table, stage)
+        return Written.of(folder, stage)
+
+
+def _export_points(study: "StudyRecord", folder: Path) -> Written:
+    from klack.analyses.study.table import study_table
+
+    with staged_folder(folder) as stage:
+        study_table(study).to_csv(stage / "points.csv")
         return Written.of(folder, stage)
 
 

@@ -19,6 +19,7 @@ __all__ = [
     "COLOURS",
     "DASHES",
     "LABEL_STEP",
+    "AnyChart",
     "AxisSpec",
     "Band",
     "BarChart",
@@ -27,6 +28,8 @@ __all__ = [
     "Curve",
     "Mark",
     "Panel",
+    "ParallelAxis",
+    "ParallelChart",
     "stems",
 ]
 
@@ -196,6 +199,66 @@ class BarChart:
     rows: tuple[str, ...]
     parts: tuple[BarPart, ...]
     note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParallelAxis:
+    """One upright axis: a value for every line, of words which of them; nan leaves the line out."""
+
+    spec: AxisSpec
+    values: NDArray[np.float64]
+    words: tuple[str, ...] = ()
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest value; apart also where all are the same."""
+        known = self.values[np.isfinite(self.values)]
+        if not known.size:
+            return 0.0, 1.0
+        low, high = float(known.min()), float(known.max())
+        apart = 0.0 if low < high else 0.5 * (abs(low) or 1.0)
+        return low - apart, high + apart
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParallelChart:
+    """Parallel axes: every point of many dimensions is a line from axis to axis.
+
+    Inselberg, A. (1985), The plane with parallel coordinates.  In the browser a range of an axis
+    can be marked, and only the lines that pass it stay.
+
+    Parameters
+    ----------
+    name, title : str
+    axes : tuple of ParallelAxis
+        From left to right.
+    coloured : int
+        Axis whose values give the lines their colours.
+    note : str
+    """
+
+    name: str
+    title: str
+    axes: tuple[ParallelAxis, ...]
+    coloured: int
+    note: str = ""
+
+    @property
+    def lines(self) -> NDArray[np.float64]:
+        """Values of the lines that have one on every axis, shape (lines, axes)."""
+        return self._table[self.places]
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Number of each of these lines among all points."""
+        return np.flatnonzero(np.isfinite(self._table).all(axis=1))
+
+    @property
+    def _table(self) -> NDArray[np.float64]:
+        return np.column_stack([axis.values for axis in self.axes])
+
+
+AnyChart = Chart | BarChart | ParallelChart
 
 
 def stems(

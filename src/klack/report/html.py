@@ -9,13 +9,11 @@ import gzip
 from base64 import b64encode
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
-from klack.report.chart import BarChart, Chart
-from klack.report.interactive import plotly_bars, plotly_chart
+from klack.report.interactive import figure_of
 from klack.report.page import Content
 from klack.whole_file import whole_file
 
@@ -37,7 +35,7 @@ def render_html(content: Content) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["figure"] = _figure
+    environment.filters["figure"] = figure_of
     environment.filters["base64"] = lambda data: b64encode(data).decode()
     template = environment.get_template("template.html")
     return template.render(content=content, plotly=_plotly())
@@ -48,7 +46,3 @@ def _plotly() -> dict[str, str]:
     """Version and packed text of the library; the same bytes every time."""
     packed = gzip.compress(get_plotlyjs().encode(), mtime=0)
     return {"version": get_plotlyjs_version(), "packed": b64encode(packed).decode()}
-
-
-def _figure(chart: Chart | BarChart) -> dict[str, Any]:
-    return plotly_bars(chart) if isinstance(chart, BarChart) else plotly_chart(chart)

@@ -16,14 +16,16 @@ from klack.report.chart import (
     COLOURS,
     DASHES,
     LABEL_STEP,
+    AnyChart,
     AxisSpec,
     BarChart,
     Chart,
     Curve,
     Panel,
+    ParallelChart,
 )
 
-__all__ = ["plotly_bars", "plotly_chart"]
+__all__ = ["figure_of", "parallel_axes", "plotly_bars", "plotly_chart"]
 
 _GRID, _INK = "#e3e6ea", "#22262b"
 _LAYOUT: dict[str, Any] = {
@@ -35,6 +37,13 @@ _LAYOUT: dict[str, Any] = {
 }
 _PANEL_HEIGHT = 330
 _PANEL_GAP = 0.06
+
+
+def figure_of(chart: AnyChart) -> dict[str, Any]:
+    """What the page draws: ``data`` and ``layout`` for ``Plotly.newPlot``, or parallel ``axes``."""
+    if isinstance(chart, ParallelChart):
+        return parallel_axes(chart)
+    return plotly_bars(chart) if isinstance(chart, BarChart) else plotly_chart(chart)
 
 
 def plotly_chart(chart: Chart) -> dict[str, Any]:
@@ -104,6 +113,25 @@ def plotly_bars(chart: BarChart) -> dict[str, Any]:
         "yaxis": {"autorange": "reversed", "automargin": True, "ticksuffix": "  "},
     }
     return {"data": data, "layout": layout}
+
+
+def parallel_axes(chart: ParallelChart) -> dict[str, Any]:
+    """Data of parallel axes, which the page draws itself.
+
+    Those of plotly compile code as they go, which the security policy of the page forbids.
+    """
+    lines, places = chart.lines, chart.places
+    axes = [
+        {
+            "label": axis.spec.text,
+            "low": float(f"{axis.ends[0]:.6g}"),
+            "high": float(f"{axis.ends[1]:.6g}"),
+            "words": list(axis.words),
+            "values": _numbers(lines[:, k]),
+        }
+        for k, axis in enumerate(chart.axes)
+    ]
+    return {"axes": axes, "coloured": chart.coloured, "names": places.tolist()}
 
 
 def _suffix(panel: int) -> str:

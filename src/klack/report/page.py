@@ -7,7 +7,7 @@ the text of the case come from the user.
 from dataclasses import dataclass
 from typing import Protocol
 
-from klack.report.chart import BarChart, Chart
+from klack.report.chart import AnyChart
 
 __all__ = ["Content", "Picture", "Section", "Sound", "Table"]
 
@@ -52,7 +52,7 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     sounds: tuple[Sound, ...] = ()
     picture: Picture | None = None
-    charts: tuple[Chart | BarChart, ...] = ()
+    charts: tuple[AnyChart, ...] = ()
     tables: tuple[Table, ...] = ()
 
 

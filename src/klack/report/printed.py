@@ -6,9 +6,11 @@ SVG has letters as outlines.
 from io import BytesIO
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
@@ -17,11 +19,13 @@ from klack.report.chart import (
     COLOURS,
     DASHES,
     LABEL_STEP,
+    AnyChart,
     AxisSpec,
     BarChart,
     Chart,
     Curve,
     Panel,
+    ParallelChart,
 )
 
 __all__ = ["STYLE", "plain", "png_chart", "svg", "svg_chart"]
@@ -61,13 +65,13 @@ def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
     return stream.getvalue()
 
 
-def svg_chart(chart: Chart | BarChart, *, width: float = _WIDTH) -> bytes:
+def svg_chart(chart: AnyChart, *, width: float = _WIDTH) -> bytes:
     """Draw a chart with its legend above it; ``width`` in inches, letters keep their size."""
     with rc_context(STYLE):
         return svg(_drawn(chart, width))
 
 
-def png_chart(chart: Chart | BarChart) -> bytes:
+def png_chart(chart: AnyChart) -> bytes:
     """Draw a chart as pixels, for notebooks: curves of many points stay small."""
     with rc_context(STYLE):
         figure = _drawn(chart, _WIDTH)
@@ -77,8 +81,47 @@ def png_chart(chart: Chart | BarChart) -> bytes:
         return stream.getvalue()
 
 
-def _drawn(chart: Chart | BarChart, width: float) -> Figure:
+def _drawn(chart: AnyChart, width: float) -> Figure:
+    if isinstance(chart, ParallelChart):
+        return _parallel(chart, width)
     return _bars(chart) if isinstance(chart, BarChart) else _curves(chart, width)
+
+
+def _parallel(chart: ParallelChart, width: float) -> Figure:
+    """Lines between upright axes, each from its lowest to its highest value."""
+    lines, ends = chart.lines, np.array([axis.ends for axis in chart.axes])
+    heights = (lines - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    order = np.argsort(-heights[:, chart.coloured])
+    with rc_context({"axes.grid": False}):
+        figure = Figure(figsize=(width, 3.4), layout="constrained")
+        axes = figure.subplots()
+        x = np.arange(len(chart.axes))
+        shown = LineCollection(
+            [np.column_stack([x, row]) for row in heights[order]],
+            array=lines[order, chart.coloured],
+            cmap="viridis",
+            linewidths=0.6,
+            alpha=0.7,
+            rasterized=True,
+        )
+        axes.add_collection(shown)
+        for k, axis in enumerate(chart.axes):
+            axes.axvline(k, color="#22262b", linewidth=0.7)
+            marks = [(end, f"{value:.4g}") for end, value in zip((0.0, 1.0), ends[k], strict=True)]
+            if axis.words:
+                span = ends[k, 1] - ends[k, 0]
+                marks = [((i - ends[k, 0]) / span, word) for i, word in enumerate(axis.words)]
+            for height, text in marks:
+                axes.text(k, height, f" {plain(text)}", fontsize=6.0, ha="left", va="center")
+        axes.set_xlim(-0.1, len(chart.axes) - 0.6)
+        axes.set_ylim(-0.04, 1.04)
+        texts = [plain(axis.spec.text) for axis in chart.axes]
+        axes.set_xticks(x, texts, rotation=20, ha="right", fontsize=6.5)
+        axes.set_yticks([])
+        axes.set_frame_on(False)
+        bar = figure.colorbar(shown, ax=axes, pad=0.01)
+        bar.set_label(plain(chart.axes[chart.coloured].spec.text))
+        return figure
 
 
 def _curves(chart: Chart, width: float) -> Figure:

@@ -3,12 +3,16 @@
 from collections.abc import Mapping
 from math import floor, isfinite, log10
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 __all__ = [
     "count",
     "fixed",
     "listed",
     "own_code",
     "power",
+    "printed_unit",
     "quantity",
     "sentence",
     "share",
@@ -44,6 +48,21 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     scaled = rounded / 10.0**power
     decimals = max(0, digits - 1 - floor(log10(abs(scaled)) + 1e-12))
     return f"{scaled:.{decimals}f}".replace("-", _MINUS) + _space(_PREFIXES[power] + unit)
+
+
+def printed_unit(values: ArrayLike, unit: str) -> tuple[str, float]:
+    """Unit with the prefix that keeps the largest value between 1 and 1000, and its factor.
+
+    >>> printed_unit([2e-5, -8e-5], "m")
+    ('µm', 1000000.0)
+    """
+    if unit in _WITHOUT_PREFIX:
+        return unit, 1.0
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    if not largest > 0.0 or unit.startswith("kg") or "^" in unit.split("/")[0]:
+        return unit, 1.0
+    power = min(max(3 * floor(log10(largest) / 3 + 1e-12), -12), 9)
+    return _PREFIXES[power] + unit, float(f"1e{-power}")
 
 
 def _space(unit: str) -> str:

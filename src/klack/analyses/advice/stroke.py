@@ -21,7 +21,7 @@ from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
 from klack.case.valve import ValveCase
-from klack.case.valve_sections import Variant
+from klack.case.variants import Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
 from klack.progress import Progress, silent

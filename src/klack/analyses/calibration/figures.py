@@ -1,6 +1,6 @@
 """The figures of a calibration report, each built from a study by one function."""
 
-from math import floor, isfinite, log10
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ from klack.analyses.calibration.record import (
 from klack.measurement.fit_window import FitWindow
 from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
 from klack.report.thinning import thinned
+from klack.report.wording import printed_unit
 
 __all__ = ["profile_chart", "stroke_chart", "window_chart"]
 
 Floats = NDArray[np.float64]
 
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 _MARGIN = 0.05
 _HEADROOM = 1.25
 """Range of the residual over its largest value, for the legend of nothing but the curve."""
@@ -162,18 +162,3 @@ def profile_chart(profile: ProfileCurve, parameter: CalibratedParameter) -> Char
             "error alone would mislead."
         ),
     )
-
-
-def printed_unit(values: Floats, unit: str) -> tuple[str, float]:
-    """Unit with the prefix that keeps the largest value between 1 and 1000, and its factor.
-
-    >>> printed_unit(np.array([2e-5, -8e-5]), "m")
-    ('µm', 1000000.0)
-    """
-    if not unit:
-        return "", 1.0
-    largest = float(np.max(np.abs(values), initial=0.0))
-    if not largest > 0.0 or unit.startswith("kg") or "^" in unit.split("/")[0]:
-        return unit, 1.0
-    power = min(max(3 * floor(log10(largest) / 3 + 1e-12), min(_PREFIXES)), max(_PREFIXES))
-    return _PREFIXES[power] + unit, float(f"1e{-power}")

@@ -27,7 +27,7 @@ from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.assembling.body_summary import BodySummary
 from klack.contact.restitution import Deviation
-from klack.report.chart import BarChart, Chart
+from klack.report.chart import AnyChart
 from klack.report.page import Content, Section, Table
 from klack.report.wording import (
     count,
@@ -50,7 +50,7 @@ def report_content(study: ImpactStudy) -> Content:
     by_name = {chart.name: chart for chart in found}
     transfer = tuple(chart for chart in found if chart.name.startswith("transfer-"))
 
-    def named(*names: str) -> tuple[Chart | BarChart, ...]:
+    def named(*names: str) -> tuple[AnyChart, ...]:
         return tuple(by_name[name] for name in names if name in by_name)
 
     sections = [_estimates(study), _computed(study)]

@@ -16,6 +16,7 @@ from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.contact.history import ImpactHistory
 from klack.reduction.transfer import TransferComparison
 from klack.report.chart import (
+    AnyChart,
     AxisSpec,
     Band,
     BarChart,
@@ -56,9 +57,9 @@ _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 _TIME = AxisSpec(label="time since first touch", unit="µs")
 
 
-def charts(study: ImpactStudy) -> tuple[Chart | BarChart, ...]:
+def charts(study: ImpactStudy) -> tuple[AnyChart, ...]:
     """Every figure that the study has data for, in the order of the report."""
-    found: list[Chart | BarChart] = [force_chart(study), spectrum_chart(study)]
+    found: list[AnyChart] = [force_chart(study), spectrum_chart(study)]
     found.append(motion_chart(study))
     found += [transfer_chart(comparison) for comparison in study.transfer]
     found += [law_chart(study), approach_chart(study), energy_bars(study)]

@@ -1,14 +1,18 @@
 """Measures of noise: of a design, of the force of a stop, and of the vibration of a body."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import log10
+from typing import cast
 
+from klack.acoustics.signal_statistics import SoundStatistics
 from klack.acoustics.third_octave import ENERGY_REFERENCE
-from klack.analyses.measures import Column, Measure, described_in
+from klack.analyses.measures import Column, Measure, Value, described_in
 from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, StopForce
 
 __all__ = [
     "BODY_MEASURES",
+    "CLICK_MEASURES",
     "DESIGN_MEASURES",
     "EXPOSURE_LEVEL_A",
     "FORCE_LEVEL",
@@ -25,7 +29,7 @@ def strongest(design: NoiseDesign) -> StopForce:
     return max(design.stops, key=lambda stop: stop.peak_force)
 
 
-def _heard(read: Callable[[ClickSound], float]) -> Callable[[NoiseDesign], float | None]:
+def _heard(read: Callable[[ClickSound], Value]) -> Callable[[NoiseDesign], Value]:
     return lambda design: None if design.sound is None else read(design.sound)
 
 
@@ -51,21 +55,59 @@ FORCE_LEVEL = Measure[NoiseDesign](
     deviation="difference",
     page=True,
 )
-EXPOSURE_LEVEL_A = Measure[NoiseDesign](
-    key="sound_exposure_level_weighted",
-    json_name="sound_exposure_level_dBA",
-    name="sound exposure level of a click, A-weighted",
-    symbol="L_AE",
-    unit="dBA",
-    definition="Level of ∫ p² dt of one click with weighting A, re (20 µPa)² s.",
-    source=_SOUND,
-    read=_heard(lambda sound: sound.statistics.exposure_level_A),
-    form="fixed",
-    digits=1,
-    column=Column("dBA", 1.0, ".1f", "SEL"),
-    deviation="difference",
-    page=True,
+CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
+    _SOUND,
+    Measure(
+        key="sound_exposure_level_weighted",
+        json_name="sound_exposure_level_dBA",
+        name="sound exposure level of a click, A-weighted",
+        symbol="L_AE",
+        unit="dBA",
+        definition="Level of ∫ p² dt of one click with weighting A, re (20 µPa)² s.",
+        read=lambda click: click.exposure_level_A,
+        form="fixed",
+        digits=1,
+        column=Column("dBA", 1.0, ".1f", "SEL"),
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="sound_exposure_level",
+        name="sound exposure level of a click",
+        symbol="L_E",
+        unit="dB",
+        definition="Level of ∫ p² dt of one click without weighting, re (20 µPa)² s.",
+        read=lambda click: click.exposure_level,
+        form="fixed",
+        digits=1,
+        column=Column("dBZ", 1.0, ".1f", "SEL"),
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="peak_level",
+        name="peak level of a click",
+        symbol="L_peak",
+        unit="dB",
+        definition="Level of the largest pressure of one click without weighting, re 20 µPa.",
+        read=lambda click: click.peak_level,
+        form="fixed",
+        digits=1,
+        column=Column("dBZ", 1.0, ".1f", "peak"),
+        deviation="difference",
+        page=True,
+    ),
 )
+"""Of one click: these need no more than its pressure."""
+
+
+def _of_design(measure: Measure[SoundStatistics]) -> Measure[NoiseDesign]:
+    read = _heard(lambda sound: measure.read(sound.statistics))
+    return replace(cast(Measure[NoiseDesign], measure), read=read)
+
+
+_OF_DESIGNS = tuple(map(_of_design, CLICK_MEASURES))
+EXPOSURE_LEVEL_A = _OF_DESIGNS[0]
 DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
     _THEORY,
     Measure(
@@ -139,35 +181,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         deviation="energy",
         page=True,
     ),
-    EXPOSURE_LEVEL_A,
-    Measure(
-        key="sound_exposure_level",
-        name="sound exposure level of a click",
-        symbol="L_E",
-        unit="dB",
-        definition="Level of ∫ p² dt of one click without weighting, re (20 µPa)² s.",
-        source=_SOUND,
-        read=_heard(lambda sound: sound.statistics.exposure_level),
-        form="fixed",
-        digits=1,
-        column=Column("dBZ", 1.0, ".1f", "SEL"),
-        deviation="difference",
-        page=True,
-    ),
-    Measure(
-        key="peak_level",
-        name="peak level of a click",
-        symbol="L_peak",
-        unit="dB",
-        definition="Level of the largest pressure of one click without weighting, re 20 µPa.",
-        source=_SOUND,
-        read=_heard(lambda sound: sound.statistics.peak_level),
-        form="fixed",
-        digits=1,
-        column=Column("dBZ", 1.0, ".1f", "peak"),
-        deviation="difference",
-        page=True,
-    ),
+    *_OF_DESIGNS,
     Measure(
         key="pattern_level",
         name="level of the drive pattern, A-weighted",

@@ -12,7 +12,11 @@ from klack.acoustics.force_bands import force_bands
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Plate
-from klack.acoustics.signal_statistics import pressure_third_octaves, sound_statistics
+from klack.acoustics.signal_statistics import (
+    SoundStatistics,
+    pressure_third_octaves,
+    sound_statistics,
+)
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.spectrum import force_spectrum, impulse_level
 from klack.acoustics.third_octave import ThirdOctaves
@@ -36,7 +40,7 @@ from klack.signals import TimeSeries
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["run_noise"]
+__all__ = ["click_statistics", "noise_design", "run_noise"]
 
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
 _HEARING = 20e3  # [Hz]
@@ -86,6 +90,22 @@ def run_noise(
         designs=designs,
         warnings=tuple(notes),
     )
+
+
+def click_statistics(source: NoiseSource) -> SoundStatistics | None:
+    """Levels of one click: a part of :func:`noise_design`, in a fifth of its time.
+
+    None if nothing radiates.
+    """
+    bands = [force_bands(stop.force) for stop in source.stops]
+    around = _surroundings(source, net_share(source.net, bands), bands[0])
+    pressure = _pressure(source, around)
+    return None if pressure is None else sound_statistics(pressure)
+
+
+def noise_design(source: NoiseSource) -> NoiseDesign:
+    """Noise of one run, by itself."""
+    return _design(source, source.run, several=False, clock=StageClock(silent))
 
 
 def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple[str, ...]:

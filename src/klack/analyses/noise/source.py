@@ -29,7 +29,7 @@ from klack.case.impact_sections import LEVELS
 from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.case.valve_sections import VARIANTS
+from klack.case.variants import VARIANTS
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.progress import Progress, silent
@@ -228,11 +228,19 @@ def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[Nois
 # --------------------------------------------------------------------------- strokes
 
 
-def stroke_sources(study: StrokeStudy, variants: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
-    """Forces of all stops of a stroke, in some variants; in the first one without."""
+def stroke_sources(
+    study: StrokeStudy, variants: Sequence[str] = (), case: ValveCase | None = None
+) -> tuple[NoiseSource, ...]:
+    """Forces of all stops of a stroke, in some variants; in the first one without.
+
+    The section ``noise`` and the materials are those of the text of the study, or of ``case``.
+    """
     _require_structures(study)
     wanted = tuple(variants) or (study.reference.name,)
-    noise, given, materials = _noise_section(study.case_text)
+    if case is None:
+        noise, given, materials = _noise_section(study.case_text)
+    else:
+        noise, given, materials = case.noise or CaseNoise(), case.noise is not None, case.materials
     found = []
     for name in wanted:
         _require("variant", name, study.variants)

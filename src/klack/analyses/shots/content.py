@@ -10,6 +10,7 @@ from klack.analyses.impact.pressure_view import PressureView, pressure_view
 from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
+from klack.analyses.sample import rank_correlation
 from klack.analyses.shots.figures import (
     Shown,
     distribution_chart,
@@ -34,8 +35,8 @@ __all__ = ["shots_content"]
 
 _LISTED = 100
 """Shots in the table; the result holds all of them."""
-_RELATED, _FEWEST = 0.5, 5
-"""Least rank correlation that is worth a sentence, and the shots that it takes."""
+_RELATED = 0.5
+"""Least rank correlation that is worth a sentence."""
 
 
 def shots_content(study: ShotsStudy) -> Content:
@@ -75,7 +76,7 @@ def _rule(study: ShotsStudy) -> str:
     if rank:
         text = f"{_shots_of(rank)} at least as high as the centred impact."
     related = {
-        shown.label: _rank_correlation(shown.of(study.shots), study.shots.rebound_height)
+        shown.label: rank_correlation(shown.of(study.shots), study.shots.rebound_height)
         for shown in _drawn_numbers(study)
     }
     strongest = max(related, key=lambda label: abs(related[label]))
@@ -86,17 +87,6 @@ def _rule(study: ShotsStudy) -> str:
             f"it {grows} with it (rank correlation {signed(related[strongest], 2)})."
         )
     return text
-
-
-def _rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Spearman's coefficient over the values present in both columns; 0 where one is constant."""
-    from scipy.stats import rankdata  # half a second to load, which every other report saves
-
-    known = np.isfinite(one) & np.isfinite(other)
-    first, second = rankdata(one[known]), rankdata(other[known])
-    if known.sum() < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
-        return 0.0
-    return float(np.corrcoef(first, second)[0, 1])
 
 
 def _shots_of(number: int) -> str:
@@ -123,7 +113,7 @@ def _explaining(study: ShotsStudy) -> list[Shown]:
         shown
         for shown in _drawn_numbers(study)
         if shown.column in ("eccentricity", "tilt")
-        or abs(_rank_correlation(shown.of(study.shots), height)) > _RELATED
+        or abs(rank_correlation(shown.of(study.shots), height)) > _RELATED
     ]
 
 

@@ -28,7 +28,7 @@ from klack.analyses.stroke.summary import (
     time_rows,
 )
 from klack.analyses.stroke.wording import largest, stroke_answer
-from klack.report.chart import BarChart, Chart
+from klack.report.chart import AnyChart, Chart
 from klack.report.page import Content, Section, Table
 from klack.report.wording import quantity
 from klack.simulation.network_result import EnergyBooks
@@ -75,12 +75,12 @@ def stroke_content(study: StrokeStudy) -> Content:
     )
 
 
-def stroke_charts(study: StrokeStudy) -> tuple[Chart | BarChart, ...]:
+def stroke_charts(study: StrokeStudy) -> tuple[AnyChart, ...]:
     """Every figure that the study has data for, in the order of the report."""
     return tuple(chart for section in stroke_content(study).sections for chart in section.charts)
 
 
-def _named(*charts: Chart | BarChart | None) -> tuple[Chart | BarChart, ...]:
+def _named(*charts: AnyChart | None) -> tuple[AnyChart, ...]:
     return tuple(chart for chart in charts if chart is not None)
 
 
@@ -113,7 +113,7 @@ def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
         for name in ("wet", "dry")
         if {name, f"{name}-lumped"} <= {*study.variants}
     ]
-    found: list[Chart | BarChart] = []
+    found: list[AnyChart] = []
     for flexible, lumped in pairs:
         note = (
             "Flexible bodies with their consistent local laws against rigid bodies on one spring "

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from klack.analyses.impact.contact_check import check_contact
-from klack.analyses.record import case_fields, run_fields
+from klack.analyses.record import RunFields, case_fields, run_fields
 from klack.analyses.stroke.missing import missing_notes
 from klack.analyses.stroke.record import (
     FluidSummary,
@@ -26,7 +26,7 @@ from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.valve_sections import Variant
+from klack.case.variants import Variant
 from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
@@ -40,7 +40,16 @@ from klack.simulation.network_run import State, simulate_network
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["VariantRun", "one_variant", "run_stroke", "run_variant", "variant_network"]
+__all__ = [
+    "VariantRun",
+    "body_summaries",
+    "one_variant",
+    "run_stroke",
+    "run_variant",
+    "stop_summaries",
+    "stroke_study",
+    "variant_network",
+]
 
 
 def run_stroke(
@@ -82,9 +91,8 @@ def run_stroke(
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
         runs, failure = _runs(valve, roles, states, clock)
-        stops = _stop_summaries(valve)
+        stops = stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
-    rows = [run.rows for run in runs.values()]
     told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
     starts = {name: item.result.start for name, item in results.items()}
     begun = [
@@ -94,21 +102,13 @@ def run_stroke(
         if not any(note in other for other in notes)  # a warning already
     ]
     missing = missing_notes(results, [name for name in wanted if name not in results], failure)
-    study = StrokeStudy(
-        **case_fields(case),
-        **run_fields(begin, clock),
-        needle=roles.needle,
-        lift=_lift(rows[0], roles.needle),
-        switch_off=_switch_off(valve.network),
-        duration=case.run.duration,
-        step=case.run.fine_step,
-        variants=results,
-        channels=_channels(valve.network, roles, [run.result for run in results.values()]),
-        bodies=_body_summaries(valve),
+    study = stroke_study(
+        valve,
+        roles,
+        runs,
+        run_fields(begin, clock),
+        bodies=body_summaries(valve),
         stops=stops,
-        fluid=_fluid_summary(rows),
-        lines=_line_summaries(valve.network, rows),
-        structures=valve.structures,
         warnings=(*missing, *notes, *begun, *(note for note in told if note)),
     )
     if failure is not None:
@@ -146,6 +146,52 @@ class VariantRun:
     variant: StrokeVariant
     rows: Rows
     failure: ConvergenceError | None
+
+
+def stroke_study(
+    valve: Valve,
+    roles: ValveRoles,
+    runs: Mapping[Variant, VariantRun],
+    made: RunFields,
+    *,
+    bodies: tuple[BodySummary, ...],
+    stops: tuple[StopSummary, ...],
+    warnings: tuple[str, ...] = (),
+) -> StrokeStudy:
+    """Record of variants that were computed.
+
+    Parameters
+    ----------
+    valve : Valve
+        Its meshes and contacts are not needed.
+    roles : ValveRoles
+    runs : mapping of str to VariantRun
+    made : RunFields
+        By which version, when, in which time.
+    bodies : tuple of BodySummary
+    stops : tuple of StopSummary
+    warnings : tuple of str
+    """
+    case = valve.case
+    rows = [run.rows for run in runs.values()]
+    results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
+    return StrokeStudy(
+        **case_fields(case),
+        **made,
+        needle=roles.needle,
+        lift=_lift(rows[0], roles.needle),
+        switch_off=_switch_off(valve.network),
+        duration=case.run.duration,
+        step=case.run.fine_step,
+        variants=results,
+        channels=_channels(valve.network, roles, [run.result for run in results.values()]),
+        bodies=bodies,
+        stops=stops,
+        fluid=_fluid_summary(rows),
+        lines=_line_summaries(valve.network, rows),
+        structures=valve.structures,
+        warnings=warnings,
+    )
 
 
 def run_variant(
@@ -191,9 +237,9 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
 
 def _runs(
     valve: Valve, roles: ValveRoles, states: Mapping[Variant, State | None], progress: Progress
-) -> tuple[dict[str, VariantRun], ConvergenceError | None]:
+) -> tuple[dict[Variant, VariantRun], ConvergenceError | None]:
     """Variants up to the first one that fails, with what there is of it, and its error."""
-    runs: dict[str, VariantRun] = {}
+    runs: dict[Variant, VariantRun] = {}
     for name, state in states.items():
         try:
             runs[name] = one_variant(valve, roles, name, state, progress)
@@ -312,7 +358,8 @@ def _channels(
     )
 
 
-def _body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
+def body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
+    """What a report says of each body."""
     result = []
     for name, body in valve.bodies.items():
         reduced = valve.reduced[name]
@@ -328,7 +375,8 @@ def _body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
     return tuple(result)
 
 
-def _stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
+def stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
+    """What a report says of the contact of each stop."""
     return tuple(
         _stop_summary(valve, name, part)
         for name, part in valve.network.components.items()

@@ -9,12 +9,24 @@ number of threads nor on the other points.
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
+from klack.analyses.noise.source import NoiseSource, stroke_sources
 from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
-from klack.analyses.stroke.chosen_measures import ChosenMeasure, chosen_measures
+from klack.analyses.record import run_fields
+from klack.analyses.stroke.record import StopSummary
 from klack.analyses.stroke.rest import rest_note
-from klack.analyses.stroke.run import one_variant, variant_network
+from klack.analyses.stroke.run import (
+    VariantRun,
+    body_summaries,
+    one_variant,
+    stop_summaries,
+    stroke_study,
+    variant_network,
+)
+from klack.analyses.study.chosen_measures import ChosenMeasure, PointRun, chosen_measures
 from klack.analyses.threads import Stopped, on_threads, warnings_of_threads
+from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.points import (
@@ -27,8 +39,8 @@ from klack.case.points import (
     with_changes,
 )
 from klack.case.valve import ValveCase
-from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, find_roles
-from klack.case.valve_sections import Variant
+from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
+from klack.case.variants import Variant
 from klack.cores import available_cores
 from klack.errors import AccuracyWarning, InputError, KlackError
 from klack.input.problem import Key
@@ -36,9 +48,9 @@ from klack.memory import require_memory
 from klack.progress import Progress, silent
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
-from klack.stages import FAILURES, collected_warnings, show
+from klack.stages import FAILURES, StageClock, collected_warnings, show
 
-__all__ = ["run_strokes"]
+__all__ = ["AskedPoints", "PointRow", "compute_points", "row_table", "run_strokes"]
 
 _AROUND = 50e6  # [byte] of a run beside its records
 _FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
@@ -48,29 +60,85 @@ _ASIDE = ("run", "lumped", "measurement", "calibration", "title", "description")
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
-    """What one point leaves behind."""
+class PointRow:
+    """What one point leaves behind.
+
+    Parameters
+    ----------
+    values : tuple of float or None
+        Of the measures, in their order.
+    failure : str
+        Why there are none; empty if it was computed.
+    notes : tuple of str
+        Doubts about the numbers.
+    others : tuple of WarningMessage
+        Warnings that are no doubt about a number.
+    by_chance : bool
+        True if the same point may be computed another time: the memory was full, or a component
+        of the user's own has failed.
+    """
 
     values: tuple[float | None, ...]
     failure: str = ""
     notes: tuple[str, ...] = ()
     others: tuple[warnings.WarningMessage, ...] = ()
+    by_chance: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
-    """What is computed at every point."""
+class AskedPoints:
+    """Points of a case, and what is computed at every one of them.
 
+    Parameters
+    ----------
+    case : ValveCase
+    tree : CaseTree
+        The same as it was written.
+    points : Points
+    chosen : tuple of ChosenMeasure
+    variant : str
+    """
+
+    case: ValveCase
     tree: CaseTree
     points: Points
     chosen: tuple[ChosenMeasure, ...]
     variant: Variant
 
-    def failed(self, error: BaseException) -> _Row:
+    @classmethod
+    def of(
+        cls,
+        case: ValveCase,
+        tree: CaseTree,
+        points: GivenPoints,
+        measures: Iterable[str],
+        variant: str | None,
+    ) -> Self:
+        """Check everything that can be known before the first run.
+
+        Raises
+        ------
+        InputError
+            For a key, a unit, a measure or a variant that does not exist.
+        """
+        chosen = chosen_measures(case, measures)
+        asked = points_of(case, tree, points)
+        for key in asked.keys:
+            if key.place[:2] == ("run", "variants"):
+                raise InputError(
+                    f"points: {key.name}",
+                    got="a variant as a part of a point",
+                    expected="one variant for all points",
+                    hint='write variant="dry", and compute two tables.',
+                )
+        name = case.require_variants((variant,) if variant is not None else case.run.variants)[0]
+        return cls(case=case, tree=tree, points=asked, chosen=chosen, variant=name)
+
+    def failed(self, error: BaseException) -> PointRow:
         """Row of a point without measures."""
         known = isinstance(error, KlackError)
         text = str(error) if known else f"{type(error).__name__}: {error}"
-        return _Row((None,) * len(self.chosen), text)
+        return PointRow((None,) * len(self.chosen), text, by_chance=not known)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +171,8 @@ class _Built:
         The same, checked where no point changes it.
     valve : Valve
         Of one point, without meshes.
+    bodies : tuple of BodySummary
+    stops : tuple of StopSummary
     notes : tuple of str
         Doubts about bodies and laws.
     """
@@ -111,6 +181,8 @@ class _Built:
     tree: CaseTree
     parts: CaseTree
     valve: Valve
+    bodies: tuple[BodySummary, ...]
+    stops: tuple[StopSummary, ...]
     notes: tuple[str, ...]
 
 
@@ -134,7 +206,7 @@ def run_strokes(
     points : sequence of mappings, or mapping of sequences
         Key of the case to a value with its unit, for every point; or a list of values by key.
     measures : iterable of str
-        See :class:`~klack.analyses.stroke.chosen_measures.ChosenMeasure`.
+        See :class:`~klack.analyses.study.chosen_measures.ChosenMeasure`.
     variant : str, optional
         The first one of the case by default.
     threads : int, optional
@@ -151,39 +223,72 @@ def run_strokes(
     RunsInterrupted
         On Ctrl-C, with the table of what was computed until then.
     """
-    chosen = chosen_measures(case, measures)
-    asked = points_of(case, tree, points)
-    for key in asked.keys:
-        if key.place[:2] == ("run", "variants"):
-            raise InputError(
-                f"points: {key.name}",
-                got="a variant as a part of a point",
-                expected="one variant for all points",
-                hint='write variant="dry", and compute two tables.',
-            )
-    name = case.require_variants((variant,) if variant is not None else case.run.variants)[0]
+    asked = AskedPoints.of(case, tree, points, measures, variant)
     if threads is not None and (isinstance(threads, bool) or threads < 1):
         raise InputError(
             "threads", got=str(threads), expected="1 or more", hint="leave it out: all cores."
         )
-    work = _Asked(tree=tree, points=asked, chosen=chosen, variant=name)
-    rows: list[_Row | None] = [None] * len(asked)
+    rows: list[PointRow | None] = [None] * len(asked.points)
     try:
-        for group in _groups(case, asked):
-            _run_group(work, group, rows, threads, progress)
+        compute_points(asked, range(len(rows)), rows.__setitem__, threads, progress)
     except KeyboardInterrupt:
-        raise RunsInterrupted(_table(case, work, rows)) from None
+        raise RunsInterrupted(row_table(asked, rows)) from None
+    return row_table(asked, rows)
+
+
+def compute_points(
+    asked: AskedPoints,
+    places: Iterable[int],
+    keep: Callable[[int, PointRow], None],
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> None:
+    """Compute some of the points, those with the same bodies one after another.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    places : iterable of int
+        Of the points that are wanted.
+    keep : callable
+        Called in this thread with each place and its row, in the order of their end.
+    threads : int, optional
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        Where so many strokes at a time do not fit into the memory.
+    KeyboardInterrupt
+        Ctrl-C, after the rows that were finished have been kept.
+    """
+    wanted = list(places)
+    others: dict[str, warnings.WarningMessage] = {}
+    begin, done = len(asked.points) - len(wanted), 0
+
+    def kept(place: int, row: PointRow) -> None:
+        nonlocal done
+        keep(place, row)
+        done += 1
+        others.update({str(item.message): item for item in row.others})
+
+    def tell() -> None:
+        progress(_STAGE, (begin + done) / len(asked.points))
+
+    try:
+        for group in _groups(asked, wanted):
+            tell()
+            _run_group(asked, group, kept, tell, threads, progress)
     finally:
-        others = [item for row in rows if row is not None for item in row.others]
-        show({str(item.message): item for item in others}.values())
-    return _table(case, work, rows)
+        show(others.values())
 
 
-def _table(case: ValveCase, asked: _Asked, found: Sequence[_Row | None]) -> PointTable:
-    none = _Row((None,) * len(asked.chosen), NOT_COMPUTED)
+def row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTable:
+    """Table of all points; those without a row were not computed."""
+    none = PointRow((None,) * len(asked.chosen), NOT_COMPUTED)
     rows = [none if row is None else row for row in found]
     return PointTable(
-        case=case.name,
+        case=asked.case.name,
         variant=asked.variant,
         points=tuple(
             column_of(
@@ -205,11 +310,12 @@ def _table(case: ValveCase, asked: _Asked, found: Sequence[_Row | None]) -> Poin
     )
 
 
-def _groups(case: ValveCase, points: Points) -> tuple[_Group, ...]:
+def _groups(asked: AskedPoints, places: Iterable[int]) -> tuple[_Group, ...]:
     """Points that share their bodies, in the order of the first one of each group."""
     found: dict[tuple[tuple[Key, PointValue], ...], list[int]] = {}
-    for i in range(len(points)):
-        made = tuple(item for item in points.changes(i).items() if _makes_bodies(case, item[0]))
+    for i in places:
+        changes = asked.points.changes(i).items()
+        made = tuple(item for item in changes if _makes_bodies(asked.case, item[0]))
         found.setdefault(made, []).append(i)
     return tuple(_Group(made=dict(made), places=tuple(at)) for made, at in found.items())
 
@@ -232,51 +338,46 @@ def _makes_bodies(case: ValveCase, place: Key) -> bool:
 
 
 def _run_group(
-    asked: _Asked,
+    asked: AskedPoints,
     group: _Group,
-    rows: list[_Row | None],
+    keep: Callable[[int, PointRow], None],
+    tell: Callable[[], None],
     threads: int | None,
     progress: Progress,
 ) -> None:
-    def tell() -> None:
-        progress(_STAGE, sum(row is not None for row in rows) / len(rows))
-
-    tell()
-    built = _build(asked, group, rows, progress)
+    built, left = _build(asked, group, keep, progress)
     if built is None:
         return
-    left = [i for i in group.places if rows[i] is None]
     with warnings_of_threads() as taken:
         crew = _crew(asked, built, left, threads)
         taken()
-        on_threads(
-            left, lambda i, check: _row(asked, built, i, check, taken), crew, rows.__setitem__, tell
-        )
+        on_threads(left, lambda i, check: _row(asked, built, i, check, taken), crew, keep, tell)
 
 
 def _build(
-    asked: _Asked, group: _Group, rows: list[_Row | None], progress: Progress
-) -> _Built | None:
-    """Bodies and laws for the first point that the case allows; None if it allows none.
+    asked: AskedPoints, group: _Group, keep: Callable[[int, PointRow], None], progress: Progress
+) -> tuple[_Built | None, tuple[int, ...]]:
+    """Bodies and laws for the first point that the case allows, and the points that are left.
 
-    The rows of points that cannot be computed are filled.
+    None if it allows none.  Points that cannot be computed have their rows.
     """
     tree = replace(asked.tree, data=with_changes(asked.tree.data, group.made))
-    for i in group.places:
+    for k, i in enumerate(group.places):
         try:
             case = case_at(tree, tree, asked.points.changes(i))
         except InputError as error:
-            rows[i] = asked.failed(error)
+            keep(i, asked.failed(error))
             continue
+        left = group.places[k:]
         try:
             with collected_warnings() as notes:
                 valve = build_valve(case, progress)
         except FAILURES as error:
-            for k in group.places:
-                rows[k] = asked.failed(error)
-            return None
+            for place in left:
+                keep(place, asked.failed(error))
+            return None, ()
         places = [key.place for key in asked.points.keys if key.place not in group.made]
-        return _Built(
+        built = _Built(
             made=group.made,
             tree=tree,
             parts=checked_parts(tree, case, places),
@@ -287,13 +388,17 @@ def _build(
                 contacts={},
                 laws=valve.laws,
                 network=valve.network,
+                structures=valve.structures,
             ),
+            bodies=body_summaries(valve),
+            stops=stop_summaries(valve),
             notes=tuple(notes),
         )
-    return None
+        return built, left
+    return None, ()
 
 
-def _valve_at(asked: _Asked, built: _Built, i: int) -> Valve:
+def _valve_at(asked: AskedPoints, built: _Built, i: int) -> Valve:
     """Valve of a point; its case is checked as a whole."""
     changes = asked.points.changes(i)
     own = {place: value for place, value in changes.items() if place not in built.made}
@@ -304,12 +409,12 @@ def _valve_at(asked: _Asked, built: _Built, i: int) -> Valve:
 
 
 def _row(
-    asked: _Asked,
+    asked: AskedPoints,
     built: _Built,
     i: int,
     check: Callable[[], None],
     taken: Callable[[], list[warnings.WarningMessage]],
-) -> _Row:
+) -> PointRow:
     """Compute one point, in whichever thread."""
     try:
         valve = _valve_at(asked, built, i)
@@ -317,7 +422,8 @@ def _row(
         run = one_variant(valve, roles, asked.variant, None, lambda stage, fraction: check())
         if run.failure is not None:
             raise run.failure
-        values = tuple(item.of(run.variant) for item in asked.chosen)
+        whole = PointRun(run.variant, lambda: _noise_source(asked, built, valve, roles, run))
+        values = tuple(item.value(whole) for item in asked.chosen)
     except Stopped:
         raise
     except BaseException as error:  # a component of the user's own may raise anything
@@ -330,7 +436,17 @@ def _row(
     notes = [*built.notes, *doubts]
     notes += [note for note in begun if not any(note in other for other in notes)]
     notes += [rest] if rest else []
-    return _Row(values, notes=tuple(dict.fromkeys(notes)), others=_others(caught))
+    return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=_others(caught))
+
+
+def _noise_source(
+    asked: AskedPoints, built: _Built, valve: Valve, roles: ValveRoles, run: VariantRun
+) -> NoiseSource:
+    """What the noise of a point comes from; the section ``noise`` is that of the point."""
+    made = run_fields(0.0, StageClock(silent))
+    runs: dict[Variant, VariantRun] = {asked.variant: run}
+    study = stroke_study(valve, roles, runs, made, bodies=built.bodies, stops=built.stops)
+    return stroke_sources(study, case=valve.case)[0]
 
 
 def _others(caught: Iterable[warnings.WarningMessage]) -> tuple[warnings.WarningMessage, ...]:
@@ -338,7 +454,7 @@ def _others(caught: Iterable[warnings.WarningMessage]) -> tuple[warnings.Warning
     return tuple(item for item in caught if not issubclass(item.category, AccuracyWarning))
 
 
-def _crew(asked: _Asked, built: _Built, places: Sequence[int], threads: int | None) -> int:
+def _crew(asked: AskedPoints, built: _Built, places: Sequence[int], threads: int | None) -> int:
     """Threads for these points: one where a component calls Python.
 
     Raises

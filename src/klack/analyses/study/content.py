@@ -1,0 +1,171 @@
+"""Content of a study's report before its layout."""
+
+import numpy as np
+
+from klack.analyses.page import page_of
+from klack.analyses.sample import rank_correlation
+from klack.analyses.study.figures import parallel_chart, scatter_chart
+from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.analyses.study.wording import on_page, rate_text, short_labels
+from klack.report.page import Content, Section, Table
+from klack.report.wording import count, signed
+
+__all__ = ["study_content"]
+
+_LISTED = 100
+"""Points in the table; the result holds all of them."""
+_FEWEST = 8
+"""Points from which a rank correlation means something."""
+
+
+def study_content(record: StudyRecord) -> Content:
+    """Texts, tables and figures of a study."""
+    labels = short_labels(record)
+    varying = [item for item in record.parameters if item.varies]
+    related = {
+        item.name: {of.name: rank_correlation(item.values, of.values) for of in varying}
+        for item in record.measures
+        if record.count >= _FEWEST
+    }
+    sections = [
+        Section(
+            title="All points",
+            charts=(parallel_chart(record, labels),) if varying else (),
+        ),
+        Section(
+            title="What each measure follows",
+            charts=tuple(
+                scatter_chart(record, measure, _strongest(varying, related[measure.name]), labels)
+                for measure in record.measures
+                if measure.varies and related.get(measure.name)
+            ),
+            tables=_related_table(record, varying, related, labels),
+        ),
+        Section(title="Parameters", tables=(_parameter_table(record),)),
+        Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
+    ]
+    return page_of(
+        record,
+        f"Study, {count(record.count)} points",
+        subtitle=(record.variant, record.design),
+        answer=_answer(record, varying, related, labels),
+        numbers=_number_table(record),
+        sections=sections,
+        definitions=_DEFINITIONS,
+        limits=_LIMITS,
+    )
+
+
+def _answer(
+    record: StudyRecord,
+    varying: list[StudyColumn],
+    related: dict[str, dict[str, float]],
+    labels: dict[str, str],
+) -> str:
+    found = [f"{count(record.count)} points of {len(varying)} parameters."]
+    for item in record.measures:
+        known = item.values[np.isfinite(item.values)]
+        if not known.size:
+            continue
+        name = labels[item.name]
+        text = f"{name[0].upper()}{name[1:]}: {on_page(item, known.min())} to "
+        text += on_page(item, known.max())
+        if np.isfinite(item.today):
+            text += f" (today {on_page(item, item.today)})"
+        best = max(related.get(item.name, {}).items(), key=lambda two: abs(two[1]), default=None)
+        if best is not None and abs(best[1]) > 0.5:
+            way = "rises" if best[1] > 0 else "falls"
+            text += f"; {way} with {labels[best[0]]}"
+        found.append(text + ".")
+    failed = int(record.failed.sum())
+    if failed:
+        found.append(f"{count(failed)} points could not be computed.")
+    return " ".join(found)
+
+
+def _strongest(varying: list[StudyColumn], related: dict[str, float]) -> list[StudyColumn]:
+    return sorted(varying, key=lambda item: -abs(related.get(item.name, 0.0)))[:2]
+
+
+def _number_table(record: StudyRecord) -> Table:
+    rows = []
+    for item in record.measures:
+        known = item.values[np.isfinite(item.values)]
+        cells = ["–"] * 3
+        if known.size:
+            cells = [on_page(item, float(f(known))) for f in (np.min, np.median, np.max)]
+        missing = record.count - known.size
+        rows.append((item.name, on_page(item, item.today), *cells, count(missing)))
+    return Table(
+        columns=("", "today", "lowest", "median", "highest", "points without"), rows=tuple(rows)
+    )
+
+
+def _parameter_table(record: StudyRecord) -> Table:
+    return Table(
+        columns=("key", "today", "values"),
+        rows=tuple(
+            (item.name, on_page(item, item.today), item.spread)
+            for item in (*record.parameters, *record.linked)
+        ),
+    )
+
+
+def _related_table(
+    record: StudyRecord,
+    varying: list[StudyColumn],
+    related: dict[str, dict[str, float]],
+    labels: dict[str, str],
+) -> tuple[Table, ...]:
+    known = [item for item in record.measures if related.get(item.name)]
+    if not known or not varying:
+        return ()
+    rows = tuple(
+        (labels[of.name], *(signed(related[item.name].get(of.name, 0.0), 2) for item in known))
+        for of in varying
+    )
+    heads = ("rank correlation with", *(labels[item.name] for item in known))
+    return (Table(columns=heads, rows=rows),)
+
+
+def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
+    shown = [item for item in record.columns if item.varies]
+    rows = []
+    for i in range(min(record.count, _LISTED)):
+        cells = [on_page(item, float(item.values[i])) for item in shown]
+        remark = record.failures[i] or record.notes[i]
+        rows.append((str(i), *cells, remark.partition("\n")[0][:80]))
+    columns = ("point", *(labels[item.name] for item in shown), "remark")
+    return Table(columns=columns, rows=tuple(rows))
+
+
+def _left(record: StudyRecord) -> tuple[str, ...]:
+    text = [rate_text(record)]
+    if record.count > _LISTED:
+        text.append(
+            f"The first {_LISTED} of {count(record.count)}; klack export writes all of them as CSV."
+        )
+    return tuple(text)
+
+
+_DEFINITIONS: tuple[tuple[str, str], ...] = (
+    ("today", "The case as it is, computed with the same measures."),
+    (
+        "rank correlation",
+        "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
+        "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+    ),
+)
+
+_LIMITS: tuple[tuple[str, str], ...] = (
+    (
+        "Bounces",
+        "After some bounces a stroke is chaotic: measures of late impacts scatter from point to "
+        "point by more than their parameters explain.",
+    ),
+    (
+        "Points",
+        "Between the points nothing was computed: a minimum of the table is the best of these "
+        "points, not of the range.",
+    ),
+)

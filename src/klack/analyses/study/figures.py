@@ -1,0 +1,108 @@
+"""The figures of a study, each built from its record by one function."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.report.chart import (
+    AxisSpec,
+    Chart,
+    Colour,
+    Curve,
+    Mark,
+    Panel,
+    ParallelAxis,
+    ParallelChart,
+)
+from klack.report.wording import printed_unit
+
+__all__ = ["parallel_chart", "scatter_chart"]
+
+_MOST_LINES = 4000
+"""More lines hide each other and cost bytes."""
+
+
+def parallel_chart(record: StudyRecord, labels: Mapping[str, str]) -> ParallelChart:
+    """Every point as a line over its parameters and measures."""
+    shown = [item for item in (*record.parameters, *record.measures) if item.varies]
+    measures = [k for k, item in enumerate(shown) if item in record.measures]
+    some = slice(None, _MOST_LINES)
+    note = (
+        "Every line is a point. On screen: drag along an axis to keep the lines that pass there; a "
+        "click on the name of an axis colours the lines by it."
+    )
+    if record.count > _MOST_LINES:
+        note += f" The first {_MOST_LINES} of {record.count} points."
+    axes = []
+    for item in shown:
+        spec, factor = _axis(item, labels)
+        axes.append(ParallelAxis(spec=spec, values=factor * item.values[some], words=item.words))
+    return ParallelChart(
+        name="points",
+        title="All points",
+        axes=tuple(axes),
+        coloured=measures[0] if measures else 0,
+        note=note,
+    )
+
+
+def scatter_chart(
+    record: StudyRecord,
+    measure: StudyColumn,
+    over: Sequence[StudyColumn],
+    labels: Mapping[str, str],
+) -> Chart:
+    """A measure over the parameter that it follows most; coloured halves of the second one."""
+    first = over[0]
+    x, x_factor = _axis(first, labels)
+    y, y_factor = _axis(measure, labels)
+    every = np.arange(record.count)
+    groups: list[tuple[str, NDArray[np.int64], Colour]] = [("points", every, "blue")]
+    if len(over) > 1:
+        second = over[1]
+        is_low = second.values <= np.median(second.values)
+        groups = [
+            (f"low {labels[second.name]}", every[is_low], "blue"),
+            (f"high {labels[second.name]}", every[~is_low], "orange"),
+        ]
+    curves = [
+        Curve(
+            x=x_factor * first.values[chosen],
+            y=y_factor * measure.values[chosen],
+            label=label,
+            colour=colour,
+            width=1.6,
+            drawn="points",
+            names=tuple(f"point {i}" for i in chosen),
+        )
+        for label, chosen, colour in groups
+        if chosen.size
+    ]
+    if np.isfinite(first.today) and np.isfinite(measure.today):
+        curves.append(
+            Curve(
+                x=np.array([x_factor * first.today]),
+                y=np.array([y_factor * measure.today]),
+                label="today",
+                colour="black",
+                width=3.0,
+                drawn="points",
+                names=("the case as it is",),
+            )
+        )
+    marks = (Mark(value=y_factor * measure.today, axis="y"),) if np.isfinite(measure.today) else ()
+    return Chart(
+        name=f"{measure.name}-over-{first.name}",
+        title=f"{labels[measure.name]} over {labels[first.name]}",
+        x=x,
+        panels=(Panel(y=y, curves=tuple(curves), marks=marks),),
+        note="Every dot is a point of the study; dashed: the case as it is.",
+    )
+
+
+def _axis(item: StudyColumn, labels: Mapping[str, str]) -> tuple[AxisSpec, float]:
+    """Axis of a column in a unit with a fitting prefix, and the factor from SI to it."""
+    unit, factor = printed_unit(item.values, "" if item.unit == "1" else item.unit)
+    return AxisSpec(label=labels[item.name], unit=unit), factor

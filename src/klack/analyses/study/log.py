@@ -1,0 +1,128 @@
+"""Computed points on disk: kept for the same case, whatever the studies of it.
+
+A file in the folder of the results for each case and version of klack; a point is known by what the
+case has there and by its variant.  A later study of the same case finds the points that both have.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from klack.analyses.study.strokes import PointRow
+from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
+from klack.case.bodies import CaseBody
+from klack.case.case_tree import CaseTree
+from klack.case.points import PointValue
+from klack.case.valve import ValveCase
+
+__all__ = ["KeptPoint", "PointLog", "point_key", "point_log_form"]
+
+_ASIDE = ("study", "calibration", "measurement", "title", "description")
+"""Sections of a case that no stroke depends on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptPoint:
+    """Measures of one point by their names, or why it has none.
+
+    Parameters
+    ----------
+    values : mapping of str to float or None
+    failure : str
+    notes : tuple of str
+    """
+
+    values: Mapping[str, float | None]
+    failure: str
+    notes: tuple[str, ...]
+
+    def row(self, measures: tuple[str, ...]) -> PointRow | None:
+        """Row of a table of these measures; None if one of them is not known."""
+        if self.failure:
+            return PointRow((None,) * len(measures), self.failure, self.notes)
+        if not all(name in self.values for name in measures):
+            return None
+        return PointRow(tuple(self.values[name] for name in measures), "", self.notes)
+
+    def with_row(self, measures: tuple[str, ...], row: PointRow) -> "KeptPoint":
+        """The same with what was computed now."""
+        values = dict(self.values) | dict(zip(measures, row.values, strict=True))
+        return KeptPoint(values=values, failure=row.failure, notes=row.notes)
+
+
+PointLog = UnfinishedLog[str, KeptPoint]
+"""Points by :func:`point_key`."""
+
+
+def point_log_form(case: ValveCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoint], str]:
+    """How the points of a case are kept, and the mark of the case."""
+    mark = fingerprint(_Deciding.of(case, tree), _own_code(case))
+    return (
+        LogForm(
+            file=f"points-{mark[:12]}.jsonl",
+            format="klack points 1",
+            parts="computed points",
+            data=_data,
+            read=_kept,
+        ),
+        mark,
+    )
+
+
+def point_key(tree: CaseTree, variant: str, written: Mapping[str, PointValue]) -> str:
+    """What tells a point of a case from all others: its values, with the content of files."""
+    marks = {name: _with_content(tree.path.parent, value) for name, value in written.items()}
+    return json.dumps([variant, dict(sorted(marks.items()))], separators=(",", ":"))
+
+
+def _with_content(folder: Path, value: PointValue) -> PointValue | list[str]:
+    if isinstance(value, str):
+        file = folder / value
+        try:
+            if file.is_file():
+                return [value, sha256(file.read_bytes()).hexdigest()]
+        except (OSError, ValueError):  # no name of a file
+            return value
+    return value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Deciding:
+    """What of a case decides a stroke, as :func:`fingerprint` wants it."""
+
+    source: str
+    bodies: Mapping[str, CaseBody]
+
+    @classmethod
+    def of(cls, case: ValveCase, tree: CaseTree) -> "_Deciding":
+        data = {name: value for name, value in tree.data.items() if name not in _ASIDE}
+        return cls(source=json.dumps(data, sort_keys=True, default=str), bodies=case.bodies)
+
+
+def _own_code(case: ValveCase) -> Iterator[bytes]:
+    for name, digest in case.own_components.items():
+        yield f"{name} {digest}".encode()
+    for name, part in case.network.components.items():
+        file = getattr(part, "file", None)  # of an FMU
+        if isinstance(file, Path):
+            yield f"{name} {sha256(file.read_bytes()).hexdigest()}".encode()
+
+
+def _data(key: str, point: KeptPoint) -> Mapping[str, Any]:
+    return {
+        "point": key,
+        "values": dict(point.values),
+        "failure": point.failure,
+        "notes": list(point.notes),
+    }
+
+
+def _kept(data: Mapping[str, Any]) -> tuple[str, KeptPoint]:
+    values = {
+        str(name): None if value is None else float(value) for name, value in data["values"].items()
+    }
+    notes = tuple(map(str, data["notes"]))
+    return str(data["point"]), KeptPoint(values=values, failure=str(data["failure"]), notes=notes)

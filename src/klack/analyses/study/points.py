@@ -1,0 +1,285 @@
+"""Points of a study: the values of its parameters, and what the case file has at each point."""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from itertools import product
+from math import prod
+
+from klack.analyses.study.parameters import (
+    Parameter,
+    parameters_of,
+    short_names,
+    unit_of,
+    written,
+)
+from klack.case.key_path import quantity_at, split_path
+from klack.case.points import PointValue
+from klack.case.reader import text_of
+from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, one_of
+from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
+from klack.studies.expression import Expression, ordered
+from klack.units import Kind, parse_quantity
+
+__all__ = ["Linked", "StudyPoints", "Values", "linked_of", "points_of_study"]
+
+Values = Mapping[str, float | str]
+
+_MOST_POINTS = 1_000_000
+_UNBALANCED = (
+    "The number of Sobol points is no power of two: means over them converge more slowly. "
+    "Try: 64, 128, 256, ... points."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linked:
+    """A key of the case whose value follows from parameters.
+
+    Parameters
+    ----------
+    name : str
+        Path of the key.
+    kind : Kind
+        Of quantity.
+    expression : Expression
+    words : mapping of str to str
+        Parameter, or other key, that each word of the expression means.
+    today : float [SI]
+        In the case.
+    """
+
+    name: str
+    kind: Kind
+    expression: Expression
+    words: Mapping[str, str]
+    today: float
+
+    @property
+    def unit(self) -> str:
+        """SI unit; ``"1"`` for a pure number."""
+        return unit_of(self.kind)
+
+    def value(self, values: Values) -> float:
+        """Value [SI] where parameters and other keys have these."""
+        own = {word: float(values[name]) for word, name in self.words.items()}
+        return self.expression.value(own)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StudyPoints:
+    """Points of a study in the order of its design.
+
+    Parameters
+    ----------
+    parameters : tuple of Parameter
+        Those that vary.
+    linked : tuple of Linked
+    values : tuple of mapping of str to value
+        Of each point by name [SI]: parameters, then what follows from them.
+    design : str
+        In words.
+    notes : tuple of str
+    """
+
+    parameters: tuple[Parameter, ...]
+    linked: tuple[Linked, ...]
+    values: tuple[Values, ...]
+    design: str
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def written(self) -> list[dict[str, PointValue]]:
+        """What the case file has at each point, by the path of the key."""
+        kinds = {item.name: item.kind for item in self.parameters if item.is_key}
+        kinds |= {item.name: item.kind for item in self.linked}
+        return [
+            {name: written(point[name], kind) for name, kind in kinds.items()}
+            for point in self.values
+        ]
+
+
+def points_of_study(case: ValveCase, source: StudySource) -> StudyPoints:
+    """Points of the design of a study.
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    parameters = parameters_of(case, source)
+    linked = linked_of(case, source, parameters)
+    varied = [parameter for parameter in parameters if not parameter.is_fixed]
+    fixed = {item.name: item.spread.at(0.5) for item in parameters if item.is_fixed}
+    rows, words, notes = _design(source, varied)
+    values = []
+    for row in rows:
+        point: dict[str, float | str] = dict(zip((item.name for item in varied), row, strict=True))
+        point |= fixed
+        for item in linked:
+            point[item.name] = item.value(point)
+        values.append(point)
+    return StudyPoints(
+        parameters=parameters, linked=linked, values=tuple(values), design=words, notes=notes
+    )
+
+
+def linked_of(
+    case: ValveCase, source: StudySource, parameters: Sequence[Parameter]
+) -> tuple[Linked, ...]:
+    """Expressions of a study in the order in which they can be computed.
+
+    Raises
+    ------
+    InputError
+        For a key without a quantity, one that is a parameter as well, an unknown name, another
+        unit, and expressions that follow from each other in a circle.
+    """
+    given = source.study.linked
+    places = {}
+    expressions = {}
+    for name, text in given.items():
+        if name in source.study.parameters:
+            raise InputError(
+                source.where(("linked", name)),
+                got="a key that is a parameter as well",
+                expected="a parameter, or an expression",
+                hint="remove one of them.",
+            )
+        try:
+            places[name] = quantity_at(case, split_path(name))
+        except CaseProblem as problem:
+            raise source.refuse(("linked", name), problem) from None
+        expressions[name] = Expression.parse(text, source.where(("linked", name)))
+    numbers = [item for item in parameters if item.kind is not None]
+    words = short_names((*(item.name for item in numbers), *given))
+    known = {word for word, name in words.items() if name not in given}
+    named = {word: expressions[name] for word, name in words.items() if name in given}
+    order = dict.fromkeys(words[word] for word in ordered(named, known))
+    kinds = {item.name: item.kind for item in numbers if item.kind is not None}
+    kinds |= {name: place.kind for name, place in places.items()}
+    found = []
+    for name in order:
+        expression = expressions[name]
+        meant = {word: words[word] for word in expression.names}
+        dimension = expression.unit({word: kinds[whole].unit for word, whole in meant.items()})
+        if not dimension.fits(kinds[name].unit):
+            raise InputError(
+                source.where(("linked", name)),
+                got=f"'{expression.text}', which is {dimension}",
+                expected=f"{kinds[name].name} [{kinds[name].unit}]",
+                hint="add a parameter with a unit, {fixed: 0.2 mm}, for a constant that is no "
+                "number.",
+            )
+        found.append(
+            Linked(
+                name=name,
+                kind=kinds[name],
+                expression=expression,
+                words=meant,
+                today=places[name].value,
+            )
+        )
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- designs
+
+
+def _design(
+    source: StudySource, varied: Sequence[Parameter]
+) -> tuple[Iterable[Sequence[float | str]], str, tuple[str, ...]]:
+    """Values of the parameters that vary at every point, in words, and notes."""
+    design = source.study.design
+    if design.kind == "file":
+        return _rows_of_file(source, varied), f"from {design.file.name if design.file else ''}", ()
+    _require_varied(source, varied)
+    if design.kind == "grid":
+        levels = [item.spread.levels(design.levels) for item in varied]
+        _require_few(source, prod(map(len, levels)))
+        return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}", ()
+    if design.kind == "one-at-a-time":
+        return _one_at_a_time(varied, design.levels), "one parameter at a time", ()
+    is_sobol = design.kind == "sobol"
+    make = sobol_sequence if is_sobol else latin_hypercube
+    rows = [
+        [item.spread.at(float(share)) for item, share in zip(varied, point, strict=True)]
+        for point in make(design.points, len(varied), design.seed)
+    ]
+    words = f"{'Sobol points' if is_sobol else 'Latin hypercube'}, seed {design.seed}"
+    notes = () if not is_sobol or balanced(design.points) else (_UNBALANCED,)
+    return rows, words, notes
+
+
+def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:
+    """The middle, then each parameter over its levels while the others stay there."""
+    middle = [item.middle for item in varied]
+    rows = [list(middle)]
+    for k, item in enumerate(varied):
+        rows += [[*middle[:k], level, *middle[k + 1 :]] for level in item.spread.levels(count)]
+    return rows
+
+
+def _require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
+    if not varied:
+        raise InputError(
+            source.where(("parameters",)),
+            got="no parameter that varies",
+            expected="at least one range, distribution or list of values",
+            hint="write {from: 8 N, to: 20 N}.",
+        )
+
+
+def _require_few(source: StudySource, count: int) -> None:
+    if count > _MOST_POINTS:
+        raise InputError(
+            source.where(("design", "levels")),
+            got=f"a grid of {count} points",
+            expected=f"at most {_MOST_POINTS}",
+            hint="use fewer levels, or kind: sobol.",
+        )
+
+
+def _rows_of_file(source: StudySource, varied: Sequence[Parameter]) -> list[list[float | str]]:
+    """Rows of a CSV file: a column for each parameter that varies, values with their units."""
+    file = source.study.design.file
+    assert file is not None
+    table = list(csv.reader(StringIO(text_of(file))))
+    names = [item.name for item in varied]
+    head = [cell.strip() for cell in table[0]] if table else []
+    if sorted(head) != sorted(names):
+        raise InputError(
+            f"{file}:1",
+            got=f"a head of: {one_of(head)}",
+            expected=f"one column for each parameter that varies: {one_of(names)}",
+            hint="write the names as in the study.",
+        )
+    rows = []
+    for number, cells in enumerate(table[1:], 2):
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(head):
+            raise InputError(
+                f"{file}:{number}",
+                got=f"{len(cells)} values",
+                expected=f"{len(head)}, one for each name in the head",
+                hint="use a comma between values and a point in numbers.",
+            )
+        texts = dict(zip(head, (cell.strip() for cell in cells), strict=True))
+        at = f"{file}:{number}"
+        rows.append([_cell(f"{at}: {item.name}", texts[item.name], item) for item in varied])
+    if not rows:
+        raise InputError(
+            str(file), got="no row of values", expected="at least one", hint="add the points."
+        )
+    return rows
+
+
+def _cell(where: str, text: str, item: Parameter) -> float | str:
+    return text if item.kind is None else parse_quantity(text, item.kind, where)

@@ -1,0 +1,103 @@
+"""Record of ``klack study``: parameters and measures of every point, in columns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+
+__all__ = ["StudyColumn", "StudyRecord"]
+
+Column = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyColumn:
+    """A parameter, what follows from parameters, or a measure: one number for every point.
+
+    Parameters
+    ----------
+    name : str
+        Path of a key of the case, a word of the study, or name of a measure.
+    title : str
+        What it is, in words.
+    unit : str
+        SI; ``"1"`` for a pure number, empty for words.
+    spread : str
+        How its values are spread, or the expression that they follow from; empty for a measure.
+    today : float
+        In the case as it is; nan where it has none.
+    values : array, shape (points,)
+        Nan where there is none; of words, which of them.
+    words : tuple of str
+        That ``values`` counts.
+    """
+
+    name: str
+    title: str
+    unit: str
+    spread: str
+    today: float
+    values: Column
+    words: tuple[str, ...] = ()
+
+    @property
+    def varies(self) -> bool:
+        """Whether two points differ in it."""
+        known = self.values[np.isfinite(self.values)]
+        return bool(known.size) and bool(np.ptp(known) > 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyRecord(CaseRecord):
+    """Measures of a case at many points.
+
+    Parameters
+    ----------
+    study_text : str
+        Of the file of the study; empty if it stands in the case.
+    variant : str
+        Of the stroke.
+    design : str
+        Where the points lie, in words.
+    threads : int
+        That computed them.
+    computed, kept : int
+        Points that were computed now, and that an earlier run had left.
+    point_time : float [s]
+        Wall-clock time of the points that were computed now.
+    parameters, linked, measures : tuple of StudyColumn
+    failures : tuple of str
+        Why a point has no measures; empty where it was computed.
+    notes : tuple of str
+        Doubts about the numbers of each point.
+    """
+
+    study_text: str
+    variant: str
+    design: str
+    threads: int
+    computed: int
+    kept: int
+    point_time: float
+    parameters: tuple[StudyColumn, ...]
+    linked: tuple[StudyColumn, ...]
+    measures: tuple[StudyColumn, ...]
+    failures: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.failures)
+
+    @property
+    def columns(self) -> tuple[StudyColumn, ...]:
+        """Parameters, what follows from them, measures."""
+        return (*self.parameters, *self.linked, *self.measures)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Points without measures."""
+        return np.array([bool(text) for text in self.failures], dtype=bool)

@@ -1,0 +1,117 @@
+"""Main numbers of a study for scripts and terminals."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.json_parts import Real, Version
+from klack.analyses.measures import number_or_none
+from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.analyses.study.wording import in_words, rate_text
+from klack.terminal.tables import TextTable
+
+__all__ = ["StudyJson", "study_to_json", "study_told"]
+
+
+class ColumnJson(TypedDict):
+    """A parameter, what follows from parameters, or a measure, at every point."""
+
+    unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
+    spread: Annotated[str, Field(description="How it varies, or its expression.")]
+    today: Annotated[Real, Field(description="In the case as it is.")]
+    values: Annotated[list[Real | str], Field(description="One for each point.")]
+
+
+class StudyJson(TypedDict):
+    """``klack study``."""
+
+    schema: Literal["klack-study/1"]
+    case: str
+    klack: Version
+    variant: str
+    design: str
+    points: int
+    failed: int
+    parameters: dict[str, ColumnJson]
+    linked: dict[str, ColumnJson]
+    measures: dict[str, ColumnJson]
+    failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
+    notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
+    wall_time_s: Real
+    point_time_s: Real
+    computed: Annotated[int, Field(description="Points computed now.")]
+    kept: Annotated[int, Field(description="Points that an earlier run had left.")]
+    threads: int
+
+
+def study_to_json(record: StudyRecord) -> StudyJson:
+    """Numbers of a study, SI."""
+    return {
+        "schema": "klack-study/1",
+        "case": record.case,
+        "klack": record.version,
+        "variant": record.variant,
+        "design": record.design,
+        "points": record.count,
+        "failed": int(record.failed.sum()),
+        "parameters": {item.name: _column(item) for item in record.parameters},
+        "linked": {item.name: _column(item) for item in record.linked},
+        "measures": {item.name: _column(item) for item in record.measures},
+        "failures": list(record.failures),
+        "notes": list(record.notes),
+        "wall_time_s": record.wall_time,
+        "point_time_s": record.point_time,
+        "computed": record.computed,
+        "kept": record.kept,
+        "threads": record.threads,
+    }
+
+
+def _column(item: StudyColumn) -> ColumnJson:
+    values: list[Any] = [number_or_none(value) for value in item.values]
+    if item.words:
+        values = [item.words[int(value)] for value in item.values]
+    return {
+        "unit": item.unit,
+        "spread": item.spread,
+        "today": number_or_none(item.today),
+        "values": values,
+    }
+
+
+def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
+    """What a terminal shows: how each parameter varies, and the range of each measure."""
+    yield TextTable(
+        title=f"{record.title or record.case}, {record.variant}",
+        columns=("parameter", "today", "values"),
+        rows=[
+            [item.name, in_words(item, item.today), item.spread]
+            for item in (*record.parameters, *record.linked)
+        ],
+        left=3,
+    )
+    yield TextTable(
+        title=f"{record.count} points, {record.design}",
+        columns=("measure", "today", "lowest", "median", "highest", "at lowest", "at highest"),
+        rows=[_range_row(record, item) for item in record.measures],
+    )
+    yield rate_text(record)
+
+
+def _range_row(record: StudyRecord, item: StudyColumn) -> list[str]:
+    known = np.flatnonzero(np.isfinite(item.values))
+    if not known.size:
+        return [item.name, in_words(item, item.today), *["–"] * 5]
+    values = item.values[known]
+    low, high = known[np.argmin(values)], known[np.argmax(values)]
+    numbers = (item.values[low], float(np.median(values)), item.values[high])
+    return [
+        item.name,
+        in_words(item, item.today),
+        *(in_words(item, float(number)) for number in numbers),
+        f"point {low}",
+        f"point {high}",
+    ]

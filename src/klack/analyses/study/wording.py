@@ -1,0 +1,60 @@
+"""Words for the columns and points of a study."""
+
+from math import isfinite
+
+from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.report.wording import fixed, quantity
+from klack.units import format_si
+
+__all__ = ["in_words", "on_page", "rate_text", "short_labels"]
+
+
+def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
+    """Value of a column with its unit; a dash where there is none."""
+    if not isfinite(value):
+        return "–"
+    if item.words:
+        return item.words[int(value)]
+    if item.unit.startswith("dB"):
+        return f"{value:.1f} {item.unit}"
+    return format_si(value, "" if item.unit == "1" else item.unit, digits)
+
+
+def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
+    """Value of a column as a report prints it."""
+    if item.words or not isfinite(value):
+        return in_words(item, value)
+    if item.unit.startswith("dB"):
+        return fixed(value, 1, item.unit)
+    return quantity(value, "" if item.unit == "1" else item.unit, digits)
+
+
+def rate_text(record: StudyRecord) -> str:
+    """How many points were computed, and how fast."""
+    parts = [f"{record.computed} points computed now"]
+    if record.computed and record.point_time > 0.0:
+        rate = 3600.0 * record.computed / record.point_time
+        parts[0] += f" in {format_si(record.point_time, 's', 3)} on {record.threads} threads"
+        parts.append(f"{rate:.3g} in an hour")
+    if record.kept:
+        parts.append(f"{record.kept} were there")
+    failed = int(record.failed.sum())
+    if failed:
+        parts.append(f"{failed} have no measures")
+    return "; ".join(parts) + "."
+
+
+def short_labels(record: StudyRecord) -> dict[str, str]:
+    """Names of measures, and of each key the shortest end that no other has: ``spring preload``."""
+    found = {item.name: item.name.replace(".", " ").replace("_", " ") for item in record.measures}
+    names = [item.name for item in (*record.parameters, *record.linked)]
+    for name in names:
+        parts = name.split(".")
+        ends = [".".join(parts[k:]) for k in range(len(parts) - 1, -1, -1)]
+        alone = (
+            end
+            for end in ends
+            if not any(other != name and f".{other}".endswith(f".{end}") for other in names)
+        )
+        found[name] = next(alone, name).replace(".", " ").replace("_", " ")
+    return found

@@ -1,0 +1,144 @@
+"""A study of a case: which keys vary, which measures are computed, at which points."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from klack.case.variants import Variant
+from klack.input.existing_file import InputPath
+from klack.input.problem import CaseProblem, one_of
+from klack.input.section import Count, Number, Section, Text
+
+__all__ = [
+    "CaseStudy",
+    "NormalRange",
+    "StudyDesign",
+    "StudyFile",
+    "StudyParameter",
+    "Written",
+]
+
+Written = Text | Number
+
+
+class NormalRange(Section):
+    """Gauss's distribution, cut off five standard deviations from its mean."""
+
+    mean: Written = Field(description="With the unit of the key.")
+    sd: Written = Field(description="Standard deviation, with its unit.")
+
+
+class StudyParameter(Section):
+    """Values of one parameter: a range, a distribution, a list, or one value."""
+
+    lowest: Written | None = Field(
+        default=None, alias="from", description="Lower end of a range, with the unit of the key."
+    )
+    highest: Written | None = Field(default=None, alias="to", description="Upper end.")
+    scale: Literal["linear", "log"] = Field(
+        default="linear", description="log: equal steps of the logarithm."
+    )
+    normal: NormalRange | None = Field(default=None, description="Mean and standard deviation.")
+    values: tuple[Written, ...] | None = Field(
+        default=None, min_length=1, description="A list, also of words."
+    )
+    fixed: Written | None = Field(
+        default=None, description="One value, for expressions of 'linked'."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_value(cls, value: Any) -> Any:
+        plain = isinstance(value, str | int | float) and not isinstance(value, bool)
+        return {"fixed": value} if plain else value
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = {
+            "from": self.lowest,
+            "to": self.highest,
+            "normal": self.normal,
+            "values": self.values,
+            "fixed": self.fixed,
+        }
+        found = [name for name, value in given.items() if value is not None]
+        if found not in (["from", "to"], ["normal"], ["values"], ["fixed"]):
+            raise CaseProblem(
+                (),
+                got=f"the keys {one_of(found)}" if found else "no values",
+                expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
+                "{values: [8 N, 12 N]}, {fixed: 12 N}",
+                hint="a range has both ends."
+                if len(found) < 2
+                else f"keep one of {one_of(found)}.",
+            )
+        if self.scale == "log" and found != ["from", "to"]:
+            raise CaseProblem(
+                ("scale",),
+                got="log without a range",
+                expected="{from: 0.1 um, to: 10 um, scale: log}",
+                hint="remove it, or give 'from' and 'to'.",
+            )
+        return self
+
+
+class StudyDesign(Section):
+    """Where the points of a study lie."""
+
+    kind: Literal["sobol", "latin-hypercube", "grid", "one-at-a-time", "file"] = Field(
+        default="sobol",
+        description="sobol: even cover, more points can be added; latin-hypercube: each parameter "
+        "evenly; grid: all combinations of 'levels'; one-at-a-time: each parameter by itself, "
+        "about the case; file: the rows of a CSV file.",
+    )
+    points: Count = Field(default=64, le=1_000_000, description="Of sobol and latin-hypercube.")
+    levels: Count = Field(
+        default=5, le=1000, description="Values of each range in a grid and one-at-a-time."
+    )
+    seed: Count = Field(default=1, description="Of the random numbers.")
+    file: InputPath | None = Field(
+        default=None,
+        description="CSV, relative to this file: a head with the names of all parameters, values "
+        "with their units.",
+    )
+
+    @model_validator(mode="after")
+    def _file(self) -> Self:
+        if (self.kind == "file") != (self.file is not None):
+            raise CaseProblem(
+                ("kind",),
+                got=f"kind: {self.kind}" + (" with a file" if self.file else " without a file"),
+                expected="{kind: file, file: points.csv}",
+                hint="give both, or neither.",
+            )
+        return self
+
+
+class CaseStudy(Section):
+    """Parameters that vary, what follows from them, and what is computed at every point."""
+
+    parameters: Mapping[Text, StudyParameter] = Field(
+        min_length=1,
+        description="Path of a key of the case, such as network.components.spring.preload, or a "
+        "word of one's own for 'linked': its values.",
+    )
+    linked: Mapping[Text, Text] = Field(
+        default_factory=dict,
+        description="Path of a key of the case: expression of parameters, such as 2 * tip_radius.",
+    )
+    measures: tuple[Text, ...] = Field(
+        min_length=1,
+        description="Such as closing_time, seat.peak_force, noise.sound_exposure_level_weighted.",
+    )
+    design: StudyDesign = Field(default=StudyDesign(), description="Where the points lie.")
+    variant: Variant | None = Field(
+        default=None, description="Of the stroke; the first one of the case by default."
+    )
+
+
+class StudyFile(Section):
+    """A study in a file of its own."""
+
+    klack: Literal[1] = Field(description="Format version of the file: 1.")
+    study: CaseStudy = Field(description="What varies and what is computed.")

@@ -1,0 +1,72 @@
+"""The study of a case, from the case itself or from a file of its own, with lines for messages."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from klack.case.case_tree import CaseTree
+from klack.case.reader import Lines, parse, text_of, validated
+from klack.case.study import CaseStudy, StudyFile
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, Key, key_text
+
+__all__ = ["StudySource", "study_of"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StudySource:
+    """A study and where it is written.
+
+    Parameters
+    ----------
+    study : CaseStudy
+    path : Path
+    lines : Lines
+    """
+
+    study: CaseStudy
+    path: Path
+    lines: Lines
+
+    def where(self, key: Key, *, on_key: bool = False) -> str:
+        """File, line and key below ``study``, as messages name them."""
+        whole = ("study", *key)
+        return f"{self.path}:{self.lines.find(whole, on_key=on_key)}: {key_text(whole)}"
+
+    def refuse(self, key: Key, error: InputError) -> InputError:
+        """The same error, at the place where the study says so."""
+        inner = error.key if isinstance(error, CaseProblem) else ()
+        where = self.where((*key, *inner))
+        return InputError(where, got=error.got, expected=error.expected, hint=error.hint)
+
+    def read(self, key: Key, parse: Callable[[], float]) -> float:
+        """Value of a text in the study; its error names the place."""
+        try:
+            return parse()
+        except InputError as error:
+            raise self.refuse(key, error) from None
+
+
+def study_of(case: ValveCase, tree: CaseTree, file: Path | None = None) -> StudySource:
+    """Study in a file of its own, or in the section ``study`` of the case.
+
+    Raises
+    ------
+    InputError
+        For a file that is no study, and a case without one.
+    """
+    if file is not None:
+        text = text_of(file)
+        data, lines = parse(text, file)
+        return StudySource(
+            study=validated(StudyFile, text, file, data, lines).study, path=file, lines=lines
+        )
+    if case.study is None:
+        raise InputError(
+            f"{tree.path}: study",
+            got="no section 'study'",
+            expected="parameters with their ranges, and measures",
+            hint="add the section, or give a file with it: --study FILE.",
+        )
+    return StudySource(study=case.study, path=tree.path, lines=tree.lines)

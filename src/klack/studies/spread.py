@@ -1,0 +1,72 @@
+"""How the values of one parameter are spread: a range, a distribution, a list, one value.
+
+Each maps a share of probability to a value (inversion; Devroye 1986, chapter II.2), so that a
+design of points in the unit cube serves them all.
+"""
+
+from dataclasses import dataclass
+from math import exp, log
+
+from scipy.special import ndtr, ndtri
+
+from klack.studies.designs import even_levels
+
+__all__ = ["Listed", "Normal", "Range", "Spread"]
+
+_CUT = 5.0  # standard deviations
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Constant density between two values; of the logarithm with ``is_log``."""
+
+    low: float
+    high: float
+    is_log: bool = False
+
+    def at(self, share: float) -> float:
+        """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
+        if self.is_log:
+            value = exp(log(self.low) + share * (log(self.high) - log(self.low)))
+        else:
+            value = self.low + share * (self.high - self.low)
+        return min(max(value, self.low), self.high)
+
+    def levels(self, count: int) -> tuple[float, ...]:
+        """Values in equal steps from end to end; the middle for one."""
+        return tuple(self.at(float(share)) for share in even_levels(count))
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it)."""
+
+    mean: float
+    deviation: float
+
+    def at(self, share: float) -> float:
+        """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
+        below = float(ndtr(-_CUT))
+        return self.mean + self.deviation * float(ndtri(below + share * (1.0 - 2.0 * below)))
+
+    def levels(self, count: int) -> tuple[float, ...]:
+        """Medians of classes of equal probability."""
+        return tuple(self.at(float(share)) for share in even_levels(count, bounded=False))
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """Values of a list, words or numbers, each as likely as the others."""
+
+    values: tuple[str | float, ...]
+
+    def at(self, share: float) -> str | float:
+        """Value in the order of the list, 0 <= share <= 1."""
+        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+
+    def levels(self, count: int) -> tuple[str | float, ...]:
+        """All of them, whatever the count."""
+        return self.values
+
+
+Spread = Range | Normal | Listed

@@ -1,0 +1,318 @@
+"""Studies: points, expressions, what is kept, and what is refused.
+
+Truth: single strokes of the changed cases, bit for bit; the points of an uninterrupted study.
+"""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import klack
+from klack.analyses.study.parameters import short_names
+from klack.cli.main import main
+from klack.errors import InputError
+
+SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
+PRELOAD = "network.components.spring.preload"
+GAP = "network.components.opening.gap"
+STIFFNESS = "network.components.spring.stiffness"
+HEAD = "klack: 1\nstudy:\n"
+STUDY = f"""
+  parameters:
+    {PRELOAD}: {{from: 10 N, to: 14 N}}
+    lift: {{normal: {{mean: 100 um, sd: 3 um}}}}
+    part: {{fixed: 10 um}}
+  linked:
+    {GAP}: lift
+    {STIFFNESS}: 0.1 * preload / part
+  measures: [opening_time, opening.peak_force, impacts]
+  design: {{points: 8}}
+  variant: dry
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    return write(tmp_path, STUDY)
+
+
+def write(folder, text, name="study.yaml"):
+    file = folder / name
+    file.write_text(HEAD + text)
+    return file
+
+
+def columns(record, kind="measures"):
+    return {item.name: item.values for item in getattr(record, kind)}
+
+
+class TestNumbers:
+    def test_every_point_is_the_stroke_of_the_changed_case(self, study):
+        record = klack.run_study(SMALL, study, threads=2).record
+        case = klack.load_case(SMALL)
+        assert record.count == 8
+        assert not record.failed.any()
+        preload, lift = (columns(record, "parameters")[name] for name in (PRELOAD, "lift"))
+        stiffness = columns(record, "linked")[STIFFNESS]
+        np.testing.assert_array_equal(columns(record, "linked")[GAP], lift)
+        np.testing.assert_allclose(stiffness, 0.1 * preload / 10e-6, rtol=1e-15)
+        assert ((preload >= 10.0) & (preload <= 14.0)).all()
+        for i in (0, 5):
+            changed = case.with_value(PRELOAD, f"{float(preload[i])!r} N")
+            changed = changed.with_value(GAP, f"{float(lift[i])!r} m")
+            changed = changed.with_value(STIFFNESS, f"{float(stiffness[i])!r} N/m")
+            found = klack.run_stroke(changed, ["dry"]).measures
+            assert columns(record)["opening_time"][i] == found["dry"]["opening_time"].value
+            assert columns(record)["impacts"][i] == found["dry"]["impacts"].value
+
+    def test_the_case_as_it_is_stands_beside(self, study):
+        record = klack.run_study(SMALL, study).record
+        today = klack.run_stroke(SMALL, ["dry"]).measures["dry"]
+        assert record.measures[0].today == today["opening_time"].value
+        assert record.parameters[0].today == 12.0
+        assert np.isnan(record.parameters[1].today)
+        assert record.linked[0].today == 100e-6
+
+    @pytest.mark.parametrize(
+        ("design", "count"),
+        [
+            ("{kind: grid, levels: 3}", 9),
+            ("{kind: one-at-a-time, levels: 3}", 7),
+            ("{kind: latin-hypercube, points: 5}", 5),
+            ("{kind: file, file: points.csv}", 2),
+        ],
+    )
+    def test_designs(self, tmp_path, design, count):
+        (tmp_path / "points.csv").write_text(f"{GAP},{PRELOAD}\n90 um,11 N\n0.11 mm,12.5 N\n")
+        text = f"""
+  parameters:
+    {PRELOAD}: {{from: 10 N, to: 14 N}}
+    {GAP}: {{from: 90 um, to: 110 um}}
+  measures: [opening_time]
+  design: {design}
+  variant: dry
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        assert record.count == count
+        preload, gap = columns(record, "parameters").values()
+        if "grid" in design:
+            assert preload.tolist() == [10.0] * 3 + [12.0] * 3 + [14.0] * 3
+            np.testing.assert_allclose(gap[:3], [90e-6, 100e-6, 110e-6], rtol=1e-14)
+        if "one-at" in design:
+            assert preload.tolist() == [12.0, 10.0, 12.0, 14.0, 12.0, 12.0, 12.0]
+        if "file" in design:
+            assert (preload.tolist(), gap.tolist()) == ([11.0, 12.5], [90e-6, 110e-6])
+
+    def test_words_and_whole_numbers_are_listed(self, tmp_path):
+        text = """
+  parameters:
+    network.components.bores.count: {values: [2, 4]}
+    run.accuracy: {values: [normal, fine]}
+  measures: [opening_time]
+  design: {kind: grid}
+  variant: wet
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        assert record.parameters[0].values.tolist() == [2.0, 2.0, 4.0, 4.0]
+        assert record.parameters[1].words == ("normal", "fine")
+        assert record.parameters[1].today == 0.0
+        assert len({*columns(record)["opening_time"].tolist()}) == 4
+
+    def test_points_that_fail_are_rows(self, tmp_path):
+        """A ring whose outer radius is below its inner one, 1.5 mm."""
+        text = """
+  parameters: {network.components.opening.film.outer_radius: {values: [2 mm, 1 mm]}}
+  measures: [opening_time]
+  design: {kind: grid}
+  variant: wet
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        assert record.failed.tolist() == [False, True]
+        assert np.isnan(columns(record)["opening_time"][1])
+        assert "1 of 2 points have no measures" in record.warnings[0]
+        text = text.replace("2 mm, 1 mm", "1 mm, 1.1 mm")
+        with pytest.raises(InputError, match="none of which can be computed"):
+            klack.run_study(SMALL, write(tmp_path, text))
+
+
+class TestKept:
+    def test_more_points_and_other_measures_use_what_is_there(self, study, tmp_path):
+        first = klack.run_study(SMALL, study, folder=tmp_path / "out").record
+        assert (first.computed, first.kept) == (9, 0)
+        again = klack.run_study(SMALL, study, folder=tmp_path / "out").record
+        assert (again.computed, again.kept) == (0, 9)
+        more = write(tmp_path, STUDY.replace("points: 8", "points: 16"), "more.yaml")
+        second = klack.run_study(SMALL, more, folder=tmp_path / "out").record
+        assert (second.computed, second.kept) == (8, 9)
+        other = write(tmp_path, STUDY.replace("impacts]", "closing_time]"), "other.yaml")
+        third = klack.run_study(SMALL, other, folder=tmp_path / "out").record
+        assert third.computed == 9
+        for name, values in columns(first).items():
+            np.testing.assert_array_equal(columns(again)[name], values)
+            np.testing.assert_array_equal(columns(second)[name][:8], values)
+
+    def test_another_case_finds_nothing_and_destroys_nothing(self, study, tmp_path):
+        klack.run_study(SMALL, study, folder=tmp_path / "out")
+        heavier = klack.load_case(SMALL).with_value("network.components.needle.mass", "4 g")
+        changed = klack.run_study(heavier, study, folder=tmp_path / "out").record
+        assert changed.computed == 9
+        assert klack.run_study(SMALL, study, folder=tmp_path / "out").record.computed == 0
+
+    def test_a_changed_file_is_another_point(self, tmp_path):
+        from klack.analyses.study.log import point_key
+        from klack.case.case_tree import read_case_tree
+
+        case = tmp_path / "case.yaml"
+        case.write_text(SMALL.read_text())
+        tree = read_case_tree(case)
+        (tmp_path / "a.inp").write_text("1")
+        before = point_key(tree, "dry", {"bodies.needle.geometry.mesh.file": "a.inp"})
+        (tmp_path / "a.inp").write_text("2")
+        assert point_key(tree, "dry", {"bodies.needle.geometry.mesh.file": "a.inp"}) != before
+
+    @pytest.mark.parametrize("lines", [1, 3, 6])
+    def test_killed_at_any_point_it_resumes_to_the_same_numbers(self, study, tmp_path, lines):
+        """The signal cannot be caught; a line that was cut off is computed again."""
+        whole = klack.run_study(SMALL, study).record
+        program = "from klack.cli.main import main; import sys; sys.exit(main(sys.argv[1:]))"
+        command = ["study", str(SMALL), "--study", str(study), "--out", str(tmp_path / "out")]
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, *command, "--no-report", "--threads", "1"],
+            env=os.environ | {"COLUMNS": "80"},
+            stdout=subprocess.DEVNULL,
+        )
+        end = time.monotonic() + 120.0
+        while time.monotonic() < end and process.poll() is None:
+            found = list((tmp_path / "out").glob("points-*.jsonl"))
+            if found and found[0].read_bytes().count(b"\n") > lines:
+                break
+            time.sleep(0.002)
+        process.kill()
+        process.wait()
+        (log,) = (tmp_path / "out").glob("points-*.jsonl")
+        log.write_bytes(log.read_bytes()[:-7])  # as if the last line had been cut off
+        record = klack.run_study(SMALL, study, folder=tmp_path / "out").record
+        assert record.kept >= lines - 1
+        for name, values in columns(whole).items():
+            np.testing.assert_array_equal(columns(record)[name], values)
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+    def test_ctrl_c_says_what_is_kept(self, study, tmp_path, capsys, monkeypatch):
+        from klack.analyses.study import run
+
+        def stopped(asked, places, keep, threads, progress):
+            real(asked, list(places)[:3], keep, threads, progress)
+            signal.raise_signal(signal.SIGINT)
+
+        real = run.compute_points
+        monkeypatch.setattr(run, "compute_points", stopped)
+        code = main(["study", str(SMALL), "--study", str(study), "--out", str(tmp_path / "out")])
+        assert code == 130
+        assert "3 computed points are kept in" in capsys.readouterr().err
+
+
+WRONG = [
+    (f"{PRELOAD}:", "network.components.sprig.preload:", "did you mean 'spring'?"),
+    ("from: 10 N", "from: 10 um", "a force"),
+    ("from: 10 N", "from: 10", "add a unit"),
+    ("from: 10 N", "from: 15 N", "more than 'from'"),
+    ("to: 14 N", "too: 14 N", "the unknown key 'too'"),
+    (", to: 14 N", "", "a range has both ends"),
+    ("from: 10 N, to: 14 N", "values: []", "values"),
+    (f"{GAP}: lift", f"{GAP}: lft", "did you mean 'lift'?"),
+    (f"{GAP}: lift", f"{GAP}: preload", "a length"),
+    (f"{GAP}: lift", f"{GAP}: lift + 1", "length"),
+    (f"{GAP}: lift", f"{GAP}: __import__('os')", "arithmetic"),
+    (f"{GAP}: lift", f"{PRELOAD}: preload", "a key that is a parameter as well"),
+    (f"{GAP}: lift", f"{GAP}: stiffness * part / 1e6", "a length"),
+    ("opening_time,", "opening_tim,", "did you mean 'opening_time'?"),
+    ("variant: dry", "variant: damp", "wet"),
+    ("points: 8", "points: 0", "1 or more"),
+    ("points: 8", "kind: file", "without a file"),
+    ("sd: 3 um", "sd: 0 um", "more than 0"),
+    ("lift:", "the lift:", "a word of letters"),
+    ("part: {fixed: 10 um}", "part: {fixed: blue}", "a number with its unit"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), WRONG)
+def test_what_cannot_be_is_one_error_with_its_line(tmp_path, capsys, old, new, words):
+    assert old in STUDY
+    file = write(tmp_path, STUDY.replace(old, new, 1))
+    out = tmp_path / "out"
+    assert main(["study", str(SMALL), "--study", str(file), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+    assert str(file) in said
+    assert not (out / "result.zarr").exists()
+
+
+def test_expressions_in_a_circle(tmp_path):
+    text = STUDY.replace("lift\n", "10 um * gap / gap\n").replace(
+        "0.1 * preload", "stiffness * gap"
+    )
+    with pytest.raises(InputError):
+        klack.run_study(SMALL, write(tmp_path, text))
+    text = STUDY.replace(f"{GAP}: lift", f"{GAP}: part * stiffness * part / preload").replace(
+        "0.1 * preload / part", "preload / gap"
+    )
+    with pytest.raises(InputError, match="circle"):
+        klack.run_study(SMALL, write(tmp_path, text))
+
+
+def test_a_case_without_a_study_says_so(capsys):
+    assert main(["study", str(SMALL)]) == 2
+    assert "--study FILE" in capsys.readouterr().err
+
+
+def test_the_section_of_the_case_serves_as_well(tmp_path):
+    case = tmp_path / "case.yaml"
+    case.write_text(SMALL.read_text() + "study:" + STUDY)
+    record = klack.run_study(case).record
+    assert record.count == 8
+    assert record.study_text == ""
+
+
+def test_a_measure_without_values_is_told(tmp_path):
+    text = STUDY.replace("impacts]", "seat.7.peak_force]")
+    record = klack.run_study(SMALL, write(tmp_path, text)).record
+    assert np.isnan(columns(record)["seat.7.peak_force"]).all()
+    assert any("'seat.7.peak_force' has no value at any point" in note for note in record.warnings)
+
+
+def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
+    out, numbers = tmp_path / "out", tmp_path / "numbers.json"
+    command = ["study", str(SMALL), "--study", str(study), "--out", str(out)]
+    assert main([*command, "--json", str(numbers)]) == 0
+    told = capsys.readouterr().out
+    assert "8 points, Sobol points, seed 1" in told
+    found = json.loads(numbers.read_text())
+    assert found["schema"] == "klack-study/1"
+    assert len(found["measures"]["opening_time"]["values"]) == 8
+    page = (out / "report.html").read_text()
+    assert "drawParallel" in page
+    assert (out / "report.pdf").stat().st_size > 10_000
+    stored = klack.load_result(out)
+    assert stored.json["measures"] == found["measures"]
+    assert main(["export", str(out), "--to", "csv", "--out", str(tmp_path / "table")]) == 0
+    (file,) = (tmp_path / "table").glob("*.csv")
+    rows = list(csv.reader(file.read_text().splitlines()))
+    assert len(rows) == 9
+    assert f"{PRELOAD} [N]" in rows[0]
+
+
+def test_short_names_are_ends_that_no_other_has():
+    words = short_names(("a.gap", "b.gap", "tip", "network.x-y.z"))
+    assert words["a_gap"] == "a.gap"
+    assert "gap" not in words
+    assert words["tip"] == "tip"
+    assert words["x_y_z"] == "network.x-y.z"
