@@ -22,6 +22,7 @@ __all__ = [
     "full_grid",
     "latin_hypercube",
     "one_at_a_time",
+    "require_size",
     "sobol_sequence",
 ]
 
@@ -88,7 +89,7 @@ def full_grid(levels: Sequence[Floats]) -> Floats:
     [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0], [1.0, 0.0]]
     """
     _require_levels(levels)
-    _require_size(prod(len(own) for own in levels), len(levels))
+    require_size(prod(len(own) for own in levels), len(levels))
     return np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
 
 
@@ -120,7 +121,7 @@ def one_at_a_time(levels: Sequence[Floats]) -> Floats:
     _require_levels(levels)
     off = [own[own != _CENTRE] for own in levels]
     count = 1 + sum(own.size for own in off)
-    _require_size(count, len(levels))
+    require_size(count, len(levels))
     points = np.full((count, len(levels)), _CENTRE)
     row = 1
     for column, own in enumerate(off):
@@ -151,7 +152,7 @@ def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
     InputError
         For a count, number of parameters or seed that cannot be used.
     """
-    _require_size(count, parameters)
+    require_size(count, parameters)
     engine = qmc.LatinHypercube(parameters, **_random(seed))
     # one draw in 2^53 is a bound, where a normal distribution has no value
     return np.clip(engine.random(count), np.finfo(np.float64).eps, 1.0 - np.finfo(np.float64).eps)
@@ -184,7 +185,7 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
     InputError
         For a count, number of parameters or seed that cannot be used.
     """
-    _require_size(count, parameters)
+    require_size(count, parameters)
     if parameters > qmc.Sobol.MAXDIM:
         raise InputError(
             "design",
@@ -242,7 +243,8 @@ def _require(count: int, what: str) -> None:
         )
 
 
-def _require_size(count: int, parameters: int) -> None:
+def require_size(count: int, parameters: int) -> None:
+    """Raise :class:`InputError` unless so many points of so many parameters make a design."""
     _require(parameters, "parameters")
     _require(count, "points")
     if count * parameters > _MOST_NUMBERS:
