@@ -1,0 +1,330 @@
+"""Local refinement of good points by a pattern search, batch by batch, without derivatives."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+from klack.studies.achievement import achievement
+from klack.studies.batches import Batches, highest, points_in_cube
+from klack.studies.counts import require_count
+from klack.studies.secants import Secants
+from klack.studies.values import PointValues, table_of_numbers, values_of_points
+
+__all__ = ["Refinement", "RefinementSettings"]
+
+
+@dataclass(frozen=True, slots=True)
+class RefinementSettings:
+    """Steps and end of a refinement.
+
+    Parameters
+    ----------
+    first_step : float
+        In the unit cube: a part of the range of every parameter, above zero to 0.5.
+    last_step : float
+        A point is done when its step falls below this, above zero.
+    evaluations : int
+        Most points to evaluate, all refined points together; no batch is begun that exceeds it.
+    seed : int
+        Of the rotated directions.
+    edge : float
+        As in the search.
+
+    Raises
+    ------
+    InputError
+        If one is out of range.
+    """
+
+    first_step: float = 0.05
+    last_step: float = 1e-4
+    evaluations: int = 2000
+    seed: int = 0
+    edge: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_count("refinement: evaluations", self.evaluations, 1, 10**12)
+        require_count("refinement: seed", self.seed, 0, 2**63 - 1)
+        for name, good, expected in (
+            ("first_step", 0.0 < self.first_step <= 0.5, "above 0, at most 0.5"),
+            ("last_step", 1e-12 <= self.last_step <= self.first_step, "1e-12 to the first step"),
+            ("edge", 0.0 <= self.edge < 0.5, "0 to below 0.5"),
+        ):
+            if not good:
+                raise InputError(
+                    f"refinement: {name}",
+                    got=f"{getattr(self, name):g}",
+                    expected=expected,
+                    hint=f"change '{name}' of the refinement.",
+                )
+
+
+class Refinement(Batches):
+    """Pattern search from several points at once, each towards its own reference.
+
+    Two batches take turns.  The first polls every point ``x`` at ``x + h e_i`` and ``x - h e_i``,
+    the second goes to where the first leads: lowest points of the parabolas, a quasi-Newton step
+    with slopes by central differences in five lengths, the last move again.  All points are clipped
+    to the cube.  The best of both replaces ``x`` if it is better by Deb's rule: less violated, or
+    equally and with a smaller :func:`~klack.studies.achievement.achievement`.  The step ``h``
+    follows the length of the move.  Without a better point the directions ``e_i`` are turned once
+    (where two objectives balance, no parameter alone leads down), then ``h`` is halved.
+
+    No point gets worse than it began.  With the objectives of the start as reference, a smaller
+    achievement means better in every objective, up to the weight of the sum.  The end of a path is
+    a local optimum to ``last_step`` where the function is smooth, and no proof of one elsewhere.
+
+    Parameters
+    ----------
+    settings : RefinementSettings
+    points : array_like, shape (points, parameters)
+        Start points in the unit cube.
+    objectives, constraints : array_like, shape (points, ...)
+        Their values, known before; none may have failed.
+    reference : array_like, shape (objectives,) or (points, objectives), optional
+        Wished-for objectives; those of the start points if absent.
+    scales : array_like, shape (objectives,)
+        Ranges of the objectives on the front, above zero.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, or a start point failed.
+
+    Notes
+    -----
+    Hooke and Jeeves (1961), J. ACM 8, 212-229; Kolda, Lewis and Torczon (2003), SIAM Review 45,
+    385-482; Audet and Dennis (2006), SIAM J. Optim. 17, 188-217, for drawn directions; Lewis and
+    Overton (2013), Math. Program. 141, 135-163, for secants of functions with kinks.
+    """
+
+    def __init__(
+        self,
+        settings: RefinementSettings,
+        points: ArrayLike,
+        objectives: ArrayLike,
+        constraints: ArrayLike | None = None,
+        *,
+        scales: ArrayLike,
+        reference: ArrayLike | None = None,
+    ) -> None:
+        values = values_of_points(objectives, constraints)
+        super().__init__(values.objectives.shape[1])
+        where = "start points of a refinement"
+        table = table_of_numbers(points, where)
+        table = points_in_cube(table, table.shape[1], where)
+        if len(table) != len(values.failed) or values.failed.any() or not table.size:
+            raise InputError(
+                where,
+                got=f"{len(table)} points with {len(values.failed)} values, "
+                f"{values.failed.sum()} of them failed",
+                expected="one point or more, each with finite values",
+                hint="take points of the front.",
+            )
+        wished = values.objectives if reference is None else np.asarray(reference, dtype=float)
+        first = achievement(values.objectives, wished, scales)
+        self.settings = settings
+        self._wished = np.broadcast_to(wished, values.objectives.shape)
+        self._unit = np.asarray(scales, dtype=float)
+        self._left = settings.evaluations
+        self._paths = [
+            _Path(x, f, (float(v), float(s)), settings, np.random.default_rng([settings.seed, i]))
+            for i, (x, f, v, s) in enumerate(
+                zip(table, values.objectives, values.violation, first, strict=True)
+            )
+        ]
+        self._parts: list[int] = []
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Best point so far from each start, shape (points, parameters)."""
+        return np.array([path.best.point for path in self._paths])
+
+    @property
+    def objectives(self) -> NDArray[np.float64]:
+        """Objectives of the best points so far, shape (points, objectives)."""
+        return np.array([path.best.objectives for path in self._paths])
+
+    @property
+    def steps(self) -> NDArray[np.float64]:
+        """Present step of each path, shape (points,): below ``last_step`` it came to its end."""
+        return np.array([path.step for path in self._paths])
+
+    def _next_points(self) -> NDArray[np.float64] | None:
+        polls = [path.poll() for path in self._paths]
+        count = sum(map(len, polls))
+        if not count or count > self._left:
+            return None
+        self._left -= count
+        self._parts = [len(poll) for poll in polls]
+        return np.concatenate(polls)
+
+    def _take(self, points: NDArray[np.float64], values: PointValues) -> None:
+        begin = 0
+        for path, wished, count in zip(self._paths, self._wished, self._parts, strict=True):
+            rows = slice(begin, begin + count)
+            begin += count
+            if count:
+                violation = values.violation[rows]
+                goals = np.where(values.failed[rows, None], np.nan, values.objectives[rows])
+                path.take(points[rows], goals, violation, achievement(goals, wished, self._unit))
+
+
+class _Path:
+    """One point on its way: turns of a poll around it and a batch along what the poll suggests."""
+
+    def __init__(
+        self,
+        point: NDArray[np.float64],
+        objectives: NDArray[np.float64],
+        rank: tuple[float, float],
+        settings: RefinementSettings,
+        generator: np.random.Generator,
+    ) -> None:
+        self.best = _Best(point, objectives, rank)
+        self.step = settings.first_step
+        self._settings = settings
+        self._generator = generator
+        self._directions = np.eye(len(point))
+        self._turned = False
+        self._centre = self.best
+        self._last = np.zeros(len(point))
+        self._suggested: list[NDArray[np.float64]] | None = None
+        self._secants = Secants()
+        self._kept = rank[0] == 0.0
+
+    def poll(self) -> NDArray[np.float64]:
+        """Points to evaluate next, none of them the present one; none at all at the end."""
+        trials = np.empty((0, len(self._last)))
+        while not len(trials) and self.step >= self._settings.last_step:
+            if self._suggested is None:
+                trials = self._clipped(np.vstack(self._pairs()))
+            else:
+                trials = self._clipped(np.array(self._suggested))
+                if not len(trials):
+                    self._go()
+        return trials
+
+    def _clipped(self, trials: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Different points of the cube, without the centre."""
+        low, high = self._settings.edge, highest(self._settings.edge)
+        return _different(np.clip(trials, low, high), self._centre.point)
+
+    def take(
+        self,
+        points: NDArray[np.float64],
+        objectives: NDArray[np.float64],
+        violation: NDArray[np.float64],
+        size: NDArray[np.float64],
+    ) -> None:
+        """Keep the best; after the batch along the suggestions, go there or shorten the step."""
+        lowest = int(np.lexsort((size, violation))[0])
+        rank = (float(violation[lowest]), float(size[lowest]))
+        if rank < self.best.rank:
+            self.best = _Best(points[lowest], objectives[lowest], rank)
+        if self._suggested is None:
+            self._suggested = self._suggestions(points, violation, size)
+        else:
+            self._go()
+
+    def _pairs(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Points one step ahead and one behind in every direction, before they are clipped."""
+        steps = self.step * self._directions
+        return self._centre.point + steps, self._centre.point - steps
+
+    def _go(self) -> None:
+        """Make the best point the centre; without a better one turn or halve the step."""
+        self._suggested = None
+        count = len(self._last)
+        if self.best is not self._centre:
+            self._last = self.best.point - self._centre.point
+            self._centre = self.best
+            length = float(np.abs(self._last).max())
+            self.step = min(
+                max(length, 0.5 * self.step), 2.0 * self.step, self._settings.first_step
+            )
+            self._turned = False
+        elif self._turned or count == 1:
+            self.step /= 2.0
+            self._turned = False
+        else:
+            self._turned = True
+        self._directions = (
+            _reflection(self._generator.standard_normal(count)) if self._turned else np.eye(count)
+        )
+
+    def _in_parameters(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Components along the directions as components along the parameters."""
+        return np.array([math.fsum(column) for column in (along[:, None] * self._directions).T])
+
+    def _suggestions(
+        self,
+        points: NDArray[np.float64],
+        violation: NDArray[np.float64],
+        size: NDArray[np.float64],
+    ) -> list[NDArray[np.float64]]:
+        """Points along the lowest ones of the parabolas, the secants, and the last move."""
+        kept = self._centre.rank[0] == 0.0
+        height = self._centre.rank[1] if kept else self._centre.rank[0]
+        heights = np.where(violation == 0.0, size, np.inf) if kept else violation
+        known = {x.tobytes(): float(y) for x, y in zip(points, heights, strict=True)}
+        ahead, behind = (
+            np.array([known.get(x.tobytes(), np.inf) for x in side]) for side in self._pairs()
+        )
+        centre = self._centre.point
+        down = self._in_parameters(_parabolas(height, ahead, behind, self.step))
+        slope = self._in_parameters(_slopes(height, ahead, behind, self.step))
+        if kept != self._kept:
+            self._kept = kept
+            self._secants.forget()
+        newton = self._secants.descent(centre, slope)
+        poll = self.best.point - centre
+        moves = [down, 0.5 * down, 2.0 * poll, poll + down, self._last, 2.0 * self._last]
+        moves += [factor * newton for factor in (2.0, 1.0, 0.5, 0.25, 0.125)]
+        return [centre + move for move in moves]
+
+
+@dataclass(frozen=True, slots=True)
+class _Best:
+    """A point, its objectives, and its violation and achievement."""
+
+    point: NDArray[np.float64]
+    objectives: NDArray[np.float64]
+    rank: tuple[float, float]
+
+
+def _parabolas(
+    centre: float, ahead: NDArray[np.float64], behind: NDArray[np.float64], step: float
+) -> NDArray[np.float64]:
+    """Distances to the lowest points of parabolas, at most two steps; one where there is none."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        slope, bend = (ahead - behind) / 2.0, ahead - 2.0 * centre + behind
+        lowest = np.clip(-slope / np.where(bend > 0.0, bend, np.nan), -2.0, 2.0)
+    downhill = np.where(ahead < np.minimum(centre, behind), 1.0, 0.0)
+    downhill -= np.where(behind < np.minimum(centre, ahead), 1.0, 0.0)
+    return step * np.where(np.isfinite(lowest), lowest, downhill)
+
+
+def _slopes(
+    centre: float, ahead: NDArray[np.float64], behind: NDArray[np.float64], step: float
+) -> NDArray[np.float64]:
+    """Central differences; one-sided where one side is unknown, zero where both are."""
+    right = np.where(np.isfinite(ahead), ahead - centre, np.nan)
+    left = np.where(np.isfinite(behind), centre - behind, np.nan)
+    right, left = np.where(np.isnan(right), left, right), np.where(np.isnan(left), right, left)
+    return np.asarray(np.nan_to_num((right + left) / (2.0 * step)))
+
+
+def _different(trials: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Without the centre itself and without repetitions, in the given order."""
+    rows = np.unique(np.vstack((centre, trials)), axis=0, return_index=True)[1]
+    return trials[np.sort(rows[rows > 0]) - 1]
+
+
+def _reflection(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal directions: the parameters mirrored in a plane with this normal."""
+    square = math.fsum(normal**2)
+    return np.eye(len(normal)) - (2.0 / square) * np.outer(normal, normal)

@@ -1,0 +1,202 @@
+"""Local refinement; the truth is optima known in closed form."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from klack.errors import InputError
+from klack.studies.achievement import achievement
+from klack.studies.refinement import Refinement, RefinementSettings
+from klack.studies.secants import Secants
+
+
+def rosenbrock(x):
+    z = 4.0 * x - 2.0
+    return (100.0 * (z[:, 1:] - z[:, :-1] ** 2) ** 2 + (1.0 - z[:, :-1]) ** 2).sum(axis=1)[:, None]
+
+
+def two_spheres(x):
+    """The front is the straight line between the centres 0.3 and 0.7."""
+    return np.column_stack((((x - 0.3) ** 2).sum(axis=1), ((x - 0.7) ** 2).sum(axis=1)))
+
+
+def refine(values, start, limits=lambda x: np.zeros((len(x), 1)), settings=None, **more):
+    """The refinement at its end, and all points evaluated."""
+    start = np.asarray(start, dtype=float)
+    goals = values(start)
+    settings = settings or RefinementSettings(first_step=0.1)
+    more = {"scales": np.ones(goals.shape[1])} | more
+    refinement = Refinement(settings, start, goals, limits(start), **more)
+    seen = []
+    for points in refinement:
+        seen.append(points)
+        refinement.tell(values(points), limits(points))
+    return refinement, np.concatenate(seen)
+
+
+def test_achievement_by_hand():
+    goals = [[3.0, 10.0], [1.0, 30.0], [np.nan, 1.0]]
+    found = achievement(goals, [1.0, 10.0], [2.0, 40.0], sum_weight=0.1)
+    assert found[:2].tolist() == [1.1, 0.55]
+    assert np.isnan(found[2])
+    assert achievement([[5.0]], [3.0], [2.0], sum_weight=0.0).tolist() == [1.0]
+
+
+def test_a_quadratic_needs_one_poll_and_one_batch_more():
+    centre = np.linspace(0.3, 0.6, 8)
+    weights = np.arange(1.0, 9.0)
+    refinement, seen = refine(lambda x: ((x - centre) ** 2 @ weights)[:, None], [[0.45] * 8])
+    assert refinement.points[0] == pytest.approx(centre, abs=1e-12)
+    assert np.abs(seen[:32] - centre).max(axis=1).min() < 1e-12
+    assert refinement.steps[0] < 1e-4
+
+
+@pytest.mark.parametrize(("parameters", "evaluations"), [(2, 700), (4, 1500)])
+def test_the_curved_valley_is_followed_to_its_end(parameters, evaluations):
+    settings = RefinementSettings(first_step=0.1, evaluations=evaluations)
+    start = np.where(np.arange(parameters) % 2, 0.55, 0.4)[None]
+    refinement, seen = refine(rosenbrock, start, settings=settings)
+    assert refinement.objectives[0, 0] < 1e-6
+    assert refinement.points[0] == pytest.approx(0.75, abs=1e-3)
+    assert len(seen) <= evaluations
+
+
+def test_a_corner_of_the_cube_is_reached():
+    refinement, seen = refine(lambda x: np.abs(x - 1.0).sum(axis=1)[:, None], [[0.4, 0.7, 0.5]])
+    assert refinement.points.tolist() == [[np.nextafter(1.0, 0.0)] * 3]
+    assert np.all((seen >= 0.0) & (seen < 1.0))
+    inside = RefinementSettings(edge=0.01)
+    refinement, seen = refine(lambda x: x.sum(axis=1)[:, None], [[0.1, 0.2]], settings=inside)
+    assert refinement.points.tolist() == [[0.01, 0.01]]
+
+
+def test_several_points_improve_in_every_objective_to_the_front():
+    start = np.random.default_rng(3).uniform(0.3, 0.7, (5, 4))
+    refinement, _ = refine(two_spheres, start)
+    before, after = two_spheres(start), refinement.objectives
+    assert np.all(after <= before + 1e-3 * np.abs(after - before).sum())
+    assert np.all(np.any(after < before, axis=1))
+    assert np.array_equal(after, two_spheres(refinement.points))
+    # on the front sqrt(f1) + sqrt(f2) is the distance of the centres
+    assert np.sqrt(after).sum(axis=1) == pytest.approx(np.sqrt(4 * 0.16), rel=2e-3)
+
+
+def test_a_reference_chooses_the_point_of_the_front():
+    reference = [
+        0.01,
+        0.09,
+    ]  # at one quarter and three quarters of the way, for d = 1: f = (0.1, 0.3)
+    refinement, _ = refine(two_spheres, [[0.62]], reference=reference)
+    assert refinement.points[0] == pytest.approx(0.4, abs=1e-4)
+
+
+def test_constraints_are_reached_and_kept():
+    def limits(x):
+        return np.column_stack((0.5 - x[:, 0], 0.2 - x[:, 1]))
+
+    refinement, _ = refine(lambda x: x.sum(axis=1)[:, None], [[0.1, 0.05, 0.3]], limits)
+    assert np.all(limits(refinement.points) <= 0.0)
+    assert refinement.objectives[0, 0] == pytest.approx(0.7, abs=2e-3)
+
+
+def test_failed_points_are_never_chosen():
+    def values(x):
+        goals = np.repeat(((x - 0.5) ** 2).sum(axis=1)[:, None], 2, axis=1)
+        goals[x[:, 0] < 0.6] = np.nan
+        goals[x[:, 1] > 0.82] = -np.inf, np.inf
+        return goals
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        refinement, seen = refine(values, [[0.8, 0.8, 0.4], [0.61, 0.2, 0.9]])
+    assert np.isnan(values(seen)).any()
+    assert np.isinf(values(seen)).any()
+    assert refinement.objectives[:, 0] == pytest.approx(0.01, abs=1e-3)
+    assert np.all(refinement.points[:, 0] >= 0.6)
+
+
+def test_where_all_fails_the_start_stays():
+    start = [[0.8, 0.8]]
+    refinement = Refinement(RefinementSettings(), start, [[2.0, 3.0]], scales=[1.0, 1.0])
+    for points in refinement:
+        refinement.tell(np.full((len(points), 2), np.nan))
+    assert refinement.points.tolist() == start
+    assert refinement.objectives.tolist() == [[2.0, 3.0]]
+    assert refinement.steps[0] < 1e-4
+
+
+def test_nothing_beyond_the_budget_is_evaluated():
+    for evaluations in (1, 7, 8, 100):
+        settings = RefinementSettings(evaluations=evaluations)
+        refinement = Refinement(settings, [[0.3] * 4], [[1.0]], scales=[1.0])
+        count = 0
+        for points in refinement:
+            count += len(points)
+            refinement.tell(rosenbrock(points))
+        assert count <= evaluations
+        assert (count == 0) == (evaluations < 8)
+
+
+def test_a_refinement_told_stored_values_asks_for_the_same_points():
+    start = np.random.default_rng(5).uniform(0.3, 0.7, (3, 4))
+    first, seen = refine(two_spheres, start)
+    store = {point.tobytes(): two_spheres(point[None])[0] for point in seen}
+    again = Refinement(RefinementSettings(first_step=0.1), start, two_spheres(start), scales=[1, 1])
+    asked = 0
+    for points in again:
+        assert np.array_equal(points, seen[asked : asked + len(points)])
+        asked += len(points)
+        again.tell([store[point.tobytes()] for point in points])
+    assert asked == len(seen)
+    assert np.array_equal(again.points, first.points)
+
+
+def test_secants_of_a_quadratic_are_its_inverse():
+    rng = np.random.default_rng(2)
+    root = rng.normal(size=(4, 4))
+    second = root @ root.T + np.eye(4)
+    lowest, point = rng.normal(size=4), rng.normal(size=4)
+    secants = Secants()
+    assert secants.descent(point, second @ (point - lowest)).tolist() == [0.0] * 4
+    for _ in range(60):  # without line search BFGS still converges here
+        slope = second @ (point - lowest)
+        step = secants.descent(point, slope)
+        point = point + (step if np.any(step) else -0.01 * slope)
+    assert point == pytest.approx(lowest, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"first_step": 0.0}, "first_step"),
+        ({"first_step": np.nan}, "first_step"),
+        ({"last_step": 0.2}, "last_step"),
+        ({"last_step": 0.0}, "last_step"),
+        ({"evaluations": 0}, "evaluations"),
+        ({"seed": -1}, "seed"),
+        ({"edge": 0.7}, "edge"),
+    ],
+)
+def test_settings_out_of_range_are_named(change, words):
+    with pytest.raises(InputError, match=words):
+        RefinementSettings(**change)
+
+
+@pytest.mark.parametrize(
+    ("points", "goals", "more", "words"),
+    [
+        ([0.5], [[1.0]], {}, "rows and columns"),
+        ([[0.5]], [[1.0], [2.0]], {}, "1 points with 2 values"),
+        ([[0.5]], [[np.nan]], {}, "1 of them failed"),
+        (np.empty((0, 2)), np.empty((0, 1)), {}, "one point or more"),
+        ([[1.5]], [[1.0]], {}, "unit cube"),
+        ([[0.5]], [[1.0]], {"scales": [0.0]}, "above zero"),
+        ([[0.5]], [[1.0]], {"scales": [1.0, 1.0]}, "1 numbers above zero"),
+        ([[0.5]], [[1.0]], {"reference": [1.0, 2.0]}, "1 finite numbers"),
+        ([[0.5]], [[1.0]], {"reference": [np.nan]}, "finite"),
+    ],
+)
+def test_starts_that_do_not_fit_are_named(points, goals, more, words):
+    with pytest.raises(InputError, match=words):
+        Refinement(RefinementSettings(), points, goals, **({"scales": [1.0]} | more))
