@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 
-__all__ = ["PointValues", "values_of_points"]
+__all__ = ["PointValues", "table_of_numbers", "values_of_points"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> Po
     InputError
         If a table is not two-dimensional, holds no column of objectives, or the two differ in rows.
     """
-    goals = _table(objectives, "objectives")
+    goals = table_of_numbers(objectives, "objectives")
     if goals.shape[1] == 0:
         raise InputError(
             "objectives",
@@ -52,7 +52,9 @@ def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> Po
             hint="name one measure to minimise.",
         )
     limits = (
-        np.empty((len(goals), 0)) if constraints is None else _table(constraints, "constraints")
+        np.empty((len(goals), 0))
+        if constraints is None
+        else table_of_numbers(constraints, "constraints")
     )
     if len(limits) != len(goals):
         raise InputError(
@@ -69,8 +71,14 @@ def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> Po
     return PointValues(goals, violation, failed)
 
 
-def _table(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
-    """Numbers in rows and columns."""
+def table_of_numbers(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Check for numbers in rows and columns.
+
+    Raises
+    ------
+    InputError
+        If ``numbers`` is anything else.
+    """
     try:
         table = np.asarray(numbers, dtype=float)
     except (TypeError, ValueError) as error:
@@ -78,13 +86,13 @@ def _table(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
             where,
             got=f"{type(numbers).__name__} that is not a table of numbers ({error})",
             expected="rows of numbers, one row per point",
-            hint="give every row the same number of columns, nan where a point failed.",
+            hint="give every row the same number of columns, nan where there is no value.",
         ) from None
     if table.ndim != 2:
         raise InputError(
             where,
             got=f"an array of {table.ndim} dimensions",
             expected="rows and columns, one row per point",
-            hint="give a single objective as one column: values[:, None].",
+            hint="give a single column as values[:, None], a single row as values[None].",
         )
     return table

@@ -1,0 +1,146 @@
+"""Points asked and values told, batch by batch: what a search and a refinement have in common."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError
+from klack.studies.values import PointValues, table_of_numbers, values_of_points
+
+__all__ = ["Batches", "highest", "points_in_cube"]
+
+
+class Batches(ABC):
+    """A search that asks for the values of batches of points and never computes one itself.
+
+    Used as ::
+
+        for points in search:
+            search.tell(*evaluate(points))
+
+    The points depend on nothing but the settings and the values told.  An interrupted search is
+    therefore resumed by a new one with the same settings that is told the stored values first: it
+    asks for the same points, to the bit, with the same versions of NumPy and pymoo.
+
+    Parameters
+    ----------
+    objectives : int
+        Columns of objectives that will be told.
+    """
+
+    def __init__(self, objectives: int) -> None:
+        self._columns = objectives
+        self._asked: NDArray[np.float64] | None = None
+        self._told = 0
+
+    @property
+    def told(self) -> int:
+        """Number of batches whose values are known."""
+        return self._told
+
+    def ask(self) -> NDArray[np.float64] | None:
+        """Points of the next batch, shape (points, parameters), in the unit cube; None at the end.
+
+        Until their values are told, the same points are asked for again.
+        """
+        if self._asked is None:
+            self._asked = self._next_points()
+        return None if self._asked is None else self._asked.copy()
+
+    def tell(self, objectives: ArrayLike, constraints: ArrayLike | None = None) -> None:
+        """Take the values of the points last asked for.
+
+        Parameters
+        ----------
+        objectives : array_like, shape (points, objectives)
+            Numbers to minimise; a row with a value that is not finite is a failed point.
+        constraints : array_like, shape (points, constraints), optional
+            Zero or less where kept.  Give them as ratios to their limits, because the violations
+            are summed.
+
+        Raises
+        ------
+        InputError
+            If no points were asked for, or the tables do not fit them.  Nothing is taken then.
+        """
+        if self._asked is None:
+            raise InputError(
+                "values told to a search",
+                got="values without points asked for",
+                expected="values of the points last asked for",
+                hint="call ask before each tell.",
+            )
+        values = values_of_points(objectives, constraints)
+        expected = (len(self._asked), self._columns)
+        if values.objectives.shape != expected:
+            raise InputError(
+                "objectives told to a search",
+                got=f"a table of shape {values.objectives.shape}",
+                expected=f"shape {expected}: a row per point asked for, a column per objective",
+                hint="give rows in the order of the points, nan for those that failed.",
+            )
+        self._take(self._asked, values)
+        self._asked = None
+        self._told += 1
+
+    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+        """Batches until the end; each must be told before the next.
+
+        Raises
+        ------
+        InputError
+            If a batch was not told.
+        """
+        while (points := self.ask()) is not None:
+            told = self._told
+            yield points
+            if self._told == told:
+                raise InputError(
+                    "search",
+                    got="no values of the last batch",
+                    expected="one call of tell for each batch",
+                    hint="call tell within the loop, with nan for points that failed.",
+                )
+
+    @abstractmethod
+    def _next_points(self) -> NDArray[np.float64] | None:
+        """Points to evaluate now, at least one; None at the end."""
+
+    @abstractmethod
+    def _take(self, points: NDArray[np.float64], values: PointValues) -> None:
+        """Learn from the values of these points."""
+
+
+def highest(edge: float) -> float:
+    """Largest coordinate: below 1, where a quantile of a distribution may be infinite."""
+    return float(min(1.0 - edge, np.nextafter(1.0, 0.0)))
+
+
+def points_in_cube(points: ArrayLike, parameters: int, where: str) -> NDArray[np.float64]:
+    """Check points of the unit cube.
+
+    Raises
+    ------
+    InputError
+        If the shape does not fit or a coordinate is outside 0 to 1.
+    """
+    table = table_of_numbers(points, where)
+    if table.shape[1] != parameters:
+        raise InputError(
+            where,
+            got=f"an array of shape {table.shape}",
+            expected=f"rows of {parameters} numbers, one per parameter",
+            hint="give one row per point, also for a single one.",
+        )
+    outside = np.argwhere(~((table >= 0.0) & (table <= 1.0)))
+    if outside.size:
+        row, column = outside[0]
+        raise InputError(
+            where,
+            got=f"{table[row, column]:g} in row {row}, column {column}",
+            expected="coordinates of the unit cube, 0 to 1",
+            hint="widen the range of this parameter, or leave the point out.",
+        )
+    return table
