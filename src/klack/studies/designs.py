@@ -22,6 +22,7 @@ __all__ = [
     "full_grid",
     "latin_hypercube",
     "one_at_a_time",
+    "random_of",
     "require_size",
     "sobol_sequence",
 ]
@@ -211,11 +212,13 @@ def balanced(count: int) -> bool:
     return count > 0 and count & (count - 1) == 0
 
 
-def _random(seed: int) -> dict[str, Any]:
-    """Argument of SciPy's samplers for a seed.
+def random_of(seed: int, *stream: int) -> np.random.Generator:
+    """Random numbers of a seed and, with further numbers, of one of its independent streams.
 
-    Always a generator: since SciPy 1.15 a whole number as ``rng`` gives other points than the same
-    number as ``seed``.
+    Raises
+    ------
+    InputError
+        If the seed is no whole number of 0 or more.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InputError(
@@ -224,7 +227,16 @@ def _random(seed: int) -> dict[str, Any]:
             expected="a whole number of 0 or more",
             hint="any will do, e.g. 1; the same seed gives the same points.",
         )
-    return {_random_keyword(): np.random.default_rng(int(seed))}
+    return np.random.default_rng([int(seed), *stream] if stream else int(seed))
+
+
+def _random(seed: int) -> dict[str, Any]:
+    """Argument of SciPy's samplers for a seed.
+
+    Always a generator: since SciPy 1.15 a whole number as ``rng`` gives other points than the same
+    number as ``seed``.
+    """
+    return {_random_keyword(): random_of(seed)}
 
 
 @cache

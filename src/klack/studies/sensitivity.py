@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
-from klack.studies.designs import require_size, sobol_sequence
+from klack.studies.designs import random_of, require_size, sobol_sequence
 
 __all__ = ["Estimates", "SobolIndices", "saltelli_design", "sobol_indices"]
 
@@ -211,7 +211,7 @@ def _indices(means: Floats) -> Floats:
 def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
     """Means of the terms over as many rows, drawn with replacement: (resamples, terms)."""
     count = len(terms)
-    random = np.random.default_rng(seed)
+    random = random_of(seed)
     means = np.empty((resamples, terms.shape[1]))
     block = max(1, _BLOCK // count)
     for start in range(0, resamples, block):
