@@ -351,8 +351,9 @@ _BASE = {
 
 @cache
 def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
-    """Powers of the SI base units in a coherent SI unit, ordered by name; ``"-"`` has none.
+    """Powers of the SI base units in a coherent SI unit, ordered by name.
 
+    A number without unit, ``"-"`` or ``"1"``, has none.
     Hz is 1/s here and rad is 1: what these two mean beyond that is with whoever asks.
 
     Raises
@@ -365,7 +366,7 @@ def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
     >>> [f"{base}^{power}" for base, power in base_powers("N/m")]
     ['kg^1', 's^-2']
     """
-    if unit in ("", "-"):
+    if unit in ("", "-", "1"):
         return ()
     hint = f"use an SI unit without prefix, e.g. {LENGTH.unit} or {STIFFNESS.unit}."
     try:

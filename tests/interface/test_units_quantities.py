@@ -8,7 +8,7 @@ import pytest
 
 from klack import units
 from klack.errors import InputError
-from klack.units import format_si, parse_quantity
+from klack.units import base_powers, format_si, parse_quantity
 
 # kind, text, SI value; exact definitions, so the tolerance is round-off
 GOOD = [
@@ -128,3 +128,34 @@ def test_pint_waits_until_a_unit_is_read():
     # klack --help and reports of stored results import klack.units, but read no unit
     code = "import sys, klack.units; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# SI brochure, table 4: derived units in base units
+BASE = [
+    ("-", {}),
+    ("1", {}),
+    ("rad", {}),
+    ("m", {"m": 1}),
+    ("N", {"kg": 1, "m": 1, "s": -2}),
+    ("Hz", {"s": -1}),
+    ("Pa*s", {"kg": 1, "m": -1, "s": -1}),
+    ("ohm", {"kg": 1, "m": 2, "s": -3, "A": -2}),
+    ("H", {"kg": 1, "m": 2, "s": -2, "A": -2}),
+    ("K", {"K": 1}),
+]
+
+
+@pytest.mark.parametrize(("unit", "powers"), BASE)
+def test_powers_of_base_units(unit, powers):
+    assert dict(base_powers(unit)) == powers
+
+
+def test_every_kind_has_a_coherent_unit():
+    for kind in units.KINDS:
+        assert base_powers(kind.unit) is not None
+
+
+@pytest.mark.parametrize("unit", ["mm", "g", "bar", "degC", "banana", "m +", "%"])
+def test_powers_need_a_coherent_unit(unit):
+    with pytest.raises(InputError, match="SI unit"):
+        base_powers(unit)

@@ -13,6 +13,7 @@ __all__ = ["Estimates", "SobolIndices", "saltelli_design", "sobol_indices"]
 Floats = NDArray[np.float64]
 
 _FEWEST_ROWS = 16
+_MANY_ROWS = 1024
 _ROUND_OFF = 64 * np.finfo(np.float64).eps
 _BLOCK = 2**22
 """Numbers in memory at once while rows are drawn again: 32 MB."""
@@ -60,6 +61,11 @@ class SobolIndices:
     discarded: int
     confidence: float
     reason: str = ""
+
+    @property
+    def few_rows(self) -> bool:
+        """Whether single intervals may be much too narrow: fewer than 1024 rows."""
+        return self.rows < _MANY_ROWS
 
 
 def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
@@ -119,10 +125,15 @@ def sobol_indices(
         V    = variance of all y_a and y_b
 
     after the mean of y_a and y_b is subtracted (I. M. Sobol and Y. L. Levitan, 1999).  Intervals
-    are percentiles over rows that are drawn again with replacement (B. Efron, 1979).  They take
-    the rows for independent; those of a Sobol sequence scatter less, so the intervals tend to be
-    wider than claimed.  :func:`scipy.stats.sobol_indices` has the same estimators and accepts no
-    other number of rows than a power of two, which remains rarely where points failed.
+    are percentiles over rows that are drawn again with replacement (B. Efron, 1979), which takes
+    the rows for independent.  :func:`scipy.stats.sobol_indices` has the same estimators and accepts
+    no other number of rows than a power of two, which remains rarely where points failed.
+
+    Limits: rows of a Sobol sequence are not independent.  Their errors are smaller than those of
+    random rows from some hundred rows on, and intervals then hold the index more often than
+    claimed; with few rows single parameters are worse.  Of the 95 % intervals of the G-function
+    with 8 parameters, over 60 seeds, 94 % held the index at 64 rows, 96 % at 256, 97 % at 1024,
+    but those of the worst index 67, 80 and 87 %: see :attr:`SobolIndices.few_rows`.
 
     Parameters
     ----------
