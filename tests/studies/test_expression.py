@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import warnings
 
 import pytest
 from hypothesis import assume, given
@@ -71,6 +72,21 @@ def test_value_is_that_of_python_to_the_bit(text):
 
 def test_names_come_once_in_the_order_of_the_text():
     assert Expression.parse("b * (a + b) + pi * sqrt(c)").names == ("b", "a", "c")
+
+
+@pytest.mark.parametrize("name", ["höhe", "µ", "µ_1", "Ω", "a_2"])
+def test_a_name_is_found_as_written(name):
+    expression = Expression.parse(f"2 * {name}")
+
+    assert expression.value({name: 3.0}) == 6.0
+    assert ordered({"x": expression}, {name}) == ("x",)
+
+
+def test_a_refused_text_gives_no_warning_of_python():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError):
+            Expression.parse("1if a else 2")
 
 
 def test_an_expression_goes_to_another_process():
@@ -143,6 +159,8 @@ def test_an_expression_goes_to_another_process():
         "a; b",
         "a\x00",
         "# a",
+        "2 * a # + b",
+        "1if a else 2",
         "((" * 150 + "a" + "))" * 150,
         "-" * 450 + "a",
         "a+" * 240 + "a",
@@ -222,6 +240,8 @@ def test_a_value_that_is_not_finite_is_an_error_also_inside_min(value):
 def test_a_missing_value_names_the_nearest():
     with pytest.raises(InputError, match="did you mean 'tip_radius'"):
         Expression.parse("2 * tip_radus").value({"tip_radius": 1.0, "gap": 2.0})
+    with pytest.raises(InputError, match="did you mean 'pi'"):
+        Expression.parse("2 * PI").value({"tip_radius": 1.0})
 
 
 UNITS = {
@@ -403,5 +423,7 @@ def test_an_unknown_name_and_a_name_twice_are_errors():
         ordered({"x": Expression.parse("2 * radus")}, {"radius"})
     with pytest.raises(InputError, match="which is a parameter too"):
         ordered({"x": Expression.parse("2")}, {"x"})
-    with pytest.raises(InputError, match="which is a function too"):
-        ordered({"pi": Expression.parse("2")}, {"x"})
+    with pytest.raises(InputError, match="which is a function or pi too"):
+        ordered({"max": Expression.parse("2")}, {"x"})
+    with pytest.raises(InputError, match="'pi', which is a function or pi too"):
+        ordered({"x": Expression.parse("2 * pi")}, {"pi"})

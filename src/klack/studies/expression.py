@@ -6,6 +6,7 @@ The text is parsed and never run: what is not on the list of allowed parts is an
 import ast
 import math
 import operator
+import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -226,13 +227,10 @@ def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tu
     """
     sorter: TopologicalSorter[str] = TopologicalSorter()
     for name, expression in expressions.items():
-        if name in known or name in RESERVED:
-            raise InputError(
-                expression.where,
-                got=f"'{name}', which is {'a parameter' if name in known else 'a function'} too",
-                expected="a name of its own for every parameter and expression",
-                hint="remove one of the two, or rename it.",
-            )
+        for other in sorted(RESERVED & {name, *known}):
+            raise _taken(expression, other, "a function or pi")
+        if name in known:
+            raise _taken(expression, name, "a parameter")
         for other in expression.names:
             if other not in known and other not in expressions:
                 raise _unknown(expression, other, (*known, *expressions))
@@ -263,14 +261,29 @@ def _unknown(expression: Expression, name: str, known: Collection[str]) -> Input
         expression.where,
         got=f"'{expression.text}' with the unknown name '{name}'",
         expected=f"names among: {one_of(known)}",
-        hint=nearest(name, known, "write one of these names, or add the parameter."),
+        hint=nearest(
+            name, (*known, *sorted(RESERVED)), "write one of these names, or add the parameter."
+        ),
+    )
+
+
+def _taken(expression: Expression, name: str, by: str) -> InputError:
+    return InputError(
+        expression.where,
+        got=f"the name '{name}', which is {by} too",
+        expected="a name of its own for every parameter and expression",
+        hint="remove one of the two, or rename it.",
     )
 
 
 def _syntax_tree(text: str, where: str) -> ast.expr:
     """Parse; nothing of the text is run."""
+    if "#" in text:  # the rest would be a comment
+        _refuse(where, f"'{text}'", "remove the # and what follows it.")
     try:
-        return ast.parse(text, mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)  # of text that is refused below
+            return ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         _refuse(where, f"'{text}'", 'write it as "2 * tip_radius": no units, no words.')
 
@@ -288,7 +301,7 @@ def _read(node: ast.expr, text: str, where: str, levels: int) -> _Node:
         case ast.Name(id="pi"):
             return _Node("pi", number=math.pi)
         case ast.Name(id=name) if name not in RESERVED:
-            return _Node(name)
+            return _Node(part)  # as written: the parser gives another letter for a micro sign
         case ast.BinOp(op=op) if type(op) in _BINARY:
             both = tuple(_read(side, text, where, levels - 1) for side in (node.left, node.right))
             return _Node(part, _BINARY[type(op)], both)
