@@ -206,14 +206,14 @@ class TestKept:
 
     @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
     def test_ctrl_c_says_what_is_kept(self, study, tmp_path, capsys, monkeypatch):
-        from klack.analyses.study import run
+        from klack.analyses.study import evaluation
 
-        def stopped(asked, places, keep, threads, progress):
-            real(asked, list(places)[:3], keep, threads, progress)
+        def stopped(asked, places, *others):
+            real(asked, list(places)[:3], *others)
             signal.raise_signal(signal.SIGINT)
 
-        real = run.compute_points
-        monkeypatch.setattr(run, "compute_points", stopped)
+        real = evaluation.compute_points
+        monkeypatch.setattr(evaluation, "compute_points", stopped)
         code = main(["study", str(SMALL), "--study", str(study), "--out", str(tmp_path / "out")])
         assert code == 130
         assert "3 computed points are kept in" in capsys.readouterr().err

@@ -1,9 +1,9 @@
 """A study of a case: which keys vary, which measures are computed, at which points."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from klack.case.variants import Variant
 from klack.input.existing_file import InputPath
@@ -15,7 +15,9 @@ __all__ = [
     "NormalRange",
     "StudyDesign",
     "StudyFile",
+    "StudyLimit",
     "StudyParameter",
+    "StudySearch",
     "Written",
 ]
 
@@ -86,13 +88,18 @@ class StudyParameter(Section):
 class StudyDesign(Section):
     """Where the points of a study lie."""
 
-    kind: Literal["sobol", "latin-hypercube", "grid", "one-at-a-time", "file"] = Field(
+    kind: Literal["sobol", "latin-hypercube", "saltelli", "grid", "one-at-a-time", "file"] = Field(
         default="sobol",
         description="sobol: even cover, more points can be added; latin-hypercube: each parameter "
-        "evenly; grid: all combinations of 'levels'; one-at-a-time: each parameter by itself, "
-        "about the case; file: the rows of a CSV file.",
+        "evenly; saltelli: for Sobol's indices, 'points' times (2 + number of parameters) points; "
+        "grid: all combinations of 'levels'; one-at-a-time: each parameter by itself, about the "
+        "case; file: the rows of a CSV file.",
     )
-    points: Count = Field(default=64, le=1_000_000, description="Of sobol and latin-hypercube.")
+    points: Count = Field(
+        default=64,
+        le=1_000_000,
+        description="Of sobol and latin-hypercube; base points of saltelli, better a power of two.",
+    )
     levels: Count = Field(
         default=5, le=1000, description="Values of each range in a grid and one-at-a-time."
     )
@@ -115,6 +122,40 @@ class StudyDesign(Section):
         return self
 
 
+class StudyLimit(Section):
+    """Bounds of a measure that a design has to keep."""
+
+    most: Written | None = Field(
+        default=None,
+        description="Largest allowed value, with its unit; or by the case as it is: today + 2 %.",
+    )
+    least: Written | None = Field(default=None, description="Smallest allowed value.")
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if self.most is None and self.least is None:
+            raise CaseProblem(
+                (),
+                got="no bound",
+                expected="{most: 400 N}, {least: 95 um}, or both",
+                hint="write the bound with its unit.",
+            )
+        return self
+
+
+class StudySearch(Section):
+    """How long a search for the best points goes on."""
+
+    population: Count = Field(
+        default=40, ge=20, le=10_000, description="Points that are computed together."
+    )
+    generations: Count = Field(default=50, le=100_000, description="Populations, one by one.")
+    refinements: Annotated[int, Strict()] = Field(
+        default=200, ge=0, le=1_000_000, description="Points about the best ones at the end."
+    )
+    seed: Count = Field(default=1, description="Of the random numbers.")
+
+
 class CaseStudy(Section):
     """Parameters that vary, what follows from them, and what is computed at every point."""
 
@@ -132,6 +173,15 @@ class CaseStudy(Section):
         description="Such as closing_time, seat.peak_force, noise.sound_exposure_level_weighted.",
     )
     design: StudyDesign = Field(default=StudyDesign(), description="Where the points lie.")
+    objectives: Mapping[Text, Literal["minimise", "maximise"]] = Field(
+        default_factory=dict,
+        max_length=4,
+        description="Measures that klack optimise makes small or large, one to four.",
+    )
+    constraints: Mapping[Text, StudyLimit] = Field(
+        default_factory=dict, description="Measures and the bounds that a design has to keep."
+    )
+    search: StudySearch = Field(default=StudySearch(), description="Of klack optimise.")
     variant: Variant | None = Field(
         default=None, description="Of the stroke; the first one of the case by default."
     )

@@ -32,6 +32,16 @@ class Range:
             value = self.low + share * (self.high - self.low)
         return min(max(value, self.low), self.high)
 
+    def share(self, value: float) -> float:
+        """Probability below a value; 0 and 1 outside of the range."""
+        if self.is_log:
+            if value <= 0.0:
+                return 0.0
+            part = log(value / self.low) / log(self.high / self.low)
+        else:
+            part = (value - self.low) / (self.high - self.low)
+        return min(max(part, 0.0), 1.0)
+
     def levels(self, count: int) -> tuple[float, ...]:
         """Values in equal steps from end to end; the middle for one."""
         return tuple(self.at(float(share)) for share in even_levels(count))
@@ -49,6 +59,12 @@ class Normal:
         below = float(ndtr(-_CUT))
         return self.mean + self.deviation * float(ndtri(below + share * (1.0 - 2.0 * below)))
 
+    def share(self, value: float) -> float:
+        """Probability below a value; 0 and 1 where the distribution is cut off."""
+        below = float(ndtr(-_CUT))
+        part = (float(ndtr((value - self.mean) / self.deviation)) - below) / (1.0 - 2.0 * below)
+        return min(max(part, 0.0), 1.0)
+
     def levels(self, count: int) -> tuple[float, ...]:
         """Medians of classes of equal probability."""
         return tuple(self.at(float(share)) for share in even_levels(count, bounded=False))
@@ -63,6 +79,12 @@ class Listed:
     def at(self, share: float) -> str | float:
         """Value in the order of the list, 0 <= share <= 1."""
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+
+    def share(self, value: str | float) -> float:
+        """Middle of the share of a value of the list; that of all for another one."""
+        if value not in self.values:
+            return 0.5
+        return (self.values.index(value) + 0.5) / len(self.values)
 
     def levels(self, count: int) -> tuple[str | float, ...]:
         """All of them, whatever the count."""

@@ -4,9 +4,9 @@ import numpy as np
 
 from klack.analyses.page import page_of
 from klack.analyses.sample import rank_correlation
-from klack.analyses.study.figures import parallel_chart, scatter_chart
+from klack.analyses.study.figures import parallel_chart, scatter_chart, sensitivity_bars
 from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.analyses.study.wording import on_page, rate_text, short_labels
+from klack.analyses.study.wording import index_cells, on_page, rate_text, short_labels
 from klack.report.page import Content, Section, Table
 from klack.report.wording import count, signed
 
@@ -41,6 +41,7 @@ def study_content(record: StudyRecord) -> Content:
             ),
             tables=_related_table(record, varying, related, labels),
         ),
+        _sensitivity_section(record, labels),
         Section(title="Parameters", tables=(_parameter_table(record),)),
         Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
     ]
@@ -128,6 +129,32 @@ def _related_table(
     return (Table(columns=heads, rows=rows),)
 
 
+def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section:
+    """Bars and numbers of Sobol's indices; empty without them."""
+    known = [item for item in record.sensitivities if np.isfinite(item.total).any()]
+    rows = [
+        (labels[item.measure], labels[name], *index_cells(item, k))
+        for item in known
+        for k, name in enumerate(item.parameters)
+    ]
+    heads = ("measure", "parameter", "alone", "", "with interactions", "")
+    told = [
+        f"{labels[item.measure]}: {item.reason}." for item in record.sensitivities if item.reason
+    ]
+    told += [
+        f"{labels[item.measure]}: {count(item.discarded)} base points were left out, because one "
+        "of their points has no value: the shares are those of the rest."
+        for item in record.sensitivities
+        if item.discarded
+    ]
+    return Section(
+        title="Which parameter causes the scatter",
+        paragraphs=tuple(told),
+        charts=tuple(sensitivity_bars(item, labels) for item in known),
+        tables=(Table(columns=heads, rows=tuple(rows)),) if rows else (),
+    )
+
+
 def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
     shown = [item for item in record.columns if item.varies]
     rows = []
@@ -154,6 +181,13 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
         "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+    ),
+    (
+        "shares of the variance",
+        "Sobol's indices (I. M. Sobol 1993; A. Saltelli et al. 2010): the share of the variance of "
+        "a measure over the ranges given that a parameter causes alone, and that which vanishes "
+        "once it is known while all others are free. The difference is what it does together with "
+        "others. Intervals hold 95 %, by drawing base points again.",
     ),
 )
 

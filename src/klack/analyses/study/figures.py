@@ -5,9 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
 from klack.report.chart import (
     AxisSpec,
+    BarChart,
+    BarPart,
     Chart,
     Colour,
     Curve,
@@ -18,7 +20,7 @@ from klack.report.chart import (
 )
 from klack.report.wording import printed_unit
 
-__all__ = ["parallel_chart", "scatter_chart"]
+__all__ = ["parallel_chart", "scatter_chart", "sensitivity_bars"]
 
 _MOST_LINES = 4000
 """More lines hide each other and cost bytes."""
@@ -102,7 +104,34 @@ def scatter_chart(
     )
 
 
+def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
+    """Shares of the variance of a measure, the largest first."""
+    order = np.argsort(-np.nan_to_num(item.total))
+    alone = np.clip(np.nan_to_num(item.first[order]), 0.0, None)
+    total = np.clip(np.nan_to_num(item.total[order]), 0.0, None)
+    alone = np.minimum(alone, total)
+    return BarChart(
+        name=f"sensitivity-{item.measure}",
+        title=f"Variance of {labels[item.measure]}",
+        x=AxisSpec(label="share of the variance", unit="%"),
+        rows=tuple(labels[item.parameters[k]] for k in order),
+        parts=(
+            BarPart(label="alone", values=tuple((100.0 * alone).tolist()), colour="blue"),
+            BarPart(
+                label="together with others",
+                values=tuple((100.0 * (total - alone)).tolist()),
+                colour="orange",
+                hatch="/",
+            ),
+        ),
+        note=f"From {item.rows} base points; the table has the intervals.",
+    )
+
+
 def _axis(item: StudyColumn, labels: Mapping[str, str]) -> tuple[AxisSpec, float]:
     """Axis of a column in a unit with a fitting prefix, and the factor from SI to it."""
+    if item.unit == "kg":
+        unit, factor = printed_unit(1e3 * item.values, "g")
+        return AxisSpec(label=labels[item.name], unit=unit), 1e3 * factor
     unit, factor = printed_unit(item.values, "" if item.unit == "1" else item.unit)
     return AxisSpec(label=labels[item.name], unit=unit), factor

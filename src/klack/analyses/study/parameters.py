@@ -11,6 +11,7 @@ from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
+from klack.studies.expression import RESERVED
 from klack.studies.spread import Listed, Normal, Range, Spread
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 
@@ -119,7 +120,7 @@ def short_names(names: Mapping[str, object] | tuple[str, ...]) -> dict[str, str]
         parts = [re.sub(r"\W", "_", part) for part in name.split(".")]
         for k in range(len(parts)):
             word = "_".join(parts[k:])
-            if word.isidentifier():
+            if word.isidentifier() and word not in RESERVED:
                 shared |= {word} if word in found else set()
                 found[word] = name
     return {word: name for word, name in found.items() if word not in shared}
@@ -167,7 +168,7 @@ def _listed(item: StudyParameter, today: object) -> Listed:
 
 
 def _own_word(source: StudySource, name: str, item: StudyParameter) -> Parameter:
-    if not name.isidentifier():
+    if not name.isidentifier() or name in RESERVED:
         raise CaseProblem(
             (),
             got=f"'{name}'",

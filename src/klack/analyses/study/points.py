@@ -1,11 +1,14 @@
 """Points of a study: the values of its parameters, and what the case file has at each point."""
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import product
 from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
 
 from klack.analyses.study.parameters import (
     Parameter,
@@ -23,13 +26,28 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, one_of
 from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
 from klack.studies.expression import Expression, ordered
+from klack.studies.sensitivity import saltelli_design
 from klack.units import Kind, parse_quantity
 
-__all__ = ["Linked", "StudyPoints", "Values", "linked_of", "points_of_study"]
+__all__ = [
+    "Linked",
+    "Space",
+    "StudyPoints",
+    "Values",
+    "linked_of",
+    "points_of_study",
+    "require_varied",
+    "space_of",
+]
 
 Values = Mapping[str, float | str]
 
 _MOST_POINTS = 1_000_000
+_DRAWN: Mapping[str, tuple[Callable[[int, int, int], NDArray[np.float64]], str]] = {
+    "sobol": (sobol_sequence, "Sobol points"),
+    "latin-hypercube": (latin_hypercube, "Latin hypercube"),
+    "saltelli": (lambda base, count, seed: saltelli_design(count, base, seed), "Saltelli's design"),
+}
 _UNBALANCED = (
     "The number of Sobol points is no power of two: means over them converge more slowly. "
     "Try: 64, 128, 256, ... points."
@@ -71,14 +89,76 @@ class Linked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Space:
+    """Parameters of a study and what follows from them: from the unit cube to the case.
+
+    Parameters
+    ----------
+    parameters : tuple of Parameter
+        All of the study.
+    linked : tuple of Linked
+        In the order in which they can be computed.
+    """
+
+    parameters: tuple[Parameter, ...]
+    linked: tuple[Linked, ...]
+
+    @property
+    def varied(self) -> tuple[Parameter, ...]:
+        """Parameters of a design, in its order."""
+        return tuple(item for item in self.parameters if not item.is_fixed)
+
+    def at(self, shares: Iterable[float]) -> Values:
+        """Values [SI] by name at a point of the unit cube."""
+        pairs = zip(self.varied, shares, strict=True)
+        return self.values([item.spread.at(float(share)) for item, share in pairs])
+
+    def values(self, row: Iterable[float | str]) -> Values:
+        """Values [SI] by name where the parameters that vary have these.
+
+        Raises
+        ------
+        InputError
+            For an expression without a value there.
+        """
+        point = dict(zip((item.name for item in self.varied), row, strict=True))
+        point |= {item.name: item.spread.at(0.5) for item in self.parameters if item.is_fixed}
+        for item in self.linked:
+            point[item.name] = item.value(point)
+        return point
+
+    def written(self, values: Values) -> dict[str, PointValue]:
+        """What the case file has at a point, by the path of the key."""
+        kinds = {item.name: item.kind for item in self.parameters if item.is_key}
+        kinds |= {item.name: item.kind for item in self.linked}
+        return {name: written(values[name], kind) for name, kind in kinds.items()}
+
+    def today(self) -> NDArray[np.float64]:
+        """Point of the unit cube nearest to the case as it is, shape (parameters that vary,).
+
+        A word of the study stands for the key that it is linked with, if it is by itself.
+        """
+        own = {
+            name: item.today
+            for item in self.linked
+            for word, name in item.words.items()
+            if item.expression.text == word
+        }
+        found = [
+            item.spread.share(value) if value is not None else 0.5  # type: ignore[arg-type]
+            for item in self.varied
+            for value in [own.get(item.name) if item.today is None else item.today]
+        ]
+        return np.array(found, dtype=float)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StudyPoints:
     """Points of a study in the order of its design.
 
     Parameters
     ----------
-    parameters : tuple of Parameter
-        Those that vary.
-    linked : tuple of Linked
+    space : Space
     values : tuple of mapping of str to value
         Of each point by name [SI]: parameters, then what follows from them.
     design : str
@@ -86,8 +166,7 @@ class StudyPoints:
     notes : tuple of str
     """
 
-    parameters: tuple[Parameter, ...]
-    linked: tuple[Linked, ...]
+    space: Space
     values: tuple[Values, ...]
     design: str
     notes: tuple[str, ...] = ()
@@ -95,14 +174,17 @@ class StudyPoints:
     def __len__(self) -> int:
         return len(self.values)
 
-    def written(self) -> list[dict[str, PointValue]]:
-        """What the case file has at each point, by the path of the key."""
-        kinds = {item.name: item.kind for item in self.parameters if item.is_key}
-        kinds |= {item.name: item.kind for item in self.linked}
-        return [
-            {name: written(point[name], kind) for name, kind in kinds.items()}
-            for point in self.values
-        ]
+
+def space_of(case: ValveCase, source: StudySource) -> Space:
+    """Parameters and expressions of a study, found in its case.
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    parameters = parameters_of(case, source)
+    return Space(parameters=parameters, linked=linked_of(case, source, parameters))
 
 
 def points_of_study(case: ValveCase, source: StudySource) -> StudyPoints:
@@ -113,21 +195,10 @@ def points_of_study(case: ValveCase, source: StudySource) -> StudyPoints:
     InputError
         With file, line and key.
     """
-    parameters = parameters_of(case, source)
-    linked = linked_of(case, source, parameters)
-    varied = [parameter for parameter in parameters if not parameter.is_fixed]
-    fixed = {item.name: item.spread.at(0.5) for item in parameters if item.is_fixed}
-    rows, words, notes = _design(source, varied)
-    values = []
-    for row in rows:
-        point: dict[str, float | str] = dict(zip((item.name for item in varied), row, strict=True))
-        point |= fixed
-        for item in linked:
-            point[item.name] = item.value(point)
-        values.append(point)
-    return StudyPoints(
-        parameters=parameters, linked=linked, values=tuple(values), design=words, notes=notes
-    )
+    space = space_of(case, source)
+    rows, words, notes = _design(source, space.varied)
+    values = tuple(map(space.values, rows))
+    return StudyPoints(space=space, values=values, design=words, notes=notes)
 
 
 def linked_of(
@@ -199,22 +270,21 @@ def _design(
     design = source.study.design
     if design.kind == "file":
         return _rows_of_file(source, varied), f"from {design.file.name if design.file else ''}", ()
-    _require_varied(source, varied)
+    require_varied(source, varied)
     if design.kind == "grid":
         levels = [item.spread.levels(design.levels) for item in varied]
         _require_few(source, prod(map(len, levels)))
         return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}", ()
     if design.kind == "one-at-a-time":
         return _one_at_a_time(varied, design.levels), "one parameter at a time", ()
-    is_sobol = design.kind == "sobol"
-    make = sobol_sequence if is_sobol else latin_hypercube
+    make, name = _DRAWN[design.kind]
+    cube = make(design.points, len(varied), design.seed)
     rows = [
         [item.spread.at(float(share)) for item, share in zip(varied, point, strict=True)]
-        for point in make(design.points, len(varied), design.seed)
+        for point in cube
     ]
-    words = f"{'Sobol points' if is_sobol else 'Latin hypercube'}, seed {design.seed}"
-    notes = () if not is_sobol or balanced(design.points) else (_UNBALANCED,)
-    return rows, words, notes
+    even = design.kind == "latin-hypercube" or balanced(design.points)
+    return rows, f"{name}, seed {design.seed}", () if even else (_UNBALANCED,)
 
 
 def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:
@@ -226,7 +296,8 @@ def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float |
     return rows
 
 
-def _require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
+def require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
+    """Refuse a study in which nothing varies."""
     if not varied:
         raise InputError(
             source.where(("parameters",)),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 
-__all__ = ["StudyColumn", "StudyRecord"]
+__all__ = ["Sensitivity", "StudyColumn", "StudyRecord"]
 
 Column = NDArray[np.float64]
 
@@ -50,6 +50,40 @@ class StudyColumn:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivity:
+    """Shares of the variance of one measure that each parameter causes (Sobol's indices).
+
+    Parameters
+    ----------
+    measure : str
+    parameters : tuple of str
+    first, first_low, first_high : array, shape (parameters,)
+        Share that a parameter causes alone, with its interval of confidence.
+    total, total_low, total_high : array, shape (parameters,)
+        Share that vanishes once the parameter is known and the others are free.
+    rows, discarded : int
+        Base points used, and those left out because one of their points has no value.
+    confidence : float
+        Of the intervals.
+    reason : str
+        Why there are no numbers; empty if there are.
+    """
+
+    measure: str
+    parameters: tuple[str, ...]
+    first: Column
+    first_low: Column
+    first_high: Column
+    total: Column
+    total_low: Column
+    total_high: Column
+    rows: int
+    discarded: int
+    confidence: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StudyRecord(CaseRecord):
     """Measures of a case at many points.
 
@@ -72,6 +106,8 @@ class StudyRecord(CaseRecord):
         Why a point has no measures; empty where it was computed.
     notes : tuple of str
         Doubts about the numbers of each point.
+    sensitivities : tuple of Sensitivity
+        Of each measure, from the design of Saltelli.
     """
 
     study_text: str
@@ -86,6 +122,7 @@ class StudyRecord(CaseRecord):
     measures: tuple[StudyColumn, ...]
     failures: tuple[str, ...]
     notes: tuple[str, ...]
+    sensitivities: tuple[Sensitivity, ...] = ()
 
     @property
     def count(self) -> int:

@@ -7,6 +7,7 @@ number of threads nor on the other points.
 """
 
 import warnings
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -50,11 +51,12 @@ from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
 from klack.stages import FAILURES, StageClock, collected_warnings, show
 
-__all__ = ["AskedPoints", "PointRow", "compute_points", "row_table", "run_strokes"]
+__all__ = ["AskedPoints", "Builds", "PointRow", "compute_points", "row_table", "run_strokes"]
 
 _AROUND = 50e6  # [byte] of a run beside its records
 _FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
 _STAGE = "points"
+_MOST_BUILDS = 8
 _ASIDE = ("run", "lumped", "measurement", "calibration", "title", "description")
 """Sections that bodies, contact laws and their stops do not depend on."""
 
@@ -186,6 +188,29 @@ class _Built:
     notes: tuple[str, ...]
 
 
+class Builds:
+    """Bodies and laws of the latest groups, for the next points of the same case."""
+
+    def __init__(self) -> None:
+        self._found: OrderedDict[tuple[object, ...], _Built] = OrderedDict()
+
+    def find(self, asked: AskedPoints, group: _Group) -> _Built | None:
+        """What a group needs, if it is there."""
+        return self._found.get(self._key(asked, group))
+
+    def keep(self, asked: AskedPoints, group: _Group, built: _Built) -> None:
+        """Keep it, and let go of the oldest."""
+        key = self._key(asked, group)
+        self._found[key] = built
+        self._found.move_to_end(key)
+        while len(self._found) > _MOST_BUILDS:
+            self._found.popitem(last=False)
+
+    def _key(self, asked: AskedPoints, group: _Group) -> tuple[object, ...]:
+        touched = tuple(key.place for key in asked.points.keys)
+        return (id(asked.tree), touched, tuple(group.made.items()))
+
+
 def run_strokes(
     case: ValveCase,
     tree: CaseTree,
@@ -242,6 +267,7 @@ def compute_points(
     keep: Callable[[int, PointRow], None],
     threads: int | None = None,
     progress: Progress = silent,
+    builds: Builds | None = None,
 ) -> None:
     """Compute some of the points, those with the same bodies one after another.
 
@@ -254,6 +280,8 @@ def compute_points(
         Called in this thread with each place and its row, in the order of their end.
     threads : int, optional
     progress : callable
+    builds : Builds, optional
+        Bodies and laws that were made before.
 
     Raises
     ------
@@ -278,7 +306,7 @@ def compute_points(
     try:
         for group in _groups(asked, wanted):
             tell()
-            _run_group(asked, group, kept, tell, threads, progress)
+            _run_group(asked, group, kept, tell, threads, progress, builds or Builds())
     finally:
         show(others.values())
 
@@ -344,10 +372,14 @@ def _run_group(
     tell: Callable[[], None],
     threads: int | None,
     progress: Progress,
+    builds: Builds,
 ) -> None:
-    built, left = _build(asked, group, keep, progress)
+    built, left = builds.find(asked, group), group.places
+    if built is None:
+        built, left = _build(asked, group, keep, progress)
     if built is None:
         return
+    builds.keep(asked, group, built)
     with warnings_of_threads() as taken:
         crew = _crew(asked, built, left, threads)
         taken()

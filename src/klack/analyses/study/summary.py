@@ -9,8 +9,8 @@ from typing_extensions import TypedDict
 
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import number_or_none
-from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.analyses.study.wording import in_words, rate_text
+from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.wording import in_words, index_cells, rate_text
 from klack.terminal.tables import TextTable
 
 __all__ = ["StudyJson", "study_to_json", "study_told"]
@@ -23,6 +23,17 @@ class ColumnJson(TypedDict):
     spread: Annotated[str, Field(description="How it varies, or its expression.")]
     today: Annotated[Real, Field(description="In the case as it is.")]
     values: Annotated[list[Real | str], Field(description="One for each point.")]
+
+
+class IndexJson(TypedDict):
+    """Share of the variance of a measure that a parameter causes."""
+
+    first: Annotated[Real, Field(description="Alone.")]
+    first_low: Real
+    first_high: Real
+    total: Annotated[Real, Field(description="With interactions.")]
+    total_low: Real
+    total_high: Real
 
 
 class StudyJson(TypedDict):
@@ -38,6 +49,10 @@ class StudyJson(TypedDict):
     parameters: dict[str, ColumnJson]
     linked: dict[str, ColumnJson]
     measures: dict[str, ColumnJson]
+    sensitivities: Annotated[
+        dict[str, dict[str, IndexJson]],
+        Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
+    ]
     failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
     notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
     wall_time_s: Real
@@ -60,6 +75,10 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "parameters": {item.name: _column(item) for item in record.parameters},
         "linked": {item.name: _column(item) for item in record.linked},
         "measures": {item.name: _column(item) for item in record.measures},
+        "sensitivities": {
+            item.measure: {name: _indices(item, k) for k, name in enumerate(item.parameters)}
+            for item in record.sensitivities
+        },
         "failures": list(record.failures),
         "notes": list(record.notes),
         "wall_time_s": record.wall_time,
@@ -67,6 +86,17 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "computed": record.computed,
         "kept": record.kept,
         "threads": record.threads,
+    }
+
+
+def _indices(item: Sensitivity, k: int) -> IndexJson:
+    return {
+        "first": number_or_none(item.first[k]),
+        "first_low": number_or_none(item.first_low[k]),
+        "first_high": number_or_none(item.first_high[k]),
+        "total": number_or_none(item.total[k]),
+        "total_low": number_or_none(item.total_low[k]),
+        "total_high": number_or_none(item.total_high[k]),
     }
 
 
@@ -98,6 +128,12 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
         columns=("measure", "today", "lowest", "median", "highest", "at lowest", "at highest"),
         rows=[_range_row(record, item) for item in record.measures],
     )
+    for item in record.sensitivities:
+        yield TextTable(
+            title=f"Shares of the variance of {item.measure} (95 % intervals)",
+            columns=("parameter", "alone", "", "with interactions", ""),
+            rows=[[name, *index_cells(item, k)] for k, name in enumerate(item.parameters)],
+        )
     yield rate_text(record)
 
 

@@ -2,11 +2,11 @@
 
 from math import isfinite
 
-from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
 from klack.report.wording import fixed, quantity
 from klack.units import format_si
 
-__all__ = ["in_words", "on_page", "rate_text", "short_labels"]
+__all__ = ["in_words", "index_cells", "on_page", "rate_text", "short_labels"]
 
 
 def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
@@ -17,6 +17,8 @@ def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
         return item.words[int(value)]
     if item.unit.startswith("dB"):
         return f"{value:.1f} {item.unit}"
+    if item.unit == "kg":
+        return format_si(1e3 * value, "g", digits)
     return format_si(value, "" if item.unit == "1" else item.unit, digits)
 
 
@@ -26,7 +28,23 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
         return in_words(item, value)
     if item.unit.startswith("dB"):
         return fixed(value, 1, item.unit)
+    if item.unit == "kg":
+        return quantity(1e3 * value, "g", digits)
     return quantity(value, "" if item.unit == "1" else item.unit, digits)
+
+
+def index_cells(item: Sensitivity, k: int) -> tuple[str, ...]:
+    """Indices of one parameter with their intervals: alone, and with interactions."""
+    return (
+        _index(item.first[k]),
+        f"{_index(item.first_low[k])} to {_index(item.first_high[k])}",
+        _index(item.total[k]),
+        f"{_index(item.total_low[k])} to {_index(item.total_high[k])}",
+    )
+
+
+def _index(value: float) -> str:
+    return f"{value:.3f}" if isfinite(value) else "–"
 
 
 def rate_text(record: StudyRecord) -> str:
@@ -54,7 +72,8 @@ def short_labels(record: StudyRecord) -> dict[str, str]:
         alone = (
             end
             for end in ends
-            if not any(other != name and f".{other}".endswith(f".{end}") for other in names)
+            if not end[0].isdigit()
+            and not any(other != name and f".{other}".endswith(f".{end}") for other in names)
         )
         found[name] = next(alone, name).replace(".", " ").replace("_", " ")
     return found

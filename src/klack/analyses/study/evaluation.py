@@ -1,0 +1,64 @@
+"""Rows of points: those that are known, and the others computed and kept."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+from klack.analyses.study.log import KeptPoint, PointLog, point_key
+from klack.analyses.study.strokes import AskedPoints, Builds, PointRow, compute_points
+from klack.progress import Progress
+
+__all__ = ["Evaluation"]
+
+
+class Evaluation:
+    """Computes what the log does not hold; counts points and seconds.
+
+    Parameters
+    ----------
+    log : PointLog
+    threads : int, optional
+    """
+
+    def __init__(self, log: PointLog, threads: int | None) -> None:
+        self._log, self._threads, self._builds = log, threads, Builds()
+        self.computed, self.seconds = 0, 0.0
+
+    def rows(self, asked: AskedPoints, progress: Progress) -> list[PointRow]:
+        """Rows of all points that are asked for, equal ones computed once."""
+        begin = perf_counter()
+        measures = tuple(item.name for item in asked.chosen)
+        keys = [point_key(asked.tree, asked.variant, row) for row in asked.points.written]
+        rows = [self._known(key, measures) for key in keys]
+        first: dict[str, int] = {}
+        for place, (key, row) in enumerate(zip(keys, rows, strict=True)):
+            if row is None:
+                first.setdefault(key, place)
+
+        def keep(place: int, row: PointRow) -> None:
+            rows[place] = row
+            self.computed += 1
+            if not row.by_chance:
+                key = keys[place]
+                before = self._log.done.get(key, KeptPoint(values={}, failure="", notes=()))
+                self._log.add(key, before.with_row(measures, row))
+
+        compute_points(asked, first.values(), keep, self._threads, progress, self._builds)
+        self.seconds += perf_counter() - begin
+        return [
+            row or self._as(rows, first, key, measures) for key, row in zip(keys, rows, strict=True)
+        ]
+
+    def _known(self, key: str, measures: tuple[str, ...]) -> PointRow | None:
+        kept = self._log.done.get(key)
+        return None if kept is None else kept.row(measures)
+
+    def _as(
+        self,
+        rows: Sequence[PointRow | None],
+        first: dict[str, int],
+        key: str,
+        measures: tuple[str, ...],
+    ) -> PointRow:
+        """Row of a point that equals an earlier one."""
+        none = PointRow((None,) * len(measures), "not computed", by_chance=True)
+        return rows[first[key]] or none
