@@ -116,6 +116,22 @@ def test_failed_points_are_never_chosen():
     assert np.all(refinement.points[:, 0] >= 0.6)
 
 
+@pytest.mark.parametrize("huge", [1e160, 1e300, np.finfo(float).max])
+@pytest.mark.parametrize("both", [False, True])
+def test_huge_objectives_are_never_chosen(huge, both):
+    def values(x):
+        goals = two_spheres(x)
+        goals[x[:, 0] > 0.62] = huge, huge if both else -huge
+        goals[x[:, 1] > 0.57] = huge
+        return goals
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        refinement, seen = refine(values, [[0.6, 0.55, 0.5]], scales=[0.1, 0.1])
+    assert (seen[:, 0] > 0.62).any()
+    assert refinement.points[0, 0] <= 0.62
+
+
 def test_where_all_fails_the_start_stays():
     start = [[0.8, 0.8]]
     refinement = Refinement(RefinementSettings(), start, [[2.0, 3.0]], scales=[1.0, 1.0])

@@ -149,6 +149,21 @@ def test_sizes_of_four_objectives_do_not_matter():
     assert np.array_equal(points, scaled)
 
 
+@pytest.mark.parametrize("objectives", [1, 2, 3, 4])
+@pytest.mark.parametrize("huge", [1e200, np.finfo(float).max])
+def test_huge_objectives_of_a_part_do_not_stop_a_search(objectives, huge):
+    def values(x):
+        goals = dtlz2(x, 4)[:, :objectives]
+        goals[x[:, 1] < 0.3] = huge
+        return goals
+
+    settings = SearchSettings(6, objectives, population=40, generations=20, seed=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        points, *_ = run(settings, values)
+    assert np.mean(points[-40:, 1] < 0.3) < 0.2
+
+
 def test_one_objective_finds_its_optimum():
     points, goals, _ = run(SearchSettings(8, 1, population=40, generations=80), sphere)
     assert goals.min() < 1e-10
@@ -234,6 +249,8 @@ def test_a_search_told_stored_values_asks_for_the_same_points(objectives):
             other.tell(values(other.ask()))
         resumed.tell([store[point.tobytes()] for point in points])
     assert resumed.told == 12
+    shorter, *_ = run(SearchSettings(5, objectives, population=24, generations=5, seed=11), values)
+    assert np.array_equal(shorter, whole[: 5 * 24])
     different, *_ = run(
         SearchSettings(5, objectives, population=24, generations=2, seed=12), values
     )

@@ -63,5 +63,6 @@ def achievement(
             expected="zero or more",
             hint="0.001 is usual.",
         )
-    distances = (values - goal) / unit
-    return np.asarray(distances.max(axis=1) + sum_weight * distances.sum(axis=1))
+    with np.errstate(over="ignore", invalid="ignore"):  # huge values give infinity, or nan
+        distances = (values - goal) / unit
+        return np.asarray(distances.max(axis=1) + sum_weight * distances.sum(axis=1))

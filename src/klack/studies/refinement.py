@@ -10,6 +10,7 @@ from klack.errors import InputError
 from klack.studies.achievement import achievement
 from klack.studies.batches import Batches, highest, points_in_cube
 from klack.studies.counts import require_count
+from klack.studies.designs import random_of
 from klack.studies.secants import Secants
 from klack.studies.values import PointValues, table_of_numbers, values_of_points
 
@@ -131,7 +132,7 @@ class Refinement(Batches):
         self._unit = np.asarray(scales, dtype=float)
         self._left = settings.evaluations
         self._paths = [
-            _Path(x, f, (float(v), float(s)), settings, np.random.default_rng([settings.seed, i]))
+            _Path(x, f, (float(v), float(s)), settings, random_of(settings.seed, i))
             for i, (x, f, v, s) in enumerate(
                 zip(table, values.objectives, values.violation, first, strict=True)
             )
@@ -268,8 +269,9 @@ class _Path:
     ) -> list[NDArray[np.float64]]:
         """Points along the lowest ones of the parabolas, the secants, and the last move."""
         kept = self._centre.rank[0] == 0.0
-        height = self._centre.rank[1] if kept else self._centre.rank[0]
+        height = _moderate(np.array(self._centre.rank[1 if kept else 0]))
         heights = np.where(violation == 0.0, size, np.inf) if kept else violation
+        heights = _moderate(heights)
         known = {x.tobytes(): float(y) for x, y in zip(points, heights, strict=True)}
         ahead, behind = (
             np.array([known.get(x.tobytes(), np.inf) for x in side]) for side in self._pairs()
@@ -296,8 +298,16 @@ class _Best:
     rank: tuple[float, float]
 
 
+def _moderate(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heights of which squares are finite; what is infinite or nan stays: not known."""
+    return np.where(np.isfinite(heights), np.clip(heights, -1e100, 1e100), heights)
+
+
 def _parabolas(
-    centre: float, ahead: NDArray[np.float64], behind: NDArray[np.float64], step: float
+    centre: NDArray[np.float64],
+    ahead: NDArray[np.float64],
+    behind: NDArray[np.float64],
+    step: float,
 ) -> NDArray[np.float64]:
     """Distances to the lowest points of parabolas, at most two steps; one where there is none."""
     with np.errstate(invalid="ignore", over="ignore"):
@@ -309,7 +319,10 @@ def _parabolas(
 
 
 def _slopes(
-    centre: float, ahead: NDArray[np.float64], behind: NDArray[np.float64], step: float
+    centre: NDArray[np.float64],
+    ahead: NDArray[np.float64],
+    behind: NDArray[np.float64],
+    step: float,
 ) -> NDArray[np.float64]:
     """Central differences; one-sided where one side is unknown, zero where both are."""
     right = np.where(np.isfinite(ahead), ahead - centre, np.nan)

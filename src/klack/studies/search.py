@@ -20,6 +20,9 @@ __all__ = ["Search", "SearchSettings"]
 _WORST_VIOLATION = 1e200
 """Largest violation of a point that did not fail."""
 
+_LARGEST = 1e100
+"""Objectives beyond this are taken as this large: their differences and squares stay finite."""
+
 
 @dataclass(frozen=True, slots=True)
 class SearchSettings:
@@ -81,6 +84,7 @@ class Search(Batches):
     evenly spread over the front.  Constraints by Deb's rule: feasible before infeasible, then the
     smaller sum of violations.  A failed point is worse than every one that did not fail.
 
+    With more generations the first ones stay the same, so a longer search continues a shorter one.
     The points of the front are those of all batches (:func:`klack.studies.fronts.find_front`), not
     those of the last population.
 
@@ -132,7 +136,9 @@ class Search(Batches):
         violation = np.minimum(values.violation, _WORST_VIOLATION)
         violation[values.failed] = 2.0 * _WORST_VIOLATION
         objectives = np.where(values.failed[:, None], 0.0, values.objectives)
-        self._population.set("F", objectives / self._scales(values), "G", violation[:, None])
+        with np.errstate(over="ignore"):
+            sized = np.clip(objectives / self._scales(values), -_LARGEST, _LARGEST)
+        self._population.set("F", sized, "G", violation[:, None])
         with _own_warnings():
             self._algorithm.tell(infills=self._population)
 
@@ -150,9 +156,10 @@ class Search(Batches):
 
 def _spread(objectives: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance between the quartiles of each column, or its range, or its size; never zero."""
-    low, high = np.quantile(objectives, (0.25, 0.75), axis=0)
+    near = np.clip(objectives, -_LARGEST, _LARGEST)
+    low, high = np.quantile(near, (0.25, 0.75), axis=0)
     spread = high - low
-    for wider in (np.ptp(objectives, axis=0), np.abs(objectives).max(axis=0)):
+    for wider in (np.ptp(near, axis=0), np.abs(near).max(axis=0)):
         spread = np.where(spread > 0.0, spread, wider)
     return np.where(spread > 0.0, spread, 1.0)
 
