@@ -49,7 +49,8 @@ def test_what_the_catalogue_names_is_there(entry):
     if entry.form:
         assert callable(named(analysis.page))
     if entry.example:
-        assert entry.command.__name__ == entry.example.split()[1]
+        names = [command.__name__ for command in entry.commands]
+        assert names == [text.split()[1] for text in (entry.example, *entry.others) if text]
 
 
 @pytest.mark.parametrize(

@@ -316,3 +316,208 @@ def test_short_names_are_ends_that_no_other_has():
     assert "gap" not in words
     assert words["tip"] == "tip"
     assert words["x_y_z"] == "network.x-y.z"
+
+
+class TestNoise:
+    """Truth: the noise of the stroke of the changed case, by the command for noise."""
+
+    ROD = """
+klack: 1
+title: A rod on an elastic block
+materials: {steel: {young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}
+bodies:
+  needle:
+    geometry:
+      model: axisymmetric
+      profile:
+        unit: mm
+        parts:
+          needle:
+            start: [0, 0]
+            edges:
+              - {line: [1.5, 0], name: tip}
+              - {line: [1.5, 20], name: shaft}
+              - {line: [0, 20], name: top}
+              - {close: true, name: axis}
+    material: steel
+    mesh: {size: 1 mm}
+    damping: {modal: 1 %}
+  block:
+    geometry:
+      model: axisymmetric
+      profile:
+        unit: mm
+        parts:
+          block:
+            start: [0, -4]
+            edges:
+              - {line: [6, -4], name: bottom}
+              - {line: [6, 0], name: outside}
+              - {line: [0, 0], name: top}
+              - {close: true, name: axis}
+    material: steel
+    mesh: {size: 1 mm}
+    fixed: [{surface: bottom}]
+    damping: {modal: 1 %}
+reduction: {modes: {needle: {count: 4}, block: {count: 6}}, correction: none}
+network:
+  components:
+    needle: {type: flexible-body, body: needle, points: [tip, top]}
+    block: {type: flexible-body, body: block, points: [top]}
+    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}}
+    opening: {type: end-stop, gap: 50 um, law: {kind: linear, stiffness: 1e8 N/m}}
+    spring: {type: spring, stiffness: 10 N/mm, preload: 5 N}
+    magnet: {type: force-over-time, time: [10 us, 11 us, 300 us, 301 us],
+             force: [0 N, 20 N, 20 N, 0 N]}
+  connections:
+    - [needle.tip, seat.upper]
+    - [seat.lower, block.top]
+    - [opening.upper, ground]
+    - [needle.top, opening.lower, spring.end, magnet.end]
+stops: {seat: {between: [needle.tip, block.top], speed: 1 m/s, force: 20 N}}
+noise: {surfaces: [block.outside], mount: {stiffness: 10 N/um, loss_factor: 10 %, mass: 60 g}}
+run: {duration: 1 ms, step: 50 ns, variants: [dry]}
+"""
+
+    def test_noise_of_a_point_is_that_of_its_stroke(self, tmp_path):
+        case = tmp_path / "rod.yaml"
+        case.write_text(self.ROD)
+        mount = "noise.mount.stiffness"
+        text = f"""
+  parameters:
+    {PRELOAD}: {{values: [5 N, 6 N]}}
+    {mount}: {{values: [10 N/um, 20 N/um]}}
+  measures: [noise.sound_exposure_level_weighted, noise.radiated_energy, noise.loudness_max]
+  design: {{kind: grid}}
+"""
+        record = klack.run_study(case, write(tmp_path, text)).record
+        found = columns(record)
+        changed = klack.load_case(case).with_value(PRELOAD, "6 N").with_value(mount, "20 N/um")
+        noise = klack.noise_of(klack.run_stroke(changed, ["dry"]))
+        (truth,) = (
+            numbers for name, numbers in noise.measures.items() if "rod" in name and "," not in name
+        )
+        for name, values in found.items():
+            assert values[3] == truth[name.partition(".")[2]].value
+            if name != "noise.loudness_max":  # too faint to have one
+                assert len({*values.tolist()}) == 4
+
+
+class TestSensitivity:
+    def test_what_has_no_effect_has_no_share_and_the_others_share_all(self, tmp_path):
+        """Peak force of a rigid mass, sqrt(2 k x (F - P - c x / 2)): independent of its mass.
+
+        It is nearly linear in magnet force and preload, whose ranges are equally wide.
+        """
+        text = f"""
+  parameters:
+    {PRELOAD}: {{from: 10 N, to: 14 N}}
+    network.components.needle.mass: {{from: 2.5 g, to: 3.5 g}}
+    network.components.magnet.force.1: {{from: 33 N, to: 37 N}}
+  measures: [opening.peak_force]
+  design: {{kind: saltelli, points: 64}}
+  variant: dry
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        assert record.count == 64 * 5
+        (found,) = record.sensitivities
+        preload, mass, force = found.total
+        assert mass < 1e-4
+        assert preload == pytest.approx(0.5, abs=0.12)
+        assert force == pytest.approx(0.5, abs=0.12)
+        assert found.first.sum() == pytest.approx(1.0, abs=0.1)
+        assert found.first_low[0] < found.first[0] < found.first_high[0]
+
+
+OPTIMUM = f"""
+  parameters:
+    {PRELOAD}: {{from: 10 N, to: 14 N}}
+    lift: {{from: 90 um, to: 110 um}}
+  linked: {{{GAP}: lift}}
+  measures: [impacts]
+  objectives: {{opening_time: minimise, opening.peak_force: minimise}}
+  constraints: {{opening.peak_force: {{most: today - 1 %}}, opening_time: {{least: 1 us}}}}
+  search: {{population: 20, generations: 4, refinements: 30}}
+  variant: dry
+"""
+
+
+class TestOptimum:
+    """Truth: definitions of the front, an exhaustive grid, and bounds by the case as it is."""
+
+    def test_nothing_that_was_computed_beats_the_front(self, tmp_path):
+        from klack.analyses.study.optimise import run_optimisation
+        from klack.case.study_source import study_of
+
+        case = klack.load_case(SMALL)
+        source = study_of(case.checked, case.tree, write(tmp_path, OPTIMUM))
+        record = run_optimisation(case.checked, case.tree, source, folder=tmp_path / "out")
+        found = record.optimum
+        time, force = (columns(record)[name] for name in ("opening_time", "opening.peak_force"))
+        today = {item.name: item.today for item in record.measures}
+        most = 0.99 * today["opening.peak_force"]
+        assert found.feasible
+        np.testing.assert_array_equal(found.kept, force <= most)
+        for i in found.front:
+            better = found.kept & (time <= time[i]) & (force <= force[i])
+            assert not (better & ((time < time[i]) | (force < force[i]))).any()
+        assert found.best in found.front
+        assert record.count > 80  # refinements came after the generations
+        again = run_optimisation(case.checked, case.tree, source, folder=tmp_path / "out")
+        assert again.computed == 0
+        np.testing.assert_array_equal(again.optimum.front, found.front)
+        grid = OPTIMUM.replace("  search:", "  design: {kind: grid, levels: 7}\n  search:")
+        grid = grid.replace("measures: [impacts]", "measures: [opening_time, opening.peak_force]")
+        every = columns(klack.run_study(SMALL, write(tmp_path, grid, "grid.yaml")).record)
+        for t, f in zip(*every.values(), strict=True):
+            if f <= most:  # within 1 %, no point of a grid is better than all of the front
+                assert ((time[found.front] <= 1.01 * t) & (force[found.front] <= 1.01 * f)).any()
+
+    def test_one_objective_finds_the_corner(self, tmp_path, capsys):
+        """A strong spring opens late: the latest opening is at the highest preload and lift."""
+        text = OPTIMUM.replace("opening.peak_force: minimise}", "}").replace(
+            "opening_time: minimise, ", "opening_time: maximise"
+        )
+        text = text.replace("opening.peak_force: {most: today - 1 %}, ", "")
+        out = tmp_path / "out"
+        file = write(tmp_path, text)
+        command = ["optimise", str(SMALL), "--study", str(file), "--out", str(out)]
+        assert main([*command, "--json", str(tmp_path / "o.json")]) == 0
+        told = capsys.readouterr()
+        assert "best so far" in told.err
+        found = json.loads((tmp_path / "o.json").read_text())
+        best = found["optimum"]["best"]
+        assert found["parameters"][PRELOAD]["values"][best] == pytest.approx(14.0, rel=1e-3)
+        assert found["parameters"]["lift"]["values"][best] == pytest.approx(110e-6, rel=1e-3)
+        page = (out / "report.html").read_text()
+        assert "The recommended point and that of today" in page
+
+        assert main(["export", str(out), "--to", "case", "--out", str(tmp_path / "case")]) == 0
+        (case,) = (tmp_path / "case").glob("*.yaml")
+        stroke = klack.run_stroke(case, ["dry"]).measures["dry"]
+        value = found["measures"]["opening_time"]["values"][best]
+        assert stroke["opening_time"].value == value
+        assert main(["export", str(out), "--to", "case", "--point", "9999"]) == 2
+        assert "--point" in capsys.readouterr().err
+
+    @pytest.mark.parametrize(
+        ("old", "new", "words"),
+        [
+            ("objectives:", "others:", "the unknown key 'others'"),
+            ("{opening_time: minimise, opening.peak_force: minimise}", "{}", "no objectives"),
+            ("opening_time: minimise", "opening_tim: minimise", "did you mean"),
+            ("today - 1 %", "400 mm", "a force"),
+            ("today - 1 %", "today - 1 mm", "a force"),
+            ("{most: today - 1 %}", "{}", "no bound"),
+            ("population: 20", "population: 5", "8 to 10000"),
+            ("most: today - 1 %", "most: 1 N", "No point keeps all bounds"),
+        ],
+    )
+    def test_what_cannot_be(self, tmp_path, capsys, old, new, words):
+        assert old in OPTIMUM
+        file = write(tmp_path, OPTIMUM.replace(old, new, 1))
+        command = ["optimise", str(SMALL), "--study", str(file), "--out", str(tmp_path / "out")]
+        code = main([*command, "--no-report"])
+        assert code == (0 if new == "most: 1 N" or words.startswith("No point") else 2)
+        said = capsys.readouterr()
+        assert words in " ".join((said.out + said.err).split())

@@ -27,19 +27,21 @@ class Entry:
     example : str
         Of its command, ``"klack shots demo-shots"``: the function ``shots`` of the module
         ``command`` in the same folder; empty without one.
+    others : tuple of str
+        Examples of further commands in that module.
     """
 
     place: str
     form: str = ""
     example: str = ""
+    others: tuple[str, ...] = ()
 
     @property
-    def command(self) -> Callable[..., int]:
-        """Function behind its command."""
-        found: Callable[..., int] = named(
-            f"{self.place.partition('.')[0]}.command:{self.example.split()[1]}"
-        )
-        return found
+    def commands(self) -> dict[Callable[..., int], str]:
+        """Functions behind its commands, with the example of each."""
+        room = self.place.partition(".")[0]
+        examples = [text for text in (self.example, *self.others) if text]
+        return {named(f"{room}.command:{text.split()[1]}"): text for text in examples}
 
 
 ANALYSES: tuple[Entry, ...] = (
@@ -54,7 +56,12 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke demo-stroke --variant wet,dry",
     ),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
-    Entry("study.analysis:STUDY", "klack study of points", "klack study demo-stroke"),
+    Entry(
+        "study.analysis:STUDY",
+        "klack study of points",
+        "klack study demo-stroke",
+        others=("klack optimise demo-stroke",),
+    ),
     Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
     Entry(
         "reduction.analysis:REDUCTION",
@@ -79,7 +86,7 @@ def analyses() -> tuple["Analysis[Any]", ...]:
 
 def commands() -> dict[Callable[..., int], str]:
     """Commands of the analyses, with the example that the help of each shows."""
-    return {entry.command: entry.example for entry in ANALYSES if entry.example}
+    return {command: text for entry in ANALYSES for command, text in entry.commands.items()}
 
 
 def analysis_in(folder: Path) -> "StoredAnalysis[Any]":

@@ -144,7 +144,7 @@ class StudyLimit(Section):
 
 
 class StudySearch(Section):
-    """How long a search for the best points goes on."""
+    """How long a search for the best points lasts."""
 
     population: Count = Field(
         default=40, ge=20, le=10_000, description="Points that are computed together."

@@ -25,11 +25,12 @@ _Source = Annotated[
     ),
 ]
 _Target = Annotated[
-    Literal["mat", "csv", "fmu", "modelica", "calculix", "netcdf", "mdf", "vtk"],
+    Literal["mat", "csv", "fmu", "modelica", "calculix", "netcdf", "mdf", "vtk", "case"],
     Parameter(
         name="--to",
         help="mat, csv: models of a case, or a result; fmu, modelica: models; netcdf, mdf: results "
-        "(a case is run first); vtk: fields over time; calculix: a deck of the impact.",
+        "(a case is run first); vtk: fields over time; calculix: a deck of the impact; case: of a "
+        "point of a study.",
     ),
 ]
 _Part = Annotated[
@@ -85,6 +86,10 @@ _TimeLimit = Annotated[
     str | None, Parameter(name="--time-limit", help='Stop that run after this long, "20 min".')
 ]
 
+_Point = Annotated[
+    int | None, Parameter(name="--point", help="Point of a study, as its report numbers it.")
+]
+
 _MODELS = ("mat", "csv", "fmu", "modelica")
 _RESULTS = ("mat", "csv", "netcdf", "mdf")
 _USED_BY: Mapping[str, tuple[str, ...]] = {
@@ -99,6 +104,7 @@ _USED_BY: Mapping[str, tuple[str, ...]] = {
     "--penalty": ("calculix",),
     "--run": ("calculix",),
     "--time-limit": ("calculix",),
+    "--point": ("case",),
 }
 
 
@@ -118,6 +124,7 @@ def export(
     penalty: _Penalty = None,
     run: _Run = False,
     time_limit: _TimeLimit = None,
+    point: _Point = None,
     component: Components = None,
     out: Out = None,
     wanted: Wanted = WANTED,
@@ -138,8 +145,15 @@ def export(
             "--penalty": penalty,
             "--run": run or None,
             "--time-limit": time_limit,
+            "--point": point,
         },
     )
+    if to == "case":
+        from klack.cli.export_results import export_point
+
+        name, made = export_point(source, point, out)
+        _tell(name, to, made, wanted)
+        return 0
     if is_result(source):
         name, made = _export_stored(source, to, out, wanted)
         _tell(name, to, made, wanted)

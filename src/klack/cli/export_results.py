@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from klack.case.schema import Case
     from klack.case.valve import ValveCase
 
-__all__ = ["export_fields", "export_result", "run_and_export"]
+__all__ = ["export_fields", "export_point", "export_result", "run_and_export"]
 
 
 def export_result(study: Any, to: str, folder: Path) -> Written:
@@ -59,6 +59,30 @@ def _export_points(study: "StudyRecord", folder: Path) -> Written:
     with staged_folder(folder) as stage:
         study_table(study).to_csv(stage / "points.csv")
         return Written.of(folder, stage)
+
+
+def export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
+    """Write the case file of a point of a stored study."""
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.result_folder import is_result
+    from klack.analyses.study.point_case import case_of_point
+    from klack.analyses.study.record import StudyRecord
+    from klack.terminal.output import require_folder
+
+    study = load_result(source) if is_result(source) else None
+    if not isinstance(study, StudyRecord):
+        raise InputError(
+            str(source),
+            got="no result of a study",
+            expected="the folder of klack study or klack optimise",
+            hint="give the folder that the command names at the end.",
+        )
+    folder = out if out is not None else source
+    require_folder(folder)
+    name, text = case_of_point(study, point, folder)
+    with staged_folder(folder) as stage:
+        (stage / name).write_text(text, encoding="utf-8")
+        return study.case, Written.of(folder, stage)
 
 
 def run_and_export(

@@ -71,6 +71,7 @@ def _column(
         today=float("nan") if today is None else float(today),
         values=np.array(values, dtype=float),
         words=words,
+        is_whole=bool(unit) and all(isinstance(point[name], int) for point in points),
     )
 
 

@@ -4,9 +4,14 @@ import numpy as np
 
 from klack.analyses.page import page_of
 from klack.analyses.sample import rank_correlation
-from klack.analyses.study.figures import parallel_chart, scatter_chart, sensitivity_bars
+from klack.analyses.study.figures import (
+    front_charts,
+    parallel_chart,
+    scatter_chart,
+    sensitivity_bars,
+)
 from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.analyses.study.wording import index_cells, on_page, rate_text, short_labels
+from klack.analyses.study.wording import change, index_cells, on_page, rate_text, short_labels
 from klack.report.page import Content, Section, Table
 from klack.report.wording import count, signed
 
@@ -14,6 +19,7 @@ __all__ = ["study_content"]
 
 _LISTED = 100
 """Points in the table; the result holds all of them."""
+_MANY_ROWS = 1024
 _FEWEST = 8
 """Points from which a rank correlation means something."""
 
@@ -25,16 +31,19 @@ def study_content(record: StudyRecord) -> Content:
     related = {
         item.name: {of.name: rank_correlation(item.values, of.values) for of in varying}
         for item in record.measures
-        if record.count >= _FEWEST
+        if record.count >= _FEWEST and record.optimum is None  # a search crowds about its front
     }
     sections = [
+        *_optimum_sections(record, labels),
         Section(
             title="All points",
             charts=(parallel_chart(record, labels),) if varying else (),
         ),
         Section(
             title="What each measure follows",
-            charts=tuple(
+            charts=()
+            if record.optimum is not None
+            else tuple(
                 scatter_chart(record, measure, _strongest(varying, related[measure.name]), labels)
                 for measure in record.measures
                 if measure.varies and related.get(measure.name)
@@ -47,9 +56,9 @@ def study_content(record: StudyRecord) -> Content:
     ]
     return page_of(
         record,
-        f"Study, {count(record.count)} points",
+        f"{'Study' if record.optimum is None else 'Optimisation'}, {count(record.count)} points",
         subtitle=(record.variant, record.design),
-        answer=_answer(record, varying, related, labels),
+        answer=_best_answer(record, labels) or _answer(record, varying, related, labels),
         numbers=_number_table(record),
         sections=sections,
         definitions=_DEFINITIONS,
@@ -82,6 +91,60 @@ def _answer(
     if failed:
         found.append(f"{count(failed)} points could not be computed.")
     return " ".join(found)
+
+
+def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
+    """The point that is recommended, against that of today; empty without an optimum."""
+    found = record.optimum
+    if found is None or found.best < 0:
+        return ""
+    parts = []
+    for item in record.measures:
+        value = float(item.values[found.best])
+        apart = change(item, value)
+        text = f"{labels[item.name]} {on_page(item, value)}"
+        parts.append(text if apart == "–" else f"{text} ({apart.replace('-', chr(8722))})")
+    several = len(found.objectives) > 1
+    chosen = f", the compromise of {count(found.front.size)} on the front" if several else ""
+    start = f"Of {count(record.count)} points, point {found.best}{chosen}"
+    if not found.feasible:
+        start = f"No point keeps all bounds. Nearest to them of {count(record.count)} points is"
+        start += f" point {found.best}"
+    return f"{start}: {', '.join(parts)}. In brackets: against the case as it is."
+
+
+def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
+    found = record.optimum
+    if found is None or found.best < 0:
+        return ()
+    best = found.best
+    rows = [
+        (item.name, on_page(item, item.today), on_page(item, value), change(item, value))
+        for item in record.columns
+        for value in [float(item.values[best])]
+    ]
+    told = [f"Bounds: {'; '.join(found.bounds)}." if found.bounds else "No bounds."]
+    front = Table(
+        columns=("point", *(labels[name] for name in found.objectives), "parameters"),
+        rows=tuple(_front_row(record, int(i), labels) for i in found.front[:_LISTED]),
+    )
+    return (
+        Section(
+            title="The recommended point and that of today",
+            paragraphs=tuple(told),
+            tables=(Table(columns=("", "today", f"point {best}", "change"), rows=tuple(rows)),),
+        ),
+        Section(title="Front", charts=front_charts(record, found, labels), tables=(front,)),
+    )
+
+
+def _front_row(record: StudyRecord, place: int, labels: dict[str, str]) -> tuple[str, ...]:
+    objectives = record.optimum.objectives if record.optimum else ()
+    own = {item.name: item for item in record.measures}
+    values = (on_page(own[name], float(own[name].values[place])) for name in objectives)
+    varied = (item for item in record.parameters if item.varies)
+    words = (f"{labels[i.name]} {on_page(i, float(i.values[place]), 3)}" for i in varied)
+    return (str(place), *values, ", ".join(words))
 
 
 def _strongest(varying: list[StudyColumn], related: dict[str, float]) -> list[StudyColumn]:
@@ -141,6 +204,11 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
     told = [
         f"{labels[item.measure]}: {item.reason}." for item in record.sensitivities if item.reason
     ]
+    if any(item.rows < _MANY_ROWS for item in known):
+        told.append(
+            f"Fewer than {_MANY_ROWS} base points: intervals of single indices may be much too "
+            "narrow."
+        )
     told += [
         f"{labels[item.measure]}: {count(item.discarded)} base points were left out, because one "
         "of their points has no value: the shares are those of the rest."
@@ -181,6 +249,16 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
         "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+    ),
+    (
+        "front",
+        "Points that no other computed point beats in every objective at once; points that miss a "
+        "bound are beaten by all that keep them (Deb's rule).",
+    ),
+    (
+        "recommended point",
+        "Of the front, the point nearest to the best value of every objective, by the ranges of "
+        "the front (Yu 1973). Another weight of the objectives is another point of the front.",
     ),
     (
         "shares of the variance",

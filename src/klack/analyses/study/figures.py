@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.record import Optimum, Sensitivity, StudyColumn, StudyRecord
 from klack.report.chart import (
     AxisSpec,
     BarChart,
@@ -20,7 +20,7 @@ from klack.report.chart import (
 )
 from klack.report.wording import printed_unit
 
-__all__ = ["parallel_chart", "scatter_chart", "sensitivity_bars"]
+__all__ = ["front_charts", "parallel_chart", "scatter_chart", "sensitivity_bars"]
 
 _MOST_LINES = 4000
 """More lines hide each other and cost bytes."""
@@ -83,17 +83,7 @@ def scatter_chart(
         if chosen.size
     ]
     if np.isfinite(first.today) and np.isfinite(measure.today):
-        curves.append(
-            Curve(
-                x=np.array([x_factor * first.today]),
-                y=np.array([y_factor * measure.today]),
-                label="today",
-                colour="black",
-                width=3.0,
-                drawn="points",
-                names=("the case as it is",),
-            )
-        )
+        curves.append(_today(x_factor * first.today, y_factor * measure.today))
     marks = (Mark(value=y_factor * measure.today, axis="y"),) if np.isfinite(measure.today) else ()
     return Chart(
         name=f"{measure.name}-over-{first.name}",
@@ -101,6 +91,64 @@ def scatter_chart(
         x=x,
         panels=(Panel(y=y, curves=tuple(curves), marks=marks),),
         note="Every dot is a point of the study; dashed: the case as it is.",
+    )
+
+
+def front_charts(
+    record: StudyRecord, found: Optimum, labels: Mapping[str, str]
+) -> tuple[Chart, ...]:
+    """Each objective over the first one: all points, the front, the recommended one, today."""
+    own = {item.name: item for item in record.measures}
+    first, *others = (own[name] for name in found.objectives)
+    return tuple(_front_chart(first, item, found, labels) for item in others)
+
+
+def _front_chart(
+    first: StudyColumn, other: StudyColumn, found: Optimum, labels: Mapping[str, str]
+) -> Chart:
+    x, x_factor = _axis(first, labels)
+    y, y_factor = _axis(other, labels)
+    every = np.arange(first.values.size)
+    on_front = np.isin(every, found.front)
+    groups: list[tuple[str, NDArray[np.bool_], Colour, float]] = [
+        ("misses a bound", ~found.kept & ~on_front, "grey", 1.0),
+        ("keeps all bounds", found.kept & ~on_front, "sky", 1.2),
+        ("front", on_front, "red", 2.0),
+        ("recommended", every == found.best, "green", 3.4),
+    ]
+    curves = [
+        Curve(
+            x=x_factor * first.values[kept],
+            y=y_factor * other.values[kept],
+            label=label,
+            colour=colour,
+            width=width,
+            drawn="points",
+            names=tuple(f"point {i}" for i in every[kept]),
+        )
+        for label, kept, colour, width in groups
+        if kept.any()
+    ]
+    if np.isfinite(first.today) and np.isfinite(other.today):
+        curves.append(_today(x_factor * first.today, y_factor * other.today))
+    return Chart(
+        name=f"front-{first.name}-{other.name}",
+        title=f"{labels[other.name]} over {labels[first.name]}",
+        x=x,
+        panels=(Panel(y=y, curves=tuple(curves)),),
+        note="Every dot is a computed point.",
+    )
+
+
+def _today(x: float, y: float) -> Curve:
+    return Curve(
+        x=np.array([x]),
+        y=np.array([y]),
+        label="today",
+        colour="black",
+        width=3.0,
+        drawn="points",
+        names=("the case as it is",),
     )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 
-__all__ = ["Sensitivity", "StudyColumn", "StudyRecord"]
+__all__ = ["Optimum", "Sensitivity", "StudyColumn", "StudyRecord"]
 
 Column = NDArray[np.float64]
 
@@ -32,6 +32,8 @@ class StudyColumn:
         Nan where there is none; of words, which of them.
     words : tuple of str
         That ``values`` counts.
+    is_whole : bool
+        Whether the case has whole numbers there.
     """
 
     name: str
@@ -41,6 +43,7 @@ class StudyColumn:
     today: float
     values: Column
     words: tuple[str, ...] = ()
+    is_whole: bool = False
 
     @property
     def varies(self) -> bool:
@@ -84,6 +87,40 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """What a search among the points of a study has found.
+
+    Parameters
+    ----------
+    algorithm : str
+        In words.
+    objectives : tuple of str
+        Measures; ``ways`` says whether each is minimised or maximised.
+    ways : tuple of str
+    bounds : tuple of str
+        In words.
+    kept : bool array, shape (points,)
+        Points that keep all bounds.
+    front : int array
+        Points that no other one beats in every objective, by the first objective.
+    best : int
+        Of the front, nearest to the ideal point by the ranges of the front; the best one of a
+        single objective.  -1 without a front.
+    feasible : bool
+        False if no point keeps all bounds: the front is then of those that miss them least.
+    """
+
+    algorithm: str
+    objectives: tuple[str, ...]
+    ways: tuple[str, ...]
+    bounds: tuple[str, ...]
+    kept: NDArray[np.bool_]
+    front: NDArray[np.int64]
+    best: int
+    feasible: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StudyRecord(CaseRecord):
     """Measures of a case at many points.
 
@@ -108,6 +145,8 @@ class StudyRecord(CaseRecord):
         Doubts about the numbers of each point.
     sensitivities : tuple of Sensitivity
         Of each measure, from the design of Saltelli.
+    optimum : Optimum or None
+        Of ``klack optimise``.
     """
 
     study_text: str
@@ -123,6 +162,7 @@ class StudyRecord(CaseRecord):
     failures: tuple[str, ...]
     notes: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...] = ()
+    optimum: Optimum | None = None
 
     @property
     def count(self) -> int:

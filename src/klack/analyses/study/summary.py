@@ -9,8 +9,8 @@ from typing_extensions import TypedDict
 
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import number_or_none
-from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
-from klack.analyses.study.wording import in_words, index_cells, rate_text
+from klack.analyses.study.record import Optimum, Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.wording import change, in_words, index_cells, rate_text
 from klack.terminal.tables import TextTable
 
 __all__ = ["StudyJson", "study_to_json", "study_told"]
@@ -36,6 +36,18 @@ class IndexJson(TypedDict):
     total_high: Real
 
 
+class OptimumJson(TypedDict):
+    """What a search has found."""
+
+    algorithm: str
+    objectives: Annotated[dict[str, str], Field(description="Measure: minimise or maximise.")]
+    bounds: list[str]
+    kept: Annotated[list[bool], Field(description="Whether each point keeps all bounds.")]
+    front: Annotated[list[int], Field(description="Points that no other one beats.")]
+    best: Annotated[int | None, Field(description="Point of the front nearest to the ideal one.")]
+    feasible: Annotated[bool, Field(description="Whether any point keeps all bounds.")]
+
+
 class StudyJson(TypedDict):
     """``klack study``."""
 
@@ -53,6 +65,7 @@ class StudyJson(TypedDict):
         dict[str, dict[str, IndexJson]],
         Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
     ]
+    optimum: Annotated[OptimumJson | None, Field(description="Of klack optimise.")]
     failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
     notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
     wall_time_s: Real
@@ -79,6 +92,7 @@ def study_to_json(record: StudyRecord) -> StudyJson:
             item.measure: {name: _indices(item, k) for k, name in enumerate(item.parameters)}
             for item in record.sensitivities
         },
+        "optimum": None if record.optimum is None else _optimum(record.optimum),
         "failures": list(record.failures),
         "notes": list(record.notes),
         "wall_time_s": record.wall_time,
@@ -86,6 +100,18 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "computed": record.computed,
         "kept": record.kept,
         "threads": record.threads,
+    }
+
+
+def _optimum(found: Optimum) -> OptimumJson:
+    return {
+        "algorithm": found.algorithm,
+        "objectives": dict(zip(found.objectives, found.ways, strict=True)),
+        "bounds": list(found.bounds),
+        "kept": found.kept.tolist(),
+        "front": found.front.tolist(),
+        "best": found.best if found.best >= 0 else None,
+        "feasible": found.feasible,
     }
 
 
@@ -128,6 +154,8 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
         columns=("measure", "today", "lowest", "median", "highest", "at lowest", "at highest"),
         rows=[_range_row(record, item) for item in record.measures],
     )
+    if record.optimum is not None and record.optimum.best >= 0:
+        yield from _optimum_told(record, record.optimum)
     for item in record.sensitivities:
         yield TextTable(
             title=f"Shares of the variance of {item.measure} (95 % intervals)",
@@ -135,6 +163,20 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             rows=[[name, *index_cells(item, k)] for k, name in enumerate(item.parameters)],
         )
     yield rate_text(record)
+
+
+def _optimum_told(record: StudyRecord, found: Optimum) -> Iterator[TextTable | str]:
+    shown = (*record.parameters, *record.linked, *record.measures)
+    yield TextTable(
+        title=f"Point {found.best} of the front ({found.front.size} points)",
+        columns=("", "today", f"point {found.best}", "change"),
+        rows=[
+            [item.name, in_words(item, item.today), in_words(item, value), change(item, value)]
+            for item in shown
+            for value in [float(item.values[found.best])]
+        ],
+    )
+    yield f"Bounds: {'; '.join(found.bounds) or 'none'}."
 
 
 def _range_row(record: StudyRecord, item: StudyColumn) -> list[str]:

@@ -6,7 +6,7 @@ from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
 from klack.report.wording import fixed, quantity
 from klack.units import format_si
 
-__all__ = ["in_words", "index_cells", "on_page", "rate_text", "short_labels"]
+__all__ = ["change", "in_words", "index_cells", "on_page", "rate_text", "short_labels"]
 
 
 def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
@@ -20,6 +20,17 @@ def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
     if item.unit == "kg":
         return format_si(1e3 * value, "g", digits)
     return format_si(value, "" if item.unit == "1" else item.unit, digits)
+
+
+def change(item: StudyColumn, value: float) -> str:
+    """How far a value is from that of today: in per cent, of levels the difference."""
+    if item.words or not (isfinite(value) and isfinite(item.today)):
+        return "–"
+    if item.unit.startswith("dB"):
+        return f"{value - item.today:+.1f} {item.unit}"
+    if item.today == 0.0:
+        return "–"
+    return f"{100.0 * (value - item.today) / abs(item.today):+.1f} %"
 
 
 def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:

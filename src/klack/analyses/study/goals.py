@@ -1,0 +1,152 @@
+"""What an optimisation looks for: measures to minimise or maximise, and bounds to keep."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.measures import Measure
+from klack.case.study import Written
+from klack.case.study_source import StudySource
+from klack.errors import InputError
+from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
+
+__all__ = ["Bound", "Goals", "bound_text", "goals_of"]
+
+_LEVELS = ("dB", "dBA", "phon", "sone", "acum")
+_TODAY = re.compile(r"today(?:\s*(?P<sign>[+-])\s*(?P<change>\S.*))?")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bound:
+    """A bound that a measure has to keep.
+
+    Parameters
+    ----------
+    measure : str
+    value : float [unit of the measure]
+    is_most : bool
+        True for the largest allowed value, False for the smallest.
+    """
+
+    measure: str
+    value: float
+    is_most: bool
+
+    def violation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much of the bound it is missed; zero or less where it is kept."""
+        past = values - self.value if self.is_most else self.value - values
+        return past / (abs(self.value) or 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goals:
+    """Objectives and bounds.
+
+    Parameters
+    ----------
+    objectives : tuple of str
+        Measures.
+    signs : tuple of float
+        1 for one to minimise, -1 for one to maximise.
+    bounds : tuple of Bound
+    """
+
+    objectives: tuple[str, ...]
+    signs: tuple[float, ...]
+    bounds: tuple[Bound, ...]
+
+    def objective_values(self, of: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Numbers to minimise, shape (points, objectives), from columns of measures."""
+        pairs = zip(self.signs, self.objectives, strict=True)
+        return np.column_stack([sign * of[name] for sign, name in pairs])
+
+    def violations(self, of: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Shape (points, bounds), zero or less where kept."""
+        count = len(of[self.objectives[0]])
+        found = [bound.violation(of[bound.measure]) for bound in self.bounds]
+        return np.column_stack(found) if found else np.zeros((count, 0))
+
+
+def goals_of(
+    source: StudySource, measures: Mapping[str, Measure[object]], today: Mapping[str, float]
+) -> Goals:
+    """Objectives and bounds of a study.
+
+    Parameters
+    ----------
+    source : StudySource
+    measures : mapping of str to Measure
+        All that are computed, by their names in the study.
+    today : mapping of str to float
+        Their values in the case as it is.
+
+    Raises
+    ------
+    InputError
+        With file, line and key: without an objective, for a bound of another unit, and one by the
+        case as it is where that has no value.
+    """
+    study = source.study
+    if not study.objectives:
+        raise InputError(
+            source.where(()),
+            got="no objectives",
+            expected="one to four measures to minimise or maximise",
+            hint="add 'objectives: {closing_time: minimise}' to the study.",
+        )
+    bounds = []
+    for name, limit in study.constraints.items():
+        for key, written in (("most", limit.most), ("least", limit.least)):
+            if written is not None:
+                where = source.where(("constraints", name, key))
+                value = _bound(where, written, measures[name].unit, today[name])
+                bounds.append(Bound(measure=name, value=value, is_most=key == "most"))
+    return Goals(
+        objectives=tuple(study.objectives),
+        signs=tuple(1.0 if way == "minimise" else -1.0 for way in study.objectives.values()),
+        bounds=tuple(bounds),
+    )
+
+
+def _bound(where: str, written: Written, unit: str, today: float) -> float:
+    kind = _kind(unit)
+    by_today = _TODAY.fullmatch(str(written).strip())
+    if by_today is None:
+        return parse_quantity(written, kind, where)
+    if not np.isfinite(today):
+        raise InputError(
+            where,
+            got=f"'{written}', but the case as it is has no value of this measure",
+            expected="a bound with its unit",
+            hint="write a number, or make the case compute it.",
+        )
+    if by_today["sign"] is None:
+        return today
+    sign = 1.0 if by_today["sign"] == "+" else -1.0
+    change = by_today["change"]
+    if change.rstrip().endswith("%"):
+        return today + sign * abs(today) * parse_quantity(change, RATIO, where)
+    return today + sign * parse_quantity(change, kind, where)
+
+
+def _kind(unit: str) -> Kind:
+    """Kind of quantity with an SI unit; a level is written with its own unit."""
+    if unit in ("", "1"):
+        return RATIO
+    plain = unit.replace(" ", "*")
+    for kind in KINDS:
+        if kind.unit in (unit, plain):
+            return kind
+    factors = {unit: 1.0} if unit in _LEVELS else {}
+    if unit == "dBA":
+        factors["dB(A)"] = 1.0
+    return Kind(f"a value in {unit}", plain, f"1 {unit}", (unit,), factors, smallest=0.0)
+
+
+def bound_text(bound: Bound, unit: str) -> str:
+    """``at most 400 N``."""
+    text = format_si(bound.value, "" if unit == "1" else unit)
+    return f"at {'most' if bound.is_most else 'least'} {text}"
