@@ -429,6 +429,30 @@ class TestSensitivity:
         assert found.first_low[0] < found.first[0] < found.first_high[0]
 
 
+class TestRobustness:
+    """Truth: counting, and the exact binomial interval of one in 64 points."""
+
+    def test_missed_bounds_are_counted(self, tmp_path):
+        text = STUDY.replace("  design: {points: 8}", "  design: {points: 64}").replace(
+            "  design:",
+            "  constraints: {opening.peak_force: {most: today - 10 %, least: 1 kN}}\n  design:",
+        )
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        force, today = columns(record)["opening.peak_force"], record.measures[1].today
+        most, least = record.missed
+        assert most.missed == (force > today - 0.1 * today).sum() > 0
+        assert (most.points, most.failed) == (64, 0)
+        assert most.probability == most.missed / 64
+        assert most.low < most.probability < most.high
+        assert (least.missed, least.low) == (0, 0.0)
+        assert least.at_most == pytest.approx(1.0 - 0.05 ** (1.0 / 64.0), rel=1e-9)
+
+    def test_a_grid_is_no_sample(self, tmp_path):
+        text = STUDY.replace("design: {points: 8}", "design: {kind: grid, levels: 2}")
+        text = text.replace("  design:", "  constraints: {impacts: {most: 9}}\n  design:")
+        assert klack.run_study(SMALL, write(tmp_path, text)).record.missed == ()
+
+
 OPTIMUM = f"""
   parameters:
     {PRELOAD}: {{from: 10 N, to: 14 N}}

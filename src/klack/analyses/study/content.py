@@ -11,7 +11,15 @@ from klack.analyses.study.figures import (
     sensitivity_bars,
 )
 from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.analyses.study.wording import change, index_cells, on_page, rate_text, short_labels
+from klack.analyses.study.wording import (
+    MISSED_COLUMNS,
+    change,
+    index_cells,
+    missed_cells,
+    on_page,
+    rate_text,
+    short_labels,
+)
 from klack.report.page import Content, Section, Table
 from klack.report.wording import count, signed
 
@@ -50,6 +58,7 @@ def study_content(record: StudyRecord) -> Content:
             ),
             tables=_related_table(record, varying, related, labels),
         ),
+        _missed_section(record),
         _sensitivity_section(record, labels),
         Section(title="Parameters", tables=(_parameter_table(record),)),
         Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
@@ -192,6 +201,15 @@ def _related_table(
     return (Table(columns=heads, rows=rows),)
 
 
+def _missed_section(record: StudyRecord) -> Section:
+    """How often drawn points miss each bound; empty without bounds."""
+    rows = tuple(missed_cells(item) for item in record.missed)
+    return Section(
+        title="How often a drawn valve misses a bound",
+        tables=(Table(columns=MISSED_COLUMNS, rows=rows),) if rows else (),
+    )
+
+
 def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section:
     """Bars and numbers of Sobol's indices; empty without them."""
     known = [item for item in record.sensitivities if np.isfinite(item.total).any()]
@@ -249,6 +267,12 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
         "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+    ),
+    (
+        "probability of a missed bound",
+        "Share of the drawn points that miss it; interval of Clopper and Pearson (1934) for "
+        "independent draws. Where none missed it, the one-sided bound of 95 %. Points without a "
+        "value widen the interval: all of them may miss it, or none.",
     ),
     (
         "front",

@@ -13,7 +13,7 @@ from klack.case.study_source import StudySource
 from klack.errors import InputError
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 
-__all__ = ["Bound", "Goals", "bound_text", "goals_of"]
+__all__ = ["Bound", "Goals", "bound_text", "bounds_of", "goals_of"]
 
 _LEVELS = ("dB", "dBA", "phon", "sone", "acum")
 _TODAY = re.compile(r"today(?:\s*(?P<sign>[+-])\s*(?P<change>\S.*))?")
@@ -97,18 +97,25 @@ def goals_of(
             expected="one to four measures to minimise or maximise",
             hint="add 'objectives: {closing_time: minimise}' to the study.",
         )
+    return Goals(
+        objectives=tuple(study.objectives),
+        signs=tuple(1.0 if way == "minimise" else -1.0 for way in study.objectives.values()),
+        bounds=bounds_of(source, measures, today),
+    )
+
+
+def bounds_of(
+    source: StudySource, measures: Mapping[str, Measure[object]], today: Mapping[str, float]
+) -> tuple[Bound, ...]:
+    """Bounds of a study; arguments and errors are those of :func:`goals_of`."""
     bounds = []
-    for name, limit in study.constraints.items():
+    for name, limit in source.study.constraints.items():
         for key, written in (("most", limit.most), ("least", limit.least)):
             if written is not None:
                 where = source.where(("constraints", name, key))
                 value = _bound(where, written, measures[name].unit, today[name])
                 bounds.append(Bound(measure=name, value=value, is_most=key == "most"))
-    return Goals(
-        objectives=tuple(study.objectives),
-        signs=tuple(1.0 if way == "minimise" else -1.0 for way in study.objectives.values()),
-        bounds=tuple(bounds),
-    )
+    return tuple(bounds)
 
 
 def _bound(where: str, written: Written, unit: str, today: float) -> float:

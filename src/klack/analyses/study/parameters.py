@@ -75,6 +75,8 @@ class Parameter:
     def _in_words(self, value: float | str) -> str:
         if self.kind is None or isinstance(value, str):
             return str(value)
+        if self.kind.unit == "kg":
+            return format_si(1e3 * value, "g")
         return format_si(value, "" if self.kind.bare else self.kind.unit)
 
 

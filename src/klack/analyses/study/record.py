@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 
-__all__ = ["Optimum", "Sensitivity", "StudyColumn", "StudyRecord"]
+__all__ = ["MissedBound", "Optimum", "Sensitivity", "StudyColumn", "StudyRecord"]
 
 Column = NDArray[np.float64]
 
@@ -120,6 +120,36 @@ class Optimum:
     feasible: bool
 
 
+@dataclass(frozen=True, kw_only=True)
+class MissedBound:
+    """How often drawn points miss a bound.
+
+    Parameters
+    ----------
+    bound : str
+        In words.
+    missed, points, failed : int
+        Points that miss it, points with a value, and those without.
+    probability, low, high : float
+        Share that misses it, with its interval of 95 %.
+    at_most : float
+        One-sided bound of 95 %: the one to state where none missed it.
+    low_if_none, high_if_all : float
+        Ends of the interval if none or all of the points without a value miss it.
+    """
+
+    bound: str
+    missed: int
+    points: int
+    failed: int
+    probability: float
+    low: float
+    high: float
+    at_most: float
+    low_if_none: float
+    high_if_all: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyRecord(CaseRecord):
     """Measures of a case at many points.
@@ -147,6 +177,8 @@ class StudyRecord(CaseRecord):
         Of each measure, from the design of Saltelli.
     optimum : Optimum or None
         Of ``klack optimise``.
+    missed : tuple of MissedBound
+        Of drawn points: the probability of missing each bound.
     """
 
     study_text: str
@@ -163,6 +195,7 @@ class StudyRecord(CaseRecord):
     notes: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...] = ()
     optimum: Optimum | None = None
+    missed: tuple[MissedBound, ...] = ()
 
     @property
     def count(self) -> int:

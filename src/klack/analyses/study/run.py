@@ -11,9 +11,11 @@ from klack.analyses.study.columns import (
     row_warnings,
 )
 from klack.analyses.study.evaluation import Evaluation
+from klack.analyses.study.goals import bounds_of
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.points import StudyPoints, points_of_study
 from klack.analyses.study.record import StudyRecord
+from klack.analyses.study.robustness import missed_bounds
 from klack.analyses.study.sensitivity import sensitivities_of
 from klack.analyses.study.strokes import AskedPoints
 from klack.case.case_tree import CaseTree
@@ -25,6 +27,9 @@ from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 
 __all__ = ["asked_points", "run_study"]
+
+_DRAWN = ("sobol", "latin-hypercube")
+"""Designs whose points are spread as the parameters are."""
 
 
 def asked_points(
@@ -43,7 +48,8 @@ def asked_points(
     # the last one is the case as it is, to compare with
     written = [*map(points.space.written, points.values), {}]
     try:
-        asked = AskedPoints.of(case, tree, written, source.study.measures, source.study.variant)
+        names = (*source.study.measures, *source.study.constraints)
+        asked = AskedPoints.of(case, tree, written, names, source.study.variant)
     except InputError as error:
         if error.where == "measures":
             raise source.refuse(("measures",), error) from None
@@ -90,6 +96,10 @@ def run_study(
         clock("points", 0.0)
         *found, today = evaluation.rows(asked, clock)
     require_some(source, found)
+    known = {item.name: item.measure for item in asked.chosen}
+    values = dict(zip(known, today.values, strict=True))
+    numbers = {name: float("nan") if x is None else x for name, x in values.items()}
+    bounds = bounds_of(source, known, numbers)
     columns = measure_columns(asked, found, today)
     parameters, linked = parameter_columns(points.space, points.values)
     return StudyRecord(
@@ -108,6 +118,15 @@ def run_study(
         sensitivities=(
             sensitivities_of(columns, [item.name for item in points.space.varied])
             if source.study.design.kind == "saltelli"
+            else ()
+        ),
+        missed=(
+            missed_bounds(
+                bounds,
+                {item.name: item.values for item in columns},
+                {item.name: item.unit for item in columns},
+            )
+            if source.study.design.kind in _DRAWN
             else ()
         ),
         failures=tuple(row.failure for row in found),

@@ -9,8 +9,15 @@ from typing_extensions import TypedDict
 
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import number_or_none
-from klack.analyses.study.record import Optimum, Sensitivity, StudyColumn, StudyRecord
-from klack.analyses.study.wording import change, in_words, index_cells, rate_text
+from klack.analyses.study.record import MissedBound, Optimum, Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.wording import (
+    MISSED_COLUMNS,
+    change,
+    in_words,
+    index_cells,
+    missed_cells,
+    rate_text,
+)
 from klack.terminal.tables import TextTable
 
 __all__ = ["StudyJson", "study_to_json", "study_told"]
@@ -34,6 +41,19 @@ class IndexJson(TypedDict):
     total: Annotated[Real, Field(description="With interactions.")]
     total_low: Real
     total_high: Real
+
+
+class MissedBoundJson(TypedDict):
+    """How often drawn points miss a bound."""
+
+    bound: str
+    missed: int
+    points: Annotated[int, Field(description="With a value.")]
+    failed: Annotated[int, Field(description="Without.")]
+    probability: Real
+    low: Annotated[Real, Field(description="Of the interval of 95 %.")]
+    high: Real
+    at_most: Annotated[Real, Field(description="One-sided bound of 95 %.")]
 
 
 class OptimumJson(TypedDict):
@@ -65,6 +85,9 @@ class StudyJson(TypedDict):
         dict[str, dict[str, IndexJson]],
         Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
     ]
+    missed_bounds: Annotated[
+        list[MissedBoundJson], Field(description="Of drawn points, for each bound.")
+    ]
     optimum: Annotated[OptimumJson | None, Field(description="Of klack optimise.")]
     failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
     notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
@@ -92,6 +115,7 @@ def study_to_json(record: StudyRecord) -> StudyJson:
             item.measure: {name: _indices(item, k) for k, name in enumerate(item.parameters)}
             for item in record.sensitivities
         },
+        "missed_bounds": [_missed(item) for item in record.missed],
         "optimum": None if record.optimum is None else _optimum(record.optimum),
         "failures": list(record.failures),
         "notes": list(record.notes),
@@ -100,6 +124,19 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "computed": record.computed,
         "kept": record.kept,
         "threads": record.threads,
+    }
+
+
+def _missed(item: MissedBound) -> MissedBoundJson:
+    return {
+        "bound": item.bound,
+        "missed": item.missed,
+        "points": item.points,
+        "failed": item.failed,
+        "probability": number_or_none(item.probability),
+        "low": number_or_none(item.low),
+        "high": number_or_none(item.high),
+        "at_most": number_or_none(item.at_most),
     }
 
 
@@ -156,6 +193,12 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
     )
     if record.optimum is not None and record.optimum.best >= 0:
         yield from _optimum_told(record, record.optimum)
+    if record.missed:
+        yield TextTable(
+            title="How often a drawn valve misses a bound",
+            columns=MISSED_COLUMNS,
+            rows=[missed_cells(item) for item in record.missed],
+        )
     for item in record.sensitivities:
         yield TextTable(
             title=f"Shares of the variance of {item.measure} (95 % intervals)",

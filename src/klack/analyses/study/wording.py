@@ -2,11 +2,20 @@
 
 from math import isfinite
 
-from klack.analyses.study.record import Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.record import MissedBound, Sensitivity, StudyColumn, StudyRecord
 from klack.report.wording import fixed, quantity
 from klack.units import format_si
 
-__all__ = ["change", "in_words", "index_cells", "on_page", "rate_text", "short_labels"]
+__all__ = [
+    "MISSED_COLUMNS",
+    "change",
+    "in_words",
+    "index_cells",
+    "missed_cells",
+    "on_page",
+    "rate_text",
+    "short_labels",
+]
 
 
 def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
@@ -42,6 +51,23 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
     if item.unit == "kg":
         return quantity(1e3 * value, "g", digits)
     return quantity(value, "" if item.unit == "1" else item.unit, digits)
+
+
+MISSED_COLUMNS = ("bound", "points", "missed", "probability", "95 % interval", "without a value")
+
+
+def missed_cells(item: MissedBound) -> tuple[str, ...]:
+    """A row of the table of missed bounds."""
+    if not item.points:
+        return (item.bound, "0", "0", "–", "–", str(item.failed))
+    likely = f"{100.0 * item.probability:.3g} %"
+    if not item.missed:
+        likely = f"below {100.0 * item.at_most:.2g} %"
+    low, high = item.low, item.high
+    if item.failed:  # they may all have missed it, or none
+        low, high = item.low_if_none, item.high_if_all
+    interval = f"{100.0 * low:.3g} % to {100.0 * high:.3g} %"
+    return (item.bound, str(item.points), str(item.missed), likely, interval, str(item.failed))
 
 
 def index_cells(item: Sensitivity, k: int) -> tuple[str, ...]:
