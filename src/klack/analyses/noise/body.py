@@ -22,7 +22,7 @@ from klack.analyses.noise.record import BodyNoise, Surface
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 
-__all__ = ["ASSUMED_DAMPING", "Surroundings", "body_noise", "port_transfers"]
+__all__ = ["ASSUMED_DAMPING", "Surroundings", "Transfers", "body_noise", "port_transfers"]
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ ASSUMED_DAMPING = 0.005
 _LOWEST, _HIGHEST = 20.0, 400e3  # [Hz] of mobilities
 _AUDIBLE = 24e3  # [Hz]
 _LINES, _ROUND_A_PEAK = 1200, 40
+_MOST_TRANSFERS = 32
 _LONGEST = 4_000_000  # values of a spectrum that resolves every resonance
 
 
@@ -124,25 +125,47 @@ def body_noise(
     )
 
 
+class Transfers:
+    """Radiated power per force of ports, kept for further runs of the same bodies."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[object, ...], tuple[Floats, Floats]] = {}
+
+    def of(self, structure: Structure, port: str, around: Surroundings) -> tuple[Floats, Floats]:
+        """Audible frequencies [Hz] and radiated power [W/N^2] of a force at a port."""
+        key = (structure, port, around.mount, around.plate, around.air, around.efficiency)
+        found = self._found.get(key)
+        if found is None:
+            sounding = damped(structure)
+            frequency = frequency_lines(sounding, around.mount, 15.0, _AUDIBLE)
+            transfer = power_transfer(
+                sounding,
+                frequency,
+                port,
+                mount=around.mount,
+                plate=around.plate,
+                efficiency=around.efficiency,
+                air=around.air,
+            )
+            found = frequency, transfer.total
+            if len(self._found) >= _MOST_TRANSFERS:  # of other mounts
+                self._found.clear()
+            self._found[key] = found
+        return found
+
+
 def port_transfers(
-    structure: Structure, stop_forces: Mapping[str, TimeSeries], around: Surroundings
+    structure: Structure,
+    stop_forces: Mapping[str, TimeSeries],
+    around: Surroundings,
+    transfers: Transfers,
 ) -> list[tuple[TimeSeries, Floats, Floats]]:
     """Of every port that is hit: force [N], audible frequencies [Hz], radiated power [W/N^2]."""
-    sounding = damped(structure)
-    frequency = frequency_lines(sounding, around.mount, 15.0, _AUDIBLE)
     found = []
     for port, force in port_forces(structure, stop_forces).items():
-        transfer = power_transfer(
-            sounding,
-            frequency,
-            port,
-            mount=around.mount,
-            plate=around.plate,
-            efficiency=around.efficiency,
-            air=around.air,
-        )
+        frequency, transfer = transfers.of(structure, port, around)
         left = share_at(frequency, around.octaves, around.share)
-        found.append((force, frequency, transfer.total * left))
+        found.append((force, frequency, transfer * left))
     return found
 
 

@@ -21,7 +21,13 @@ from klack.acoustics.sound import click_pressure
 from klack.acoustics.spectrum import force_spectrum, impulse_level
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.noise.balance import net_share
-from klack.analyses.noise.body import ASSUMED_DAMPING, Surroundings, body_noise, port_transfers
+from klack.analyses.noise.body import (
+    ASSUMED_DAMPING,
+    Surroundings,
+    Transfers,
+    body_noise,
+    port_transfers,
+)
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
@@ -92,14 +98,20 @@ def run_noise(
     )
 
 
-def click_statistics(source: NoiseSource) -> SoundStatistics | None:
+def click_statistics(source: NoiseSource, transfers: Transfers) -> SoundStatistics | None:
     """Levels of one click: a part of :func:`noise_design`, in a fifth of its time.
 
     None if nothing radiates.
+
+    Parameters
+    ----------
+    source : NoiseSource
+    transfers : Transfers
+        Of its structures, as far as they are known.
     """
     bands = [force_bands(stop.force) for stop in source.stops]
     around = _surroundings(source, net_share(source.net, bands), bands[0])
-    pressure = _pressure(source, around)
+    pressure = _pressure(source, around, transfers)
     return None if pressure is None else sound_statistics(pressure)
 
 
@@ -142,7 +154,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     found = [body_noise(structure, forces, around) for structure in source.structures]
     bodies = tuple(body for body in found if body is not None)
     clock("sound", 0.0)
-    pressure = _pressure(source, around)
+    pressure = _pressure(source, around, Transfers())
     sound = _heard(pressure, source, clock) if pressure is not None else None
     return NoiseDesign(
         name=name,
@@ -277,7 +289,7 @@ def _settings(source: NoiseSource) -> NoiseSettings:
 # --------------------------------------------------------------------------- sound
 
 
-def _pressure(source: NoiseSource, around: Surroundings) -> TimeSeries | None:
+def _pressure(source: NoiseSource, around: Surroundings, transfers: Transfers) -> TimeSeries | None:
     """Sound pressure of all ports of all bodies; None without any that radiates."""
     forces = {stop.name: stop.force for stop in source.stops}
     parts = [
@@ -290,7 +302,7 @@ def _pressure(source: NoiseSource, around: Surroundings) -> TimeSeries | None:
             sound_speed=source.noise.sound_speed,
         )
         for structure in source.structures
-        for force, frequency, transfer in port_transfers(structure, forces, around)
+        for force, frequency, transfer in port_transfers(structure, forces, around, transfers)
         if np.any(transfer > 0.0)
     ]
     if not parts:

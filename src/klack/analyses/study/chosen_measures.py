@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from klack.acoustics.signal_statistics import SoundStatistics
 from klack.analyses.measures import Measure
+from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import click_statistics, noise_design
@@ -38,10 +39,14 @@ class PointRun:
     variant : StrokeVariant
     source : callable
         Makes what the noise comes from.
+    transfers : Transfers
+        Of the bodies, as far as they are known.
     """
 
-    def __init__(self, variant: StrokeVariant, source: Callable[[], NoiseSource]) -> None:
-        self.variant, self._make = variant, source
+    def __init__(
+        self, variant: StrokeVariant, source: Callable[[], NoiseSource], transfers: Transfers
+    ) -> None:
+        self.variant, self._make, self._transfers = variant, source, transfers
 
     @cached_property
     def _source(self) -> NoiseSource:
@@ -50,7 +55,7 @@ class PointRun:
     @cached_property
     def click(self) -> SoundStatistics | None:
         """Levels of a click."""
-        return click_statistics(self._source)
+        return click_statistics(self._source, self._transfers)
 
     @cached_property
     def design(self) -> NoiseDesign:

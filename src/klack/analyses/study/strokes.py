@@ -9,9 +9,10 @@ number of threads nor on the other points.
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
+from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
 from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
 from klack.analyses.record import run_fields
@@ -177,6 +178,8 @@ class _Built:
     stops : tuple of StopSummary
     notes : tuple of str
         Doubts about bodies and laws.
+    transfers : Transfers
+        Of the bodies to the sound.
     """
 
     made: Mapping[Key, PointValue]
@@ -186,6 +189,7 @@ class _Built:
     bodies: tuple[BodySummary, ...]
     stops: tuple[StopSummary, ...]
     notes: tuple[str, ...]
+    transfers: Transfers = field(default_factory=Transfers)
 
 
 class Builds:
@@ -454,7 +458,9 @@ def _row(
         run = one_variant(valve, roles, asked.variant, None, lambda stage, fraction: check())
         if run.failure is not None:
             raise run.failure
-        whole = PointRun(run.variant, lambda: _noise_source(asked, built, valve, roles, run))
+        whole = PointRun(
+            run.variant, lambda: _noise_source(asked, built, valve, roles, run), built.transfers
+        )
         values = tuple(item.value(whole) for item in asked.chosen)
     except Stopped:
         raise
