@@ -214,6 +214,8 @@ class TestKept:
 
         real = evaluation.compute_points
         monkeypatch.setattr(evaluation, "compute_points", stopped)
+        # a suite in the background ignores it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         code = main(["study", str(SMALL), "--study", str(study), "--out", str(tmp_path / "out")])
         assert code == 130
         assert "3 computed points are kept in" in capsys.readouterr().err
@@ -427,6 +429,38 @@ class TestSensitivity:
         assert force == pytest.approx(0.5, abs=0.12)
         assert found.first.sum() == pytest.approx(1.0, abs=0.1)
         assert found.first_low[0] < found.first[0] < found.first_high[0]
+
+
+class TestScreening:
+    def test_effects_have_the_size_of_the_change_over_a_range(self, tmp_path):
+        """Truth: the two ends of a range, of a measure that is nearly linear; and no effect."""
+        text = f"""
+  parameters:
+    {PRELOAD}: {{from: 11.9 N, to: 12.1 N}}
+    network.components.magnet.force.1: {{from: 34.9 N, to: 35.1 N}}
+    network.components.opening.restitution: {{from: 0.4, to: 0.6}}
+  measures: [opening_time]
+  design: {{kind: morris, points: 6}}
+  variant: dry
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        assert record.count == 6 * 4
+        (found,) = record.screenings
+        case = klack.load_case(SMALL)
+        for k, key, low, high in (
+            (0, PRELOAD, "11.9 N", "12.1 N"),
+            (1, "network.components.magnet.force.1", "34.9 N", "35.1 N"),
+        ):
+            ends = [
+                klack.run_stroke(case.with_value(key, value), ["dry"])
+                .measures["dry"]["opening_time"]
+                .value
+                for value in (low, high)
+            ]
+            assert found.mean[k] == pytest.approx(ends[1] - ends[0], rel=0.02)
+            assert found.size[k] == pytest.approx(abs(ends[1] - ends[0]), rel=0.02)
+        assert (found.size[2], found.scatter[2]) == (0.0, 0.0)
+        assert found.effects.tolist() == [6, 6, 6]
 
 
 class TestRobustness:

@@ -88,17 +88,21 @@ class StudyParameter(Section):
 class StudyDesign(Section):
     """Where the points of a study lie."""
 
-    kind: Literal["sobol", "latin-hypercube", "saltelli", "grid", "one-at-a-time", "file"] = Field(
+    kind: Literal[
+        "sobol", "latin-hypercube", "saltelli", "morris", "grid", "one-at-a-time", "file"
+    ] = Field(
         default="sobol",
         description="sobol: even cover, more points can be added; latin-hypercube: each parameter "
         "evenly; saltelli: for Sobol's indices, 'points' times (2 + number of parameters) points; "
-        "grid: all combinations of 'levels'; one-at-a-time: each parameter by itself, about the "
-        "case; file: the rows of a CSV file.",
+        "morris: elementary effects, 'points' times (1 + number of parameters); grid: all "
+        "combinations of 'levels'; one-at-a-time: each parameter by itself, about the case; "
+        "file: the rows of a CSV file.",
     )
     points: Count = Field(
         default=64,
         le=1_000_000,
-        description="Of sobol and latin-hypercube; base points of saltelli, better a power of two.",
+        description="Of sobol and latin-hypercube; base points of saltelli, better a power of two; "
+        "trajectories of morris, ten or more.",
     )
     levels: Count = Field(
         default=5, le=1000, description="Values of each range in a grid and one-at-a-time."

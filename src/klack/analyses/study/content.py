@@ -5,6 +5,7 @@ import numpy as np
 from klack.analyses.page import page_of
 from klack.analyses.sample import rank_correlation
 from klack.analyses.study.figures import (
+    effect_bars,
     front_charts,
     parallel_chart,
     scatter_chart,
@@ -12,9 +13,12 @@ from klack.analyses.study.figures import (
 )
 from klack.analyses.study.record import StudyColumn, StudyRecord
 from klack.analyses.study.wording import (
+    EFFECT_COLUMNS,
     MISSED_COLUMNS,
     change,
+    effect_cells,
     index_cells,
+    largest_first,
     missed_cells,
     on_page,
     rate_text,
@@ -59,6 +63,7 @@ def study_content(record: StudyRecord) -> Content:
             tables=_related_table(record, varying, related, labels),
         ),
         _missed_section(record),
+        _screening_section(record, labels),
         _sensitivity_section(record, labels),
         Section(title="Parameters", tables=(_parameter_table(record),)),
         Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
@@ -210,6 +215,26 @@ def _missed_section(record: StudyRecord) -> Section:
     )
 
 
+def _screening_section(record: StudyRecord, labels: dict[str, str]) -> Section:
+    """Effects of each parameter on each measure; empty without trajectories."""
+    own = {item.name: item for item in record.measures}
+    rows = [
+        (labels[item.measure], labels[item.parameters[k]], *cells)
+        for item in record.screenings
+        for k in largest_first(item)
+        for cells in [effect_cells(own[item.measure], item, k, on_page)]
+    ]
+    return Section(
+        title="How much each parameter changes",
+        charts=tuple(
+            effect_bars(own[item.measure], item, labels)
+            for item in record.screenings
+            if np.isfinite(item.size).any()
+        ),
+        tables=(Table(columns=("measure", *EFFECT_COLUMNS), rows=tuple(rows)),) if rows else (),
+    )
+
+
 def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section:
     """Bars and numbers of Sobol's indices; empty without them."""
     known = [item for item in record.sensitivities if np.isfinite(item.total).any()]
@@ -267,6 +292,12 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
         "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+    ),
+    (
+        "effect of a parameter",
+        "Change of a measure when one parameter moves by half of its range, over that half, as if "
+        "it went on over the whole (Morris 1991): size is the mean without signs (Campolongo et "
+        "al. 2007). A scatter as large as the size tells of curves and of interactions.",
     ),
     (
         "probability of a missed bound",

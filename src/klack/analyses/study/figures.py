@@ -5,7 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.study.record import Optimum, Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.record import (
+    Optimum,
+    Screening,
+    Sensitivity,
+    StudyColumn,
+    StudyRecord,
+)
+from klack.analyses.study.wording import largest_first
 from klack.report.chart import (
     AxisSpec,
     BarChart,
@@ -20,7 +27,7 @@ from klack.report.chart import (
 )
 from klack.report.wording import printed_unit
 
-__all__ = ["front_charts", "parallel_chart", "scatter_chart", "sensitivity_bars"]
+__all__ = ["effect_bars", "front_charts", "parallel_chart", "scatter_chart", "sensitivity_bars"]
 
 _MOST_LINES = 4000
 """More lines hide each other and cost bytes."""
@@ -149,6 +156,21 @@ def _today(x: float, y: float) -> Curve:
         width=3.0,
         drawn="points",
         names=("the case as it is",),
+    )
+
+
+def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]) -> BarChart:
+    """Sizes of the effects of all parameters on a measure, the largest first."""
+    unit, factor = printed_unit(item.size, "" if measure.unit == "1" else measure.unit)
+    order = largest_first(item)
+    sizes = factor * np.nan_to_num(item.size[order])
+    return BarChart(
+        name=f"effects-{item.measure}",
+        title=f"Effects on {labels[item.measure]}",
+        x=AxisSpec(label=f"change of {labels[item.measure]} over the whole range", unit=unit),
+        rows=tuple(labels[item.parameters[k]] for k in order),
+        parts=(BarPart(label="size of the effect", values=tuple(sizes.tolist()), colour="blue"),),
+        note="Mean size of the elementary effects; the table has standard errors and scatter.",
     )
 
 

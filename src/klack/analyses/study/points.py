@@ -1,7 +1,7 @@
 """Points of a study: the values of its parameters, and what the case file has at each point."""
 
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import product
@@ -26,7 +26,9 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, one_of
 from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
 from klack.studies.expression import Expression, ordered
+from klack.studies.screening import morris_design
 from klack.studies.sensitivity import saltelli_design
+from klack.studies.spread import Range
 from klack.units import Kind, parse_quantity
 
 __all__ = [
@@ -35,6 +37,7 @@ __all__ = [
     "StudyPoints",
     "Values",
     "linked_of",
+    "morris_points",
     "points_of_study",
     "require_varied",
     "space_of",
@@ -43,11 +46,6 @@ __all__ = [
 Values = Mapping[str, float | str]
 
 _MOST_POINTS = 1_000_000
-_DRAWN: Mapping[str, tuple[Callable[[int, int, int], NDArray[np.float64]], str]] = {
-    "sobol": (sobol_sequence, "Sobol points"),
-    "latin-hypercube": (latin_hypercube, "Latin hypercube"),
-    "saltelli": (lambda base, count, seed: saltelli_design(count, base, seed), "Saltelli's design"),
-}
 _UNBALANCED = (
     "The number of Sobol points is no power of two: means over them converge more slowly. "
     "Try: 64, 128, 256, ... points."
@@ -277,14 +275,32 @@ def _design(
         return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}", ()
     if design.kind == "one-at-a-time":
         return _one_at_a_time(varied, design.levels), "one parameter at a time", ()
-    make, name = _DRAWN[design.kind]
-    cube = make(design.points, len(varied), design.seed)
+    cube, name = _cube(source, varied)
     rows = [
         [item.spread.at(float(share)) for item, share in zip(varied, point, strict=True)]
         for point in cube
     ]
-    even = design.kind == "latin-hypercube" or balanced(design.points)
+    even = design.kind not in ("sobol", "saltelli") or balanced(design.points)
     return rows, f"{name}, seed {design.seed}", () if even else (_UNBALANCED,)
+
+
+def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.float64], str]:
+    """Points of the unit cube of a drawn design, and its name."""
+    design, count = source.study.design, len(varied)
+    if design.kind == "saltelli":
+        return saltelli_design(count, design.points, design.seed), "Saltelli's design"
+    if design.kind == "morris":
+        return morris_points(source, varied), "trajectories of Morris"
+    if design.kind == "latin-hypercube":
+        return latin_hypercube(design.points, count, design.seed), "Latin hypercube"
+    return sobol_sequence(design.points, count, design.seed), "Sobol points"
+
+
+def morris_points(source: StudySource, varied: Sequence[Parameter]) -> NDArray[np.float64]:
+    """Trajectories through the unit cube, shape (points, parameters that vary)."""
+    design = source.study.design
+    bounded = [isinstance(item.spread, Range) for item in varied]
+    return morris_design(len(varied), design.points, design.seed, bounded=bounded)
 
 
 def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 
-__all__ = ["MissedBound", "Optimum", "Sensitivity", "StudyColumn", "StudyRecord"]
+__all__ = ["MissedBound", "Optimum", "Screening", "Sensitivity", "StudyColumn", "StudyRecord"]
 
 Column = NDArray[np.float64]
 
@@ -84,6 +84,34 @@ class Sensitivity:
     discarded: int
     confidence: float
     reason: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Screening:
+    """Elementary effects of each parameter on one measure: its change over a whole range.
+
+    Parameters
+    ----------
+    measure : str
+    parameters : tuple of str
+    size, size_error : array, shape (parameters,) [unit of the measure]
+        Mean of the sizes of the effects, mu*, and its standard error.
+    mean : array, shape (parameters,)
+        Mean of the effects with their signs, mu.
+    scatter : array, shape (parameters,)
+        Standard deviation of the effects, sigma: of a parameter that acts differently at other
+        places, by itself or through others.
+    effects : int array, shape (parameters,)
+        How many there are; those next to a point without a value are left out.
+    """
+
+    measure: str
+    parameters: tuple[str, ...]
+    size: Column
+    size_error: Column
+    mean: Column
+    scatter: Column
+    effects: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,6 +203,8 @@ class StudyRecord(CaseRecord):
         Doubts about the numbers of each point.
     sensitivities : tuple of Sensitivity
         Of each measure, from the design of Saltelli.
+    screenings : tuple of Screening
+        Of each measure, from the trajectories of Morris.
     optimum : Optimum or None
         Of ``klack optimise``.
     missed : tuple of MissedBound
@@ -194,6 +224,7 @@ class StudyRecord(CaseRecord):
     failures: tuple[str, ...]
     notes: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...] = ()
+    screenings: tuple[Screening, ...] = ()
     optimum: Optimum | None = None
     missed: tuple[MissedBound, ...] = ()
 

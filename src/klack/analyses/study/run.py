@@ -13,10 +13,10 @@ from klack.analyses.study.columns import (
 from klack.analyses.study.evaluation import Evaluation
 from klack.analyses.study.goals import bounds_of
 from klack.analyses.study.log import point_log_form
-from klack.analyses.study.points import StudyPoints, points_of_study
+from klack.analyses.study.points import StudyPoints, morris_points, points_of_study
 from klack.analyses.study.record import StudyRecord
 from klack.analyses.study.robustness import missed_bounds
-from klack.analyses.study.sensitivity import sensitivities_of
+from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
 from klack.analyses.study.strokes import AskedPoints
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
@@ -118,6 +118,15 @@ def run_study(
         sensitivities=(
             sensitivities_of(columns, [item.name for item in points.space.varied])
             if source.study.design.kind == "saltelli"
+            else ()
+        ),
+        screenings=(
+            screenings_of(
+                columns,
+                [item.name for item in points.space.varied],
+                morris_points(source, points.space.varied),
+            )
+            if source.study.design.kind == "morris"
             else ()
         ),
         missed=(

@@ -9,12 +9,22 @@ from typing_extensions import TypedDict
 
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import number_or_none
-from klack.analyses.study.record import MissedBound, Optimum, Sensitivity, StudyColumn, StudyRecord
+from klack.analyses.study.record import (
+    MissedBound,
+    Optimum,
+    Screening,
+    Sensitivity,
+    StudyColumn,
+    StudyRecord,
+)
 from klack.analyses.study.wording import (
+    EFFECT_COLUMNS,
     MISSED_COLUMNS,
     change,
+    effect_cells,
     in_words,
     index_cells,
+    largest_first,
     missed_cells,
     rate_text,
 )
@@ -41,6 +51,16 @@ class IndexJson(TypedDict):
     total: Annotated[Real, Field(description="With interactions.")]
     total_low: Real
     total_high: Real
+
+
+class EffectJson(TypedDict):
+    """Elementary effects of a parameter on a measure, over its whole range."""
+
+    size: Annotated[Real, Field(description="Mean of their sizes, mu*.")]
+    size_error: Annotated[Real, Field(description="Its standard error.")]
+    mean: Annotated[Real, Field(description="Mean with their signs, mu.")]
+    scatter: Annotated[Real, Field(description="Standard deviation, sigma.")]
+    effects: Annotated[int, Field(description="How many.")]
 
 
 class MissedBoundJson(TypedDict):
@@ -85,6 +105,10 @@ class StudyJson(TypedDict):
         dict[str, dict[str, IndexJson]],
         Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
     ]
+    screenings: Annotated[
+        dict[str, dict[str, EffectJson]],
+        Field(description="Elementary effects by measure and parameter, of Morris's design."),
+    ]
     missed_bounds: Annotated[
         list[MissedBoundJson], Field(description="Of drawn points, for each bound.")
     ]
@@ -115,6 +139,10 @@ def study_to_json(record: StudyRecord) -> StudyJson:
             item.measure: {name: _indices(item, k) for k, name in enumerate(item.parameters)}
             for item in record.sensitivities
         },
+        "screenings": {
+            item.measure: {name: _effects(item, k) for k, name in enumerate(item.parameters)}
+            for item in record.screenings
+        },
         "missed_bounds": [_missed(item) for item in record.missed],
         "optimum": None if record.optimum is None else _optimum(record.optimum),
         "failures": list(record.failures),
@@ -124,6 +152,16 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "computed": record.computed,
         "kept": record.kept,
         "threads": record.threads,
+    }
+
+
+def _effects(item: Screening, k: int) -> EffectJson:
+    return {
+        "size": number_or_none(item.size[k]),
+        "size_error": number_or_none(item.size_error[k]),
+        "mean": number_or_none(item.mean[k]),
+        "scatter": number_or_none(item.scatter[k]),
+        "effects": int(item.effects[k]),
     }
 
 
@@ -198,6 +236,17 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             title="How often a drawn valve misses a bound",
             columns=MISSED_COLUMNS,
             rows=[missed_cells(item) for item in record.missed],
+        )
+    own = {item.name: item for item in record.measures}
+    for effects in record.screenings:
+        measure = own[effects.measure]
+        yield TextTable(
+            title=f"Change of {effects.measure} over the whole range of each parameter",
+            columns=EFFECT_COLUMNS,
+            rows=[
+                [effects.parameters[k], *effect_cells(measure, effects, k, in_words)]
+                for k in largest_first(effects)
+            ],
         )
     for item in record.sensitivities:
         yield TextTable(

@@ -1,16 +1,28 @@
 """Words for the columns and points of a study."""
 
+from collections.abc import Callable
 from math import isfinite
 
-from klack.analyses.study.record import MissedBound, Sensitivity, StudyColumn, StudyRecord
+import numpy as np
+
+from klack.analyses.study.record import (
+    MissedBound,
+    Screening,
+    Sensitivity,
+    StudyColumn,
+    StudyRecord,
+)
 from klack.report.wording import fixed, quantity
 from klack.units import format_si
 
 __all__ = [
+    "EFFECT_COLUMNS",
     "MISSED_COLUMNS",
     "change",
+    "effect_cells",
     "in_words",
     "index_cells",
+    "largest_first",
     "missed_cells",
     "on_page",
     "rate_text",
@@ -51,6 +63,22 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
     if item.unit == "kg":
         return quantity(1e3 * value, "g", digits)
     return quantity(value, "" if item.unit == "1" else item.unit, digits)
+
+
+EFFECT_COLUMNS = ("parameter", "size", "standard error", "mean", "scatter", "effects")
+
+
+def largest_first(item: Screening) -> list[int]:
+    """Places of the parameters, those with the largest effects first."""
+    return [int(k) for k in np.argsort(-np.nan_to_num(item.size), kind="stable")]
+
+
+def effect_cells(
+    measure: StudyColumn, item: Screening, k: int, text: Callable[[StudyColumn, float], str]
+) -> tuple[str, ...]:
+    """Size, its error, mean and scatter of the effects of one parameter, and how many."""
+    numbers = (item.size[k], item.size_error[k], item.mean[k], item.scatter[k])
+    return (*(text(measure, float(number)) for number in numbers), str(int(item.effects[k])))
 
 
 MISSED_COLUMNS = ("bound", "points", "missed", "probability", "95 % interval", "without a value")
