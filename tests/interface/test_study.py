@@ -404,6 +404,35 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
             if name != "noise.loudness_max":  # too faint to have one
                 assert len({*values.tolist()}) == 4
 
+    def test_a_valve_without_stops_has_no_noise_but_its_stroke(self, tmp_path, capsys):
+        text = SMALL.read_text().partition("    chamber:")[0]
+        text = "\n".join(line for line in text.splitlines() if "seat:" not in line)
+        head, _, rest = text.partition("    opening:")
+        rest = rest[rest.index("    spring:") :]
+        text = f"""{head}{rest}
+  connections:
+    - [needle.top, spring.end, magnet.end]
+run: {{duration: 0.5 ms, variants: [dry]}}
+"""
+        case = tmp_path / "free.yaml"
+        case.write_text(text.replace("points: [tip, top]", "points: [top]"))
+        file = write(
+            tmp_path,
+            f"""
+  parameters: {{{PRELOAD}: {{values: [5 N, 6 N]}}}}
+  measures: [noise.sound_exposure_level_weighted, end_time]
+  design: {{kind: grid}}
+""",
+        )
+        record = klack.run_study(case, file).record
+        assert not record.failed.any()
+        assert np.isfinite(columns(record)["end_time"]).all()
+        assert np.isnan(columns(record)["noise.sound_exposure_level_weighted"]).all()
+        assert "no end stop" in record.notes[0]
+        stroke = klack.run_stroke(case, ["dry"])
+        with pytest.raises(InputError, match="no end stop"):
+            klack.noise_of(stroke)
+
 
 class TestSensitivity:
     def test_what_has_no_effect_has_no_share_and_the_others_share_all(self, tmp_path):

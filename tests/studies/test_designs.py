@@ -2,7 +2,6 @@
 
 import warnings
 from hashlib import sha256
-from itertools import product
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ from klack.errors import InputError
 from klack.studies.designs import (
     balanced,
     even_levels,
-    full_grid,
     latin_hypercube,
-    one_at_a_time,
     sobol_sequence,
 )
 
@@ -23,25 +20,6 @@ def test_even_levels():
     assert even_levels(5).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
     assert even_levels(4, bounded=False).tolist() == [0.125, 0.375, 0.625, 0.875]
     assert even_levels(1).tolist() == even_levels(1, bounded=False).tolist() == [0.5]
-
-
-def test_grid_is_the_product_of_levels():
-    levels = [even_levels(2), even_levels(3), even_levels(4, bounded=False)]
-
-    assert full_grid(levels).tolist() == [list(point) for point in product(*levels)]
-    assert full_grid([even_levels(3)]).tolist() == [[0.0], [0.5], [1.0]]
-
-
-def test_one_at_a_time_moves_one_parameter():
-    levels = [even_levels(4), even_levels(5), even_levels(1), even_levels(2, bounded=False)]
-    points = one_at_a_time(levels)
-
-    assert points.shape == (1 + 4 + 4 + 0 + 2, 4)
-    assert points[0].tolist() == [0.5] * 4
-    assert np.all(np.sum(points[1:] != 0.5, axis=1) == 1)
-    for column, own in enumerate(levels):
-        moved = points[1:, column]
-        assert moved[moved != 0.5].tolist() == [x for x in own if x != 0.5]
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100])
@@ -133,12 +111,6 @@ def test_points_are_those_of_other_versions(design, digest):
     [
         (lambda: even_levels(0), "0 levels"),
         (lambda: even_levels(2.5), "2.5 levels"),
-        (lambda: full_grid([]), "0 parameters"),
-        (lambda: full_grid([even_levels(2), np.array([])]), "0 levels"),
-        (lambda: full_grid([np.array([0.5, 2.0])]), "levels from 0.5 to 2"),
-        (lambda: full_grid([np.array([np.nan])]), "levels from nan"),
-        (lambda: full_grid([even_levels(10)] * 20), r"1e\+20 points of 20 parameters"),
-        (lambda: one_at_a_time([]), "0 parameters"),
         (lambda: latin_hypercube(0, 2, 1), "0 points"),
         (lambda: latin_hypercube(True, 2, 1), "True points"),
         (lambda: latin_hypercube(10, 0, 1), "0 parameters"),

@@ -4,10 +4,8 @@ A point is a row, a parameter is a column.  A coordinate is the probability belo
 parameter: 0 and 1 are the ends of a range, 0.5 is its middle or the median of its distribution.
 """
 
-from collections.abc import Sequence
 from functools import cache
 from inspect import signature
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -19,9 +17,7 @@ from klack.errors import InputError
 __all__ = [
     "balanced",
     "even_levels",
-    "full_grid",
     "latin_hypercube",
-    "one_at_a_time",
     "random_of",
     "require_size",
     "sobol_sequence",
@@ -32,7 +28,6 @@ Floats = NDArray[np.float64]
 _MOST_NUMBERS = 10**8
 """Coordinates of one design: 800 MB."""
 _BITS = 30
-_CENTRE = 0.5
 
 
 def even_levels(count: int, *, bounded: bool = True) -> Floats:
@@ -65,70 +60,6 @@ def even_levels(count: int, *, bounded: bool = True) -> Floats:
     _require(count, "levels")
     k = np.arange(count)
     return k / (count - 1) if bounded and count > 1 else (k + 0.5) / count
-
-
-def full_grid(levels: Sequence[Floats]) -> Floats:
-    """Full factorial design: every combination of levels, the last parameter varies fastest.
-
-    Parameters
-    ----------
-    levels : sequence of array
-        Coordinates that each parameter takes, in [0, 1]; see :func:`even_levels`.
-
-    Returns
-    -------
-    array (product of the numbers of levels, parameters)
-
-    Raises
-    ------
-    InputError
-        For no parameter, no level, levels outside [0, 1], or too many points.
-
-    Examples
-    --------
-    >>> full_grid([even_levels(2), even_levels(3)])[:4].tolist()
-    [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0], [1.0, 0.0]]
-    """
-    _require_levels(levels)
-    require_size(prod(len(own) for own in levels), len(levels))
-    return np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
-
-
-def one_at_a_time(levels: Sequence[Floats]) -> Floats:
-    """The centre, then each parameter over its levels while all others stay at the centre.
-
-    A level at the centre is not repeated: it is the first point.  This design shows no
-    interaction of parameters.
-
-    Parameters
-    ----------
-    levels : sequence of array
-        Coordinates that each parameter takes, in [0, 1]; see :func:`even_levels`.
-
-    Returns
-    -------
-    array (1 + number of levels off the centre, parameters)
-
-    Raises
-    ------
-    InputError
-        As for :func:`full_grid`.
-
-    Examples
-    --------
-    >>> one_at_a_time([even_levels(2), even_levels(3)]).tolist()
-    [[0.5, 0.5], [0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0]]
-    """
-    _require_levels(levels)
-    off = [own[own != _CENTRE] for own in levels]
-    count = 1 + sum(own.size for own in off)
-    require_size(count, len(levels))
-    points = np.full((count, len(levels)), _CENTRE)
-    row = 1
-    for column, own in enumerate(off):
-        points[row : row + own.size, column] = own
-        row += own.size
-    return points
 
 
 def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
@@ -266,16 +197,3 @@ def require_size(count: int, parameters: int) -> None:
             expected=f"at most {_MOST_NUMBERS // parameters:.4g} points",
             hint="use fewer levels, or a Sobol sequence, whose number of points is free.",
         )
-
-
-def _require_levels(levels: Sequence[Floats]) -> None:
-    _require(len(levels), "parameters")
-    for own in levels:
-        _require(len(own), "levels")
-        if not np.all((own >= 0.0) & (own <= 1.0)):
-            raise InputError(
-                "design",
-                got=f"levels from {np.min(own):g} to {np.max(own):g}",
-                expected="levels between 0 and 1",
-                hint="give coordinates of the unit cube, not values.",
-            )

@@ -245,6 +245,7 @@ def stroke_sources(
     for name in wanted:
         _require("variant", name, study.variants)
         variant = study.variants[name]
+        _require_stops(study.case, variant)
         followed, cut = first_part(variant.result)
         variant = replace(variant, result=followed)
         net = _net_force(study, variant)
@@ -380,6 +381,17 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
             got=f"no modes and surfaces of {one_of(held)}, as an earlier version of klack wrote it",
             expected="a result that holds them",
             hint="run the case again, then klack noise.",
+        )
+
+
+def _require_stops(case: str, variant: StrokeVariant) -> None:
+    """Refuse a valve in which nothing hits anything."""
+    if not variant.result.interfaces:
+        raise InputError(
+            f"result of case {case}",
+            got=f"no end stop in '{variant.name}'",
+            expected="a valve whose needle hits a stop",
+            hint="add an end-stop to the network: the noise comes from its force.",
         )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from klack.acoustics.signal_statistics import SoundStatistics
 from klack.analyses.measures import Measure
@@ -17,10 +17,12 @@ from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.stroke.summary import first_impact
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
-from klack.errors import InputError
+from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 
 __all__ = ["ChosenMeasure", "PointRun", "chosen_measures"]
+
+Found = TypeVar("Found")
 
 NOISE = "noise"
 """Before the names of measures of noise."""
@@ -47,6 +49,7 @@ class PointRun:
         self, variant: StrokeVariant, source: Callable[[], NoiseSource], transfers: Transfers
     ) -> None:
         self.variant, self._make, self._transfers = variant, source, transfers
+        self.notes: list[str] = []
 
     @cached_property
     def _source(self) -> NoiseSource:
@@ -54,13 +57,20 @@ class PointRun:
 
     @cached_property
     def click(self) -> SoundStatistics | None:
-        """Levels of a click."""
-        return click_statistics(self._source, self._transfers)
+        """Levels of a click; None, with a note, where they cannot be had."""
+        return self._noted(lambda: click_statistics(self._source, self._transfers))
 
     @cached_property
-    def design(self) -> NoiseDesign:
-        """Noise as a whole."""
-        return noise_design(self._source)
+    def design(self) -> NoiseDesign | None:
+        """Noise as a whole; None, with a note, where it cannot be had."""
+        return self._noted(lambda: noise_design(self._source))
+
+    def _noted(self, make: Callable[[], Found]) -> Found | None:
+        try:
+            return make()
+        except KlackError as error:  # the measures of the stroke stand
+            self.notes.append(f"noise: {error}")
+            return None
 
 
 @dataclass(frozen=True, slots=True)

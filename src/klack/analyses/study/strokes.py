@@ -471,7 +471,7 @@ def _row(
     doubts = [str(item.message) for item in caught if issubclass(item.category, AccuracyWarning)]
     begun = result.start.notes if result.start is not None else ()
     rest = rest_note(asked.variant, result, roles.seat)
-    notes = [*built.notes, *doubts]
+    notes = [*built.notes, *doubts, *whole.notes]
     notes += [note for note in begun if not any(note in other for other in notes)]
     notes += [rest] if rest else []
     return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=_others(caught))
