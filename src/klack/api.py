@@ -41,6 +41,7 @@ __all__ = [
     "load_case",
     "load_result",
     "noise_of",
+    "optimise",
     "run_impact",
     "run_many",
     "run_shots",
@@ -437,8 +438,37 @@ def run_study(
     InputError
         Before the first run, with file, line and key.
     """
-    from klack.analyses.study.analysis import STUDY
     from klack.analyses.study.run import run_study as run
+
+    return _studied(run, case, study, folder, threads, progress)
+
+
+def optimise(
+    case: Given,
+    study: str | Path | None = None,
+    *,
+    folder: str | Path | None = None,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Search the ranges of a study for the best points, as ``klack optimise`` does.
+
+    Arguments and errors are those of :func:`run_study`; the study has objectives.
+    """
+    from klack.analyses.study.optimise import run_optimisation
+
+    return _studied(run_optimisation, case, study, folder, threads, progress)
+
+
+def _studied(
+    run: Any,
+    case: Given,
+    study: str | Path | None,
+    folder: str | Path | None,
+    threads: int | None,
+    progress: Progress,
+) -> Result:
+    from klack.analyses.study.analysis import STUDY
     from klack.case.study_source import study_of
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)

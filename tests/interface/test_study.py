@@ -533,12 +533,8 @@ class TestOptimum:
     """Truth: definitions of the front, an exhaustive grid, and bounds by the case as it is."""
 
     def test_nothing_that_was_computed_beats_the_front(self, tmp_path):
-        from klack.analyses.study.optimise import run_optimisation
-        from klack.case.study_source import study_of
-
-        case = klack.load_case(SMALL)
-        source = study_of(case.checked, case.tree, write(tmp_path, OPTIMUM))
-        record = run_optimisation(case.checked, case.tree, source, folder=tmp_path / "out")
+        file = write(tmp_path, OPTIMUM)
+        record = klack.optimise(SMALL, file, folder=tmp_path / "out").record
         found = record.optimum
         time, force = (columns(record)[name] for name in ("opening_time", "opening.peak_force"))
         today = {item.name: item.today for item in record.measures}
@@ -550,7 +546,7 @@ class TestOptimum:
             assert not (better & ((time < time[i]) | (force < force[i]))).any()
         assert found.best in found.front
         assert record.count > 80  # refinements came after the generations
-        again = run_optimisation(case.checked, case.tree, source, folder=tmp_path / "out")
+        again = klack.optimise(SMALL, file, folder=tmp_path / "out").record
         assert again.computed == 0
         np.testing.assert_array_equal(again.optimum.front, found.front)
         grid = OPTIMUM.replace("  search:", "  design: {kind: grid, levels: 7}\n  search:")

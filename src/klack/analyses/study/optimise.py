@@ -136,7 +136,7 @@ class _Work:
         progress: Progress,
     ) -> None:
         self._case, self._tree, self._source = case, tree, source
-        self._space, self._progress = space, progress
+        self.space, self._progress = space, progress
         self.evaluation = evaluation
         self.values: list[Values] = []
         self.found: list[PointRow] = []
@@ -176,8 +176,8 @@ class _Work:
         self, cube: NDArray[np.float64], goals: Goals
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Objectives and violations of points of the unit cube."""
-        values = [self._space.at(point) for point in cube]
-        rows = self.rows([self._space.written(point) for point in values])
+        values = [self.space.at(point) for point in cube]
+        rows = self.rows([self.space.written(point) for point in values])
         self.values += values
         self.found += rows
         self.cubes += list(cube)
@@ -244,7 +244,7 @@ def _refinement(source: StudySource, work: _Work, goals: Goals) -> Batches | Non
     sizes = np.abs(objectives[front.points]).max(axis=0)
     given = source.study.search
     settings = RefinementSettings(
-        evaluations=given.refinements, seed=given.seed, edge=_edge(work._space)
+        evaluations=given.refinements, seed=given.seed, edge=_edge(work.space)
     )
     return Refinement(
         settings,
