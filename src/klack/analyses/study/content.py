@@ -295,9 +295,10 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "effect of a parameter",
-        "Change of a measure when one parameter moves by half of its range, over that half, as if "
-        "it went on over the whole (Morris 1991): size is the mean without signs (Campolongo et "
-        "al. 2007). A scatter as large as the size tells of curves and of interactions.",
+        "Change of a measure when one parameter moves by half of its range, over that half: the "
+        "change over the whole range of a straight line (Morris 1991). Size is the mean without "
+        "signs (Campolongo et al. 2007). A scatter as large as the size tells of curves and of "
+        "interactions.",
     ),
     (
         "probability of a missed bound",
