@@ -304,6 +304,11 @@ def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
     assert "drawParallel" in page
     assert (out / "report.pdf").stat().st_size > 10_000
     stored = klack.load_result(out)
+    data = stored.to_xarray()
+    assert data["opening_time"].attrs["units"] == "s"
+    assert data["opening_time"].values.tolist() == found["measures"]["opening_time"]["values"]
+    assert data["network_components_spring_preload"].attrs["comment"] == "10 N to 14 N"
+    assert "data:image/png" in stored._repr_html_()
     assert stored.json["measures"] == found["measures"]
     assert main(["export", str(out), "--to", "csv", "--out", str(tmp_path / "table")]) == 0
     (file,) = (tmp_path / "table").glob("*.csv")

@@ -9,10 +9,12 @@ from klack.analyses.measures import json_of
 from klack.analyses.noise.record import NoiseStudy
 from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.study.record import StudyRecord
 from klack.errors import InputError, MissingExtraError
 from klack.exchange.results.about import about_study
 from klack.exchange.results.naming import identifiers
 from klack.exchange.results.noise_dataset import noise_variables
+from klack.exchange.results.points_dataset import points_variables
 from klack.exchange.results.shots_dataset import shots_variables
 from klack.exchange.results.study_table import result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar
@@ -31,12 +33,12 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
 
     Parameters
     ----------
-    record : ImpactStudy, StrokeStudy, ShotsStudy or NoiseStudy
+    record : ImpactStudy, StrokeStudy, ShotsStudy, StudyRecord or NoiseStudy
     measured : iterable of (name, part of the record, measures)
         Those of the record; the numbers of a noise study are read from them.
     run : str, optional
         Level, variant or design; the answer of an impact, the reference of a stroke, the first
-        design by default.  Shots have one run.
+        design by default.  Shots and studies have one run.
 
     Raises
     ------
@@ -61,6 +63,10 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
         _named(run, "shots", ("shots",))
         variables, coordinates = shots_variables(record)
         about = about_study(record, {"surfaces": record.surfaces, "guide": record.guide})
+    elif isinstance(record, StudyRecord):
+        _named(run, "points", ("points",))
+        variables, coordinates = points_variables(record)
+        about = about_study(record, {"run": record.variant, "label": record.design})
     elif isinstance(record, NoiseStudy):
         designs = {item.name: item for item in record.designs}
         design = designs[_named(run, record.reference.name, designs)]
@@ -77,7 +83,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
         raise InputError(
             "to_xarray",
             got=f"a {type(record).__name__}",
-            expected="the record of an impact, a stroke, shots or noise",
+            expected="the record of an impact, a stroke, shots, a study or noise",
             hint="its arrays are fields of the record: result.record.",
         )
     shown = {key: text for key, text in about.items() if text}

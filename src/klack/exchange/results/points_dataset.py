@@ -1,0 +1,40 @@
+"""Points of a study as named arrays over the points."""
+
+import numpy as np
+
+from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.exchange.results.naming import identifiers
+from klack.exchange.results.variables import Variable
+
+__all__ = ["points_variables"]
+
+
+def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """Variables and coordinates of all points, in the order of the design.
+
+    Parameters and measures are of shape (points,) over ``point``, by their names with underscores
+    for what Python does not take; ``failure`` says why a point has no measures.
+
+    Parameters
+    ----------
+    study : StudyRecord
+    """
+    names = identifiers([item.name for item in study.columns], ("point", "failure"))
+    variables = {
+        name: Variable(("point",), _values(item), _about(item))
+        for name, item in zip(names, study.columns, strict=True)
+    }
+    variables["failure"] = Variable(
+        ("point",), np.array(study.failures, dtype=str), {"long_name": "why there are no measures"}
+    )
+    number = np.arange(study.count)
+    return variables, {"point": Variable(("point",), number, {"long_name": "number of the point"})}
+
+
+def _values(item: StudyColumn) -> np.ndarray:
+    return np.array([item.words[int(i)] for i in item.values]) if item.words else item.values
+
+
+def _about(item: StudyColumn) -> dict[str, str]:
+    comment = {"comment": item.spread} if item.spread else {}
+    return {"units": item.unit or "1", "long_name": item.name, **comment}
