@@ -85,15 +85,11 @@ def measure_columns(
             title=item.measure.name,
             unit=item.measure.unit,
             spread="",
-            today=_number(today.values[k]),
-            values=np.array([_number(row.values[k]) for row in rows], dtype=float),
+            today=today.numbers[k],
+            values=np.array([row.numbers[k] for row in rows], dtype=float),
         )
         for k, item in enumerate(asked.chosen)
     )
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
 
 
 def _today_notes(today: PointRow) -> tuple[str, ...]:

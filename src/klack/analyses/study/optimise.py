@@ -1,6 +1,6 @@
 """``klack optimise``: search the points of a study for those that no other one beats."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 
@@ -85,29 +85,27 @@ def run_optimisation(
     with form.open(folder, mark) as log, collected_warnings() as notes:
         work = _Work(case, tree, source, space, Evaluation(log, threads), clock)
         today = work.rows([{}])[0]
-        measures = work.asked([{}]).chosen
-        known = {item.name: item.measure for item in measures}
-        numbers = {item.name: _number(today.values[k]) for k, item in enumerate(measures)}
-        goals = goals_of(source, known, numbers)
-        search = _search(source, space, goals)
+        asked = work.asked([{}])
+        known = {item.name: item.measure for item in asked.chosen}
+        front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
+        search = _search(source, space, front.goals)
         for cube in search:
-            search.tell(*work.told(cube, goals))
+            search.tell(*work.told(cube, front))
         require_some(source, work.found)
         if source.study.search.refinements:
-            refinement = _refinement(source, work, goals)
+            refinement = _refinement(source, work, front)
             if refinement is not None:
                 for cube in refinement:
-                    refinement.tell(*work.told(cube, goals))
-    columns = measure_columns(work.asked([{}]), work.found, today)
+                    refinement.tell(*work.told(cube, front))
+    columns = measure_columns(asked, work.found, today)
     parameters, linked = parameter_columns(space, work.values)
-    optimum = _optimum(
-        goals, work, search.settings.algorithm, source, {c.name: c.unit for c in columns}
-    )
+    units = {item.name: item.unit for item in columns}
+    optimum = _optimum(front, search.settings.algorithm, source, units)
     return StudyRecord(
         **case_fields(case),
         **run_fields(begin, clock, "pymoo"),
         study_text="" if source.path == tree.path else source.path.read_text(encoding="utf-8"),
-        variant=work.asked([{}]).variant,
+        variant=asked.variant,
         design=optimum.algorithm,
         threads=available_cores() if threads is None else threads,
         computed=work.evaluation.computed,
@@ -173,43 +171,73 @@ class _Work:
         return self.evaluation.rows(self.asked(written), told)
 
     def told(
-        self, cube: NDArray[np.float64], goals: Goals
+        self, cube: NDArray[np.float64], front: "_Front"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Objectives and violations of points of the unit cube."""
+        """Objectives and violations of points of the unit cube, which join the front."""
         values = [self.space.at(point) for point in cube]
         rows = self.rows([self.space.written(point) for point in values])
         self.values += values
         self.found += rows
         self.cubes += list(cube)
-        columns = self.columns(rows)
-        self._tell_best(goals)
-        return goals.objective_values(columns), goals.violations(columns)
+        table = np.array([row.numbers for row in rows])
+        columns = dict(zip(self._names, table.T, strict=True))
+        objectives, violations = front.add(columns)
+        self._tell_best(front)
+        return objectives, violations
 
-    def columns(self, rows: Iterable[PointRow] | None = None) -> dict[str, NDArray[np.float64]]:
-        """Values of the measures by name, of all points by default."""
-        table = [row.values for row in (self.found if rows is None else rows)]
-        return {
-            name: np.array([_number(values[k]) for values in table], dtype=float)
-            for k, name in enumerate(self._names)
-        }
-
-    def _tell_best(self, goals: Goals) -> None:
+    def _tell_best(self, front: "_Front") -> None:
         """A line when a single objective, or the compromise of several, has become better."""
-        columns = self.columns()
-        objectives = goals.objective_values(columns)
-        front = find_front(objectives, goals.violations(columns))
         if not front.feasible:
             return
-        best = int(front.points[compromise(objectives[front.points])])
-        numbers = ", ".join(f"{name} {columns[name][best]:.5g}" for name in goals.objectives)
+        best = front.best
+        own = dict(zip(self._names, self.found[best].numbers, strict=True))
+        numbers = ", ".join(f"{name} {own[name]:.5g}" for name in front.goals.objectives)
         text = f"point {best}: {numbers}; {front.points.size} on the front"
         if text != self._best:
             self._best = text
             remark(self._progress, f"{len(self.found)} points, best so far {text}")
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
+class _Front:
+    """Points that no other one beats, kept while points come: only they meet the next ones.
+
+    What a point of the front beats, it beats for good, so that this is the front of all points.
+    """
+
+    def __init__(self, goals: Goals) -> None:
+        self.goals = goals
+        self.objectives = np.zeros((0, len(goals.objectives)))
+        self.violations = np.zeros((0, len(goals.bounds)))
+        self.points: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.feasible = False
+
+    def add(
+        self, columns: Mapping[str, NDArray[np.float64]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Take the measures of the next points; return their objectives and violations."""
+        objectives = self.goals.objective_values(columns)
+        violations = self.goals.violations(columns)
+        new = np.arange(len(self.objectives), len(self.objectives) + len(objectives))
+        self.objectives = np.vstack([self.objectives, objectives])
+        self.violations = np.vstack([self.violations, violations])
+        places = np.append(self.points, new)
+        found = find_front(self.objectives[places], self.violations[places])
+        self.points, self.feasible = places[found.points], found.feasible
+        return objectives, violations
+
+    @property
+    def ordered(self) -> NDArray[np.int64]:
+        """By the first objective."""
+        first = self.objectives[self.points, 0]
+        return self.points[np.argsort(first, kind="stable")]
+
+    @property
+    def best(self) -> int:
+        """The compromise; -1 without a front."""
+        if not self.points.size:
+            return -1
+        order = self.ordered
+        return int(order[compromise(self.objectives[order])])
 
 
 def _edge(space: Space) -> float:
@@ -229,53 +257,45 @@ def _search(source: StudySource, space: Space, goals: Goals) -> Search:
     return Search(settings, [space.today()])
 
 
-def _refinement(source: StudySource, work: _Work, goals: Goals) -> Batches | None:
+def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | None:
     """Refinement of points spread over the front; None without a front."""
-    columns = work.columns()
-    objectives, violations = goals.objective_values(columns), goals.violations(columns)
-    front = find_front(objectives, violations)
     if not front.points.size:
         return None
-    order = front.points[np.argsort(objectives[front.points, 0], kind="stable")]
+    order, given = front.ordered, source.study.search
     polls = 2 * len(work.cubes[0]) * _POLLS
-    count = min(max(source.study.search.refinements // polls, 1), _REFINED)
+    count = min(max(given.refinements // polls, 1), _REFINED)
     chosen = order[np.unique(np.linspace(0, order.size - 1, count).round().astype(int))]
-    spans = np.ptp(objectives[front.points], axis=0)
-    sizes = np.abs(objectives[front.points]).max(axis=0)
-    given = source.study.search
+    spans = np.ptp(front.objectives[order], axis=0)
+    sizes = np.abs(front.objectives[order]).max(axis=0)
     settings = RefinementSettings(
         evaluations=given.refinements, seed=given.seed, edge=_edge(work.space)
     )
     return Refinement(
         settings,
         np.array(work.cubes)[chosen],
-        objectives[chosen],
-        violations[chosen],
+        front.objectives[chosen],
+        front.violations[chosen],
         scales=np.where(spans > 0.0, spans, np.maximum(sizes, 1e-300)),
     )
 
 
 def _optimum(
-    goals: Goals, work: _Work, algorithm: str, source: StudySource, units: Mapping[str, str]
+    front: _Front, algorithm: str, source: StudySource, units: Mapping[str, str]
 ) -> Optimum:
-    columns = work.columns()
-    objectives, violations = goals.objective_values(columns), goals.violations(columns)
-    front = find_front(objectives, violations)
-    order = front.points[np.argsort(objectives[front.points, 0], kind="stable")]
-    best = int(order[compromise(objectives[order])]) if order.size else -1
-    given = source.study.search
+    given, goals = source.study.search, front.goals
     words = f"{algorithm}, {given.generations} generations of {given.population}"
     if given.refinements:
         words += f", {given.refinements} refinements"
     bounds = [f"{b.measure} {bound_text(b, units[b.measure])}" for b in goals.bounds]
+    kept = np.all(front.violations <= 0.0, axis=1) & np.isfinite(front.objectives).all(axis=1)
     return Optimum(
         algorithm=f"{words}, seed {given.seed}",
         objectives=goals.objectives,
         ways=tuple(source.study.objectives.values()),
         bounds=tuple(bounds),
-        kept=np.all(violations <= 0.0, axis=1) & np.isfinite(objectives).all(axis=1),
-        front=order.astype(np.int64),
-        best=best,
+        kept=kept,
+        front=front.ordered,
+        best=front.best,
         feasible=front.feasible,
     )
 

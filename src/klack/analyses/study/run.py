@@ -97,9 +97,7 @@ def run_study(
         *found, today = evaluation.rows(asked, clock)
     require_some(source, found)
     known = {item.name: item.measure for item in asked.chosen}
-    values = dict(zip(known, today.values, strict=True))
-    numbers = {name: float("nan") if x is None else x for name, x in values.items()}
-    bounds = bounds_of(source, known, numbers)
+    bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
     columns = measure_columns(asked, found, today)
     parameters, linked = parameter_columns(points.space, points.values)
     return StudyRecord(

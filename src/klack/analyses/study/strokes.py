@@ -87,6 +87,11 @@ class PointRow:
     others: tuple[warnings.WarningMessage, ...] = ()
     by_chance: bool = False
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Values with nan where there is none."""
+        return tuple(float("nan") if value is None else value for value in self.values)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskedPoints:
