@@ -37,7 +37,6 @@ __all__ = [
     "StudyPoints",
     "Values",
     "linked_of",
-    "morris_points",
     "points_of_study",
     "require_varied",
     "space_of",
@@ -162,15 +161,15 @@ class StudyPoints:
     design : str
         In words.
     notes : tuple of str
+    cube : array, shape (points, parameters that vary), optional
+        Where they lie in the unit cube, if they were drawn there.
     """
 
     space: Space
     values: tuple[Values, ...]
     design: str
     notes: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.values)
+    cube: NDArray[np.float64] | None = None
 
 
 def space_of(case: ValveCase, source: StudySource) -> Space:
@@ -194,9 +193,14 @@ def points_of_study(case: ValveCase, source: StudySource) -> StudyPoints:
         With file, line and key.
     """
     space = space_of(case, source)
-    rows, words, notes = _design(source, space.varied)
-    values = tuple(map(space.values, rows))
-    return StudyPoints(space=space, values=values, design=words, notes=notes)
+    kind = source.study.design.kind
+    if kind != "file":
+        require_varied(source, space.varied)
+    if kind in ("file", "grid", "one-at-a-time"):
+        listed = _rows_of_file if kind == "file" else _levels
+        rows, words = listed(source, space.varied)
+        return StudyPoints(space=space, values=tuple(map(space.values, rows)), design=words)
+    return _drawn(source, space)
 
 
 def linked_of(
@@ -261,27 +265,30 @@ def linked_of(
 # --------------------------------------------------------------------------- designs
 
 
-def _design(
+def _levels(
     source: StudySource, varied: Sequence[Parameter]
-) -> tuple[Iterable[Sequence[float | str]], str, tuple[str, ...]]:
-    """Values of the parameters that vary at every point, in words, and notes."""
+) -> tuple[Iterable[Sequence[float | str]], str]:
+    """Values of the parameters on a grid or one at a time, and the design in words."""
     design = source.study.design
-    if design.kind == "file":
-        return _rows_of_file(source, varied), f"from {design.file.name if design.file else ''}", ()
-    require_varied(source, varied)
-    if design.kind == "grid":
-        levels = [item.spread.levels(design.levels) for item in varied]
-        _require_few(source, prod(map(len, levels)))
-        return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}", ()
     if design.kind == "one-at-a-time":
-        return _one_at_a_time(varied, design.levels), "one parameter at a time", ()
-    cube, name = _cube(source, varied)
-    rows = [
-        [item.spread.at(float(share)) for item, share in zip(varied, point, strict=True)]
-        for point in cube
-    ]
+        return _one_at_a_time(varied, design.levels), "one parameter at a time"
+    levels = [item.spread.levels(design.levels) for item in varied]
+    _require_few(source, prod(map(len, levels)))
+    return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}"
+
+
+def _drawn(source: StudySource, space: Space) -> StudyPoints:
+    """Points that are drawn in the unit cube."""
+    design = source.study.design
+    cube, name = _cube(source, space.varied)
     even = design.kind not in ("sobol", "saltelli") or balanced(design.points)
-    return rows, f"{name}, seed {design.seed}", () if even else (_UNBALANCED,)
+    return StudyPoints(
+        space=space,
+        values=tuple(map(space.at, cube)),
+        design=f"{name}, seed {design.seed}",
+        notes=() if even else (_UNBALANCED,),
+        cube=cube,
+    )
 
 
 def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.float64], str]:
@@ -290,17 +297,12 @@ def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.
     if design.kind == "saltelli":
         return saltelli_design(count, design.points, design.seed), "Saltelli's design"
     if design.kind == "morris":
-        return morris_points(source, varied), "trajectories of Morris"
+        bounded = [isinstance(item.spread, Range) for item in varied]
+        cube = morris_design(count, design.points, design.seed, bounded=bounded)
+        return cube, "trajectories of Morris"
     if design.kind == "latin-hypercube":
         return latin_hypercube(design.points, count, design.seed), "Latin hypercube"
     return sobol_sequence(design.points, count, design.seed), "Sobol points"
-
-
-def morris_points(source: StudySource, varied: Sequence[Parameter]) -> NDArray[np.float64]:
-    """Trajectories through the unit cube, shape (points, parameters that vary)."""
-    design = source.study.design
-    bounded = [isinstance(item.spread, Range) for item in varied]
-    return morris_design(len(varied), design.points, design.seed, bounded=bounded)
 
 
 def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:
@@ -333,7 +335,9 @@ def _require_few(source: StudySource, count: int) -> None:
         )
 
 
-def _rows_of_file(source: StudySource, varied: Sequence[Parameter]) -> list[list[float | str]]:
+def _rows_of_file(
+    source: StudySource, varied: Sequence[Parameter]
+) -> tuple[Iterable[Sequence[float | str]], str]:
     """Rows of a CSV file: a column for each parameter that varies, values with their units."""
     file = source.study.design.file
     assert file is not None
@@ -365,7 +369,7 @@ def _rows_of_file(source: StudySource, varied: Sequence[Parameter]) -> list[list
         raise InputError(
             str(file), got="no row of values", expected="at least one", hint="add the points."
         )
-    return rows
+    return rows, f"from {file.name}"
 
 
 def _cell(where: str, text: str, item: Parameter) -> float | str:

@@ -13,7 +13,7 @@ from klack.analyses.study.columns import (
 from klack.analyses.study.evaluation import Evaluation
 from klack.analyses.study.goals import bounds_of
 from klack.analyses.study.log import point_log_form
-from klack.analyses.study.points import StudyPoints, morris_points, points_of_study
+from klack.analyses.study.points import StudyPoints, points_of_study
 from klack.analyses.study.record import StudyRecord
 from klack.analyses.study.robustness import missed_bounds
 from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
@@ -99,6 +99,7 @@ def run_study(
     known = {item.name: item.measure for item in asked.chosen}
     bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
     columns = measure_columns(asked, found, today)
+    varied = [item.name for item in points.space.varied]
     parameters, linked = parameter_columns(points.space, points.values)
     return StudyRecord(
         **case_fields(case),
@@ -114,17 +115,11 @@ def run_study(
         linked=linked,
         measures=columns,
         sensitivities=(
-            sensitivities_of(columns, [item.name for item in points.space.varied])
-            if source.study.design.kind == "saltelli"
-            else ()
+            sensitivities_of(columns, varied) if source.study.design.kind == "saltelli" else ()
         ),
         screenings=(
-            screenings_of(
-                columns,
-                [item.name for item in points.space.varied],
-                morris_points(source, points.space.varied),
-            )
-            if source.study.design.kind == "morris"
+            screenings_of(columns, varied, points.cube)
+            if source.study.design.kind == "morris" and points.cube is not None
             else ()
         ),
         missed=(
