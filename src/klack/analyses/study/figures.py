@@ -12,7 +12,7 @@ from klack.analyses.study.record import (
     StudyColumn,
     StudyRecord,
 )
-from klack.analyses.study.wording import largest_first
+from klack.analyses.study.wording import largest_first, shown_unit
 from klack.report.chart import (
     AxisSpec,
     BarChart,
@@ -200,8 +200,6 @@ def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
 
 def _axis(item: StudyColumn, labels: Mapping[str, str]) -> tuple[AxisSpec, float]:
     """Axis of a column in a unit with a fitting prefix, and the factor from SI to it."""
-    if item.unit == "kg":
-        unit, factor = printed_unit(1e3 * item.values, "g")
-        return AxisSpec(label=labels[item.name], unit=unit), 1e3 * factor
-    unit, factor = printed_unit(item.values, "" if item.unit == "1" else item.unit)
-    return AxisSpec(label=labels[item.name], unit=unit), factor
+    own, to_own = shown_unit(item.unit)
+    unit, factor = printed_unit(to_own * item.values, own)
+    return AxisSpec(label=labels[item.name], unit=unit), to_own * factor

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from klack.analyses.study.wording import shown_unit
 from klack.case.key_path import Quantity, kind_at, node_at, quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study import StudyParameter, Written
@@ -75,9 +76,8 @@ class Parameter:
     def _in_words(self, value: float | str) -> str:
         if self.kind is None or isinstance(value, str):
             return str(value)
-        if self.kind.unit == "kg":
-            return format_si(1e3 * value, "g")
-        return format_si(value, "" if self.kind.bare else self.kind.unit)
+        unit, factor = shown_unit(self.kind.unit)
+        return format_si(factor * value, unit)
 
 
 def unit_of(kind: Kind | None) -> str:

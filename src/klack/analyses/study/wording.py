@@ -27,7 +27,15 @@ __all__ = [
     "on_page",
     "rate_text",
     "short_labels",
+    "shown_unit",
 ]
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """Unit that takes a prefix, and the factor from SI to it: masses in grams, numbers bare."""
+    if unit == "kg":
+        return "g", 1e3
+    return ("", 1.0) if unit in ("1", "-") else (unit, 1.0)
 
 
 def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
@@ -38,9 +46,8 @@ def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
         return item.words[int(value)]
     if item.unit.startswith("dB"):
         return f"{value:.1f} {item.unit}"
-    if item.unit == "kg":
-        return format_si(1e3 * value, "g", digits)
-    return format_si(value, "" if item.unit == "1" else item.unit, digits)
+    unit, factor = shown_unit(item.unit)
+    return format_si(factor * value, unit, digits)
 
 
 def change(item: StudyColumn, value: float) -> str:
@@ -60,9 +67,8 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
         return in_words(item, value)
     if item.unit.startswith("dB"):
         return fixed(value, 1, item.unit)
-    if item.unit == "kg":
-        return quantity(1e3 * value, "g", digits)
-    return quantity(value, "" if item.unit == "1" else item.unit, digits)
+    unit, factor = shown_unit(item.unit)
+    return quantity(factor * value, unit, digits)
 
 
 EFFECT_COLUMNS = ("parameter", "size", "standard error", "mean", "scatter", "effects")
