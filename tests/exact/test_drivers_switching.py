@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.drive_profile import DriveProfile
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, When
 from klack.magnetics.flux_step import flux_numbers, flux_state, magnet_step
 from klack.magnetics.peak_hold import PeakHold
@@ -214,3 +215,144 @@ def test_nothing_is_divided_by_a_step_of_zero_length():
     assert status == 0
     assert np.all(np.isfinite(out))
     assert out[2 + state.size + 3] == pytest.approx(0.5 * (MAIN * 9e-12 + LEAK * 4e-12), rel=1e-14)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    level=st.floats(2.0, 8.0),
+    band=st.floats(0.1, 1.0),
+    freewheel=st.floats(0.5, 20.0),
+    step=st.floats(0.1e-6, 2e-6),
+)
+def test_even_profile_is_two_point_control(level, band, freewheel, step):
+    """Truth: exact; the same switching by two components."""
+    upper, lower = level + 0.5 * band, level - 0.5 * band
+    if band * INDUCTANCE * (1 / 40.0 + 1 / freewheel) < 0.2 * step:
+        return  # more than the guard against chatter allows
+    two = TwoPoint(voltage=40.0, upper=upper, lower=lower, freewheel=freewheel)
+    profile = DriveProfile(
+        time=(0.0, 1.0),
+        current=(level, level),
+        supply_voltage=40.0,
+        band=band,
+        freewheel=freewheel,
+    )
+
+    runs = [run(driver, steps=400, step=step, resistance=0.5) for driver in (two, profile)]
+
+    np.testing.assert_allclose(runs[1].current, runs[0].current, atol=1e-9 * upper)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    knots=st.lists(
+        st.tuples(st.floats(8e-6, 40e-6), st.sampled_from([0.0, 1.0, 2.0, 4.0])),
+        min_size=2,
+        max_size=7,
+    ),
+    jump=st.booleans(),
+    step=st.floats(0.1e-6, 2e-6),
+)
+def test_current_of_a_profile_is_a_chain_of_straight_lines(knots, jump, step):
+    """Truth: exact; the switching by hand, from one straight line to the next."""
+    time = np.concatenate(([3e-6], 3e-6 + np.cumsum([k[0] for k in knots])))
+    current = np.array([0.0, *(k[1] for k in knots)])
+    if jump:
+        time = np.append(time, time[-1])
+        current = np.append(current, 1.0 if current[-1] != 1.0 else 2.0)
+        time, current = np.append(time, time[-1] + 30e-6), np.append(current, current[-1])
+    if not current.any():
+        return
+    up, slow, fast, band = 40.0, 2.0, 30.0, 0.3
+    driver = DriveProfile(
+        time=tuple(time),
+        current=tuple(current),
+        supply_voltage=up,
+        band=band,
+        freewheel=slow,
+        decay=fast,
+    )
+    end = time[-1] + 20e-6
+
+    r = run(driver, steps=int(end / step), step=step)
+
+    at, value = _followed(time, current, up, slow, fast, band, end)
+    np.testing.assert_allclose(r.current, np.interp(r.time, at, value), atol=1e-7)
+
+
+def _followed(time, target, up, slow, fast, band, end):
+    """Corners of the current that follows a target through a coil without resistance."""
+    volts = {"on": up, "slow": -slow, "fast": -fast, "off": -fast}
+    t, i, state = 0.0, 0.0, "off"
+    corners = [(t, i)]
+    while t < end:
+        later = time[time > t + 1e-15]
+        until = min(later[0], end) if later.size else end
+        if t < time[0] or t >= time[-1]:
+            state, a, b = "off", 0.0, 0.0
+        else:
+            k = int(np.searchsorted(time, t, side="right")) - 1
+            a = float(np.interp(t, time[k : k + 2], target[k : k + 2]))
+            b = float(target[k + 1])
+            zero = target[k] == 0.0 and target[k + 1] == 0.0
+            state = "off" if zero else ("on" if state == "off" else state)
+        slope_of_target = (b - a) / (until - t)
+        for _ in range(3):
+            excess = i - a
+            if state == "on" and excess >= band / 2 - 1e-12:
+                state = "slow"
+            if state == "slow" and excess <= -band / 2 + 1e-12:
+                state = "on"
+            elif state == "slow" and excess >= band - 1e-12:
+                state = "fast"
+            if state == "fast" and excess <= band / 2 + 1e-12:
+                state = "slow"
+        slope = volts[state] / INDUCTANCE
+        if i <= 0.0 and slope < 0.0:
+            i, slope = 0.0, 0.0
+        goals = {"on": [0.5], "slow": [-0.5, 1.0], "fast": [0.5], "off": []}[state]
+        lasts = until - t
+        if slope < 0.0:
+            lasts = min(lasts, i / -slope)
+        for goal in goals:
+            closing = slope - slope_of_target
+            gap = a + goal * band - i
+            if closing != 0.0 and gap / closing > 1e-15:
+                lasts = min(lasts, gap / closing)
+        i = max(i + slope * lasts, 0.0) if i + slope * lasts > 1e-13 else 0.0
+        t = until if lasts == until - t else t + lasts
+        corners.append((t, i))
+    return np.array(corners).T
+
+
+def test_profile_of_a_voltage_gives_its_integral_and_no_negative_current():
+    profile = DriveProfile(
+        time=(1e-6, 3e-6, 3e-6, 9e-6), voltage=(0.0, 20.0, 10.0, 10.0), decay=30.0
+    )
+    r = run(profile, steps=600, step=0.1e-6)
+
+    area = 0.5 * 2e-6 * 20.0 + 6e-6 * 10.0
+    assert r.current.max() == pytest.approx(area / INDUCTANCE, rel=1e-9)
+    gone = 9e-6 + area / 30.0
+    falling = (r.time > 9e-6) & (r.time < gone)
+    expected = (area - 30.0 * (r.time[falling] - 9e-6)) / INDUCTANCE
+    np.testing.assert_allclose(r.current[falling], expected, atol=1e-9)
+    assert np.all(r.current[r.time > gone + 1e-7] == 0.0)
+
+
+def test_repeated_profile_does_not_drift():
+    r = run(
+        DriveProfile(
+            time=(0.0, 0.0, 4e-6, 4e-6),
+            voltage=(0.0, 12.0, 12.0, 0.0),
+            decay=12.0,
+            repeat_every=10.01e-6,
+        ),
+        steps=3003,
+        step=1e-6,
+    )
+
+    begin = 299 * 10.01e-6
+    k = np.flatnonzero((r.time > begin) & (r.time < begin + 4e-6))
+    top = 12.0 * 4e-6 / INDUCTANCE
+    assert r.current[k] == pytest.approx(12.0 * (r.time[k] - begin) / INDUCTANCE, abs=1e-9 * top)

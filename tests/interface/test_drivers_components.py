@@ -8,12 +8,13 @@ from pydantic import ValidationError
 
 from klack.errors import InputError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.drive_profile import DriveProfile
 from klack.magnetics.driver import (
+    DriveCourse,
     DriveProgram,
     Driver,
     DriveState,
     Switch,
-    VoltageCourse,
     When,
     driver_of,
 )
@@ -62,7 +63,21 @@ PEAK_HOLD = {
         (lambda: PeakHold(**PEAK_HOLD, peak_until=2e-3), "between start and end"),
         (lambda: VoltageTable(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 voltages"),
         (lambda: VoltageTable(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "decreasing times"),
-        (lambda: VoltageCourse([0.0, -1.0], [0.0, 0.0]), "decreasing times"),
+        (lambda: DriveProfile(time=(0.0, 1e-3)), "neither current nor voltage"),
+        (lambda: DriveProfile(time=(0.0, 1e-3), current=(1.0, 1.0)), "that the current is raised"),
+        (
+            lambda: DriveProfile(time=(0.0, 1e-3), current=(1.0, -1.0), supply_voltage=14.0),
+            "not negative, one of them above zero",
+        ),
+        (lambda: DriveProfile(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 values"),
+        (lambda: DriveProfile(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "0 s after 0.001 s"),
+        (lambda: DriveProfile(time=(1e-3, 1e-3), voltage=(1.0, 2.0)), "the last one after"),
+        (lambda: DriveProfile(time=(0.0, 1e-3), voltage=(1.0, 2.0), band=0.1), "'band' with a vol"),
+        (
+            lambda: DriveProfile(time=(0.0, 2e-3), voltage=(1.0, 2.0), repeat_every=1e-3),
+            "not shorter",
+        ),
+        (lambda: DriveCourse([0.0, -1.0], [0.0, 0.0]), "decreasing times"),
         (lambda: DriveProgram(()), "at least one state"),
         (
             lambda: DriveProgram((DriveState("on", 1.0, (Switch(When.TIME, 1.0, "of"),)),)),
@@ -81,7 +96,9 @@ def test_contradictions_have_one_clear_error(make, words):
         make()
 
 
-@pytest.mark.parametrize("word", ["voltage-step", "voltage-table", "two-point", "peak-hold", "pwm"])
+@pytest.mark.parametrize(
+    "word", ["voltage-step", "voltage-table", "drive-profile", "two-point", "peak-hold", "pwm"]
+)
 def test_case_files_know_the_drivers_by_their_words(word):
     made = component_class(word)
 

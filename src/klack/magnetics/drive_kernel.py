@@ -4,7 +4,15 @@ from typing import Any
 
 from klack.compiling.jit import inner
 
-__all__ = ["NEVER", "crossed_switch", "due_switch", "next_time", "state_block", "state_voltage"]
+__all__ = [
+    "NEVER",
+    "crossed_switch",
+    "due_switch",
+    "next_time",
+    "state_block",
+    "state_voltage",
+    "switch_current",
+]
 
 NEVER = 1e300
 """Time that does not come [s]."""
@@ -16,18 +24,66 @@ def state_block(par: Any, drive: int, state: int) -> int:
     return drive + int(par[drive + 1 + state])
 
 
+@inner(error_model="numpy")
+def _point_after(par: Any, course: int, time: float) -> int:
+    """Return the first point of a course that is later than ``time``."""
+    low, high = 0, int(par[course])
+    while low < high:
+        middle = (low + high) // 2
+        if par[course + 1 + middle] > time:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@inner(error_model="numpy")
+def _value_at(par: Any, course: int, time: float) -> float:
+    """Return the value of a course at a time since the start of the cycle."""
+    n = int(par[course])
+    i = _point_after(par, course, time)
+    if i == 0:
+        return par[course + 1 + n]
+    if i == n:
+        return par[course + n + n]
+    t0, t1 = par[course + i], par[course + 1 + i]
+    v0, v1 = par[course + n + i], par[course + n + 1 + i]
+    return v0 + (v1 - v0) * (time - t0) / (t1 - t0)
+
+
+@inner(error_model="numpy", forceinline=True)
+def state_voltage(par: Any, block: int, time: float) -> float:
+    """Return the voltage of a state at a time since the start of the cycle [V]."""
+    source = block + 3 + 4 * int(par[block + 2])
+    if par[block] == 1.0:
+        return _value_at(par, source, time)
+    return par[source]
+
+
+@inner(error_model="numpy", forceinline=True)
+def switch_current(par: Any, block: int, switch: int, time: float) -> float:
+    """Return the current of a switch [A] at a time since the start of the cycle."""
+    value = par[block + 4 + 4 * switch]
+    if par[block] == 2.0:
+        value += _value_at(par, block + 4 + 4 * int(par[block + 2]), time)
+    return value
+
+
 @inner(error_model="numpy", forceinline=True)
 def due_switch(
     par: Any, block: int, time: float, entered: float, cycle: float, current: float, close: float
 ) -> int:
-    """Return the first switch that is due now, by ``close`` at the latest; -1 if none."""
+    """Return the first switch that is due now, by ``close`` at the latest; -1 if none.
+
+    A target that jumps now has its later value.
+    """
     for k in range(int(par[block + 2])):
         s = block + 3 + 4 * k
         when, value = par[s], par[s + 1]
         if when == 0.0:
-            due = current >= value
+            due = current >= switch_current(par, block, k, time + close - cycle)
         elif when == 1.0:
-            due = current <= value
+            due = current <= switch_current(par, block, k, time + close - cycle)
         elif when == 2.0:
             due = time >= entered + value - close
         else:
@@ -39,7 +95,7 @@ def due_switch(
 
 @inner(error_model="numpy", forceinline=True)
 def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -> float:
-    """Return the next time at which the voltage of a state bends or a switch is due."""
+    """Return the next time at which a course of a state bends or a switch is due."""
     due = NEVER
     count = int(par[block + 2])
     for k in range(count):
@@ -48,50 +104,24 @@ def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -
             due = min(due, entered + par[s + 1])
         elif par[s] == 3.0:
             due = min(due, cycle + par[s + 1])
-    if par[block] == 1.0:
-        source = block + 3 + 4 * count
-        i = _point_after(par, source, time - cycle)
-        if i < int(par[source]):
-            due = min(due, cycle + par[source + 1 + i])
+    if par[block] != 0.0:
+        course = block + 3 + 4 * count
+        if par[block] == 2.0:
+            course += 1
+        i = _point_after(par, course, time - cycle)
+        if i < int(par[course]):
+            due = min(due, cycle + par[course + 1 + i])
     return due
 
 
 @inner(error_model="numpy", forceinline=True)
-def crossed_switch(par: Any, block: int, before: int, current: float) -> int:
-    """Return the first switch at or after ``before`` that an end current calls for; -1 if none."""
+def crossed_switch(par: Any, block: int, before: int, current: float, time: float) -> int:
+    """Return the first switch from ``before`` on that an end current calls for; -1 if none."""
     for k in range(before, int(par[block + 2])):
-        s = block + 3 + 4 * k
-        above, below = current > par[s + 1], current < par[s + 1]
-        if (par[s] == 0.0 and above) or (par[s] == 1.0 and below):
+        when = par[block + 3 + 4 * k]
+        if when > 1.0:
+            continue
+        value = switch_current(par, block, k, time)
+        if (when == 0.0 and current > value) or (when == 1.0 and current < value):
             return k
     return -1
-
-
-@inner(error_model="numpy")
-def _point_after(par: Any, source: int, time: float) -> int:
-    """Return the first point of a course that is later than ``time``."""
-    low, high = 0, int(par[source])
-    while low < high:
-        middle = (low + high) // 2
-        if par[source + 1 + middle] > time:
-            high = middle
-        else:
-            low = middle + 1
-    return low
-
-
-@inner(error_model="numpy", forceinline=True)
-def state_voltage(par: Any, block: int, time: float) -> float:
-    """Return the voltage of a state at a time since the start of the cycle [V]."""
-    source = block + 3 + 4 * int(par[block + 2])
-    if par[block] == 0.0:
-        return par[source]
-    n = int(par[source])
-    i = _point_after(par, source, time)
-    if i == 0:
-        return par[source + 1 + n]
-    if i == n:
-        return par[source + n + n]
-    t0, t1 = par[source + i], par[source + 1 + i]
-    u0, u1 = par[source + n + i], par[source + n + 1 + i]
-    return u0 + (u1 - u0) * (time - t0) / (t1 - t0)

@@ -4,6 +4,7 @@ A driver is in one *state* at a time.  The state says which voltage the terminal
 a course over time) and whether a diode keeps the current from turning negative; its *switches* say
 when it goes over into another one: current above or below a value, time in the state, or time
 since the start of the cycle.  Switches are looked at in their order; the first that is due wins.
+A state may have a *target*, a current over time: the currents of its switches count from there.
 
 With a diode the coil is left open once its current has come down to zero, and is connected again
 when the driver offers more than the coil induces, :math:`u > \dot\psi`.  Freewheeling is a state
@@ -33,12 +34,13 @@ from klack.network.rows import Rows
 from klack.units import Time, Voltage
 
 __all__ = [
+    "DiodeDriver",
+    "DriveCourse",
     "DriveProgram",
     "DriveState",
     "Driver",
     "Switch",
     "TimedDriver",
-    "VoltageCourse",
     "When",
     "driver_of",
 ]
@@ -61,7 +63,8 @@ class Switch:
     ----------
     when : When
     value : float [A] or [s]
-        Times in the state count from entering it, ``When.TIME`` from the start of the cycle.
+        Times in the state count from entering it, ``When.TIME`` from the start of the cycle;
+        currents count from the target of the state, if it has one.
     to : str
         Name of the next state.
     new_cycle : bool
@@ -75,32 +78,36 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VoltageCourse:
-    """Voltage over time since the start of the cycle, straight between its points.
+class DriveCourse:
+    """Voltage or current over time since the start of the cycle, straight between its points.
 
     Parameters
     ----------
     time : array, shape (n,) [s]
         Not falling; a time that stands twice is a jump.
-    voltage : array, shape (n,) [V]
+    value : array, shape (n,) [V] or [A]
         Constant before the first and after the last point.
     """
 
     time: NDArray[np.float64]
-    voltage: NDArray[np.float64]
+    value: NDArray[np.float64]
 
-    def __init__(self, time: ArrayLike, voltage: ArrayLike) -> None:
-        t, u = np.array(time, dtype=float).ravel(), np.array(voltage, dtype=float).ravel()
-        if t.size != u.size or t.size == 0 or np.any(np.diff(t) < 0):
+    def __init__(self, time: ArrayLike, value: ArrayLike) -> None:
+        t, v = np.array(time, dtype=float).ravel(), np.array(value, dtype=float).ravel()
+        if t.size != v.size or t.size == 0 or np.any(np.diff(t) < 0):
             raise InputError(
-                "VoltageCourse",
-                got=f"{t.size} times and {u.size} voltages"
-                + (", decreasing times" if t.size == u.size > 0 else ""),
-                expected="as many times as voltages, at least one, not decreasing",
+                "DriveCourse",
+                got=f"{t.size} times and {v.size} values"
+                + (", decreasing times" if t.size == v.size > 0 else ""),
+                expected="as many times as values, at least one, not decreasing",
                 hint="sort the points by time; write a jump as the same time twice.",
             )
         object.__setattr__(self, "time", t)
-        object.__setattr__(self, "voltage", u)
+        object.__setattr__(self, "value", v)
+
+    def numbers(self) -> list[float]:
+        """Flat course for the compiled step: ``n, times, values``."""
+        return [float(self.time.size), *self.time, *self.value]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,17 +117,20 @@ class DriveState:
     Parameters
     ----------
     name : str
-    voltage : float [V] or VoltageCourse
+    voltage : float [V] or DriveCourse
     switches : tuple of Switch
         The first that is due wins.
     diode : bool
         Whether the current cannot turn negative.
+    target : DriveCourse [A], optional
+        Where the currents of the switches count from; with a constant voltage only.
     """
 
     name: str
-    voltage: float | VoltageCourse
+    voltage: float | DriveCourse
     switches: tuple[Switch, ...] = ()
     diode: bool = True
+    target: DriveCourse | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,8 +164,9 @@ class DriveProgram:
         """Flat program for the compiled step.
 
         ``[n] | offset of each state | states``; a state is ``source, diode, n switches`` and four
-        numbers per switch ``when, value, next state, new cycle``; then ``voltage`` (source 0) or
-        ``n, times, voltages`` (source 1).  Offsets count from the start of the program.
+        numbers per switch ``when, value, next state, new cycle``; then ``voltage`` (source 0),
+        ``n, times, voltages`` (source 1), or ``voltage, n, times, currents`` of the target
+        (source 2).  Offsets count from the start of the program.
         """
         names = [state.name for state in self.states]
         blocks = [_block(state, names) for state in self.states]
@@ -166,6 +177,13 @@ class DriveProgram:
 
 def _check(state: DriveState, switch: Switch, names: Sequence[str]) -> None:
     where = f"DriveState '{state.name}'"
+    if state.target is not None and isinstance(state.voltage, DriveCourse):
+        raise InputError(
+            where,
+            got="a voltage over time and a target current",
+            expected="a constant voltage with a target",
+            hint="the switches of the state follow the target.",
+        )
     if switch.to not in names or (switch.to == state.name and not switch.new_cycle):
         raise InputError(
             where,
@@ -188,12 +206,12 @@ def _block(state: DriveState, names: Sequence[str]) -> NDArray[np.float64]:
         for s in state.switches
         for number in (float(s.when), s.value, float(names.index(s.to)), float(s.new_cycle))
     ]
-    if isinstance(state.voltage, VoltageCourse):
-        course = state.voltage
-        source = [float(course.time.size), *course.time, *course.voltage]
+    if isinstance(state.voltage, DriveCourse):
+        kind, source = 1.0, state.voltage.numbers()
+    elif state.target is not None:
+        kind, source = 2.0, [state.voltage, *state.target.numbers()]
     else:
-        source = [state.voltage]
-    kind = float(isinstance(state.voltage, VoltageCourse))
+        kind, source = 0.0, [state.voltage]
     return np.array([kind, float(state.diode), float(len(state.switches)), *switches, *source])
 
 
@@ -214,18 +232,13 @@ class Driver(Component):
         """Add nothing: the coil runs the program."""
 
 
-class TimedDriver(Driver):
-    """A driver that works from ``start`` to ``end``, perhaps again and again.
+class DiodeDriver(Driver):
+    """A driver that works from some time to another, perhaps again and again.
 
     Before and after, the coil sees the decay voltage against its current through a diode: what
     flows comes down fast, and then the coil is open.
     """
 
-    start: Time = Field(default=0.0, ge=0, description="When the driver switches on.")
-    end: Time | None = Field(default=None, gt=0, description="When it switches off; default never.")
-    repeat_every: Time | None = Field(
-        default=None, gt=0, description="Period of repetition; default no repetition."
-    )
     freewheel: Voltage = Field(
         default=0.7, ge=0, description="Forward voltage of the diode while the coil freewheels."
     )
@@ -235,6 +248,49 @@ class TimedDriver(Driver):
         description="Voltage against the current after the end (zener diode, boost "
         "capacitor); default that of freewheeling.",
     )
+    repeat_every: Time | None = Field(
+        default=None, gt=0, description="Period of repetition; default no repetition."
+    )
+
+    @property
+    def down(self) -> float:
+        """Voltage at the coil while the driver is off [V]."""
+        return -(self.freewheel if self.decay is None else self.decay)
+
+    def between(self, start: float, end: float | None, *working: DriveState) -> DriveProgram:
+        """Program of the working states, the first one entered at ``start``, left at ``end``."""
+        states = [DriveState("idle", self.down, (Switch(When.TIME, start, working[0].name),))]
+        for state in working:
+            over = () if end is None else (Switch(When.TIME, end, "off"),)
+            states.append(replace(state, switches=(*over, *state.switches)))
+        if end is not None:
+            again: tuple[Switch, ...] = ()
+            if self.repeat_every is not None:
+                again = (Switch(When.TIME, self.repeat_every, "idle", new_cycle=True),)
+            states.append(DriveState("off", self.down, again))
+        return DriveProgram(tuple(states))
+
+    def require_period(self, end: float | None) -> None:
+        """Raise if the driver would start again before its end.
+
+        Raises
+        ------
+        CaseProblem
+        """
+        if self.repeat_every is not None and (end is None or self.repeat_every < end):
+            raise CaseProblem(
+                ("repeat_every",),
+                got=f"a period of {self.repeat_every:g} s",
+                expected="an end, and a period that is not shorter",
+                hint="give an end, or a longer period.",
+            )
+
+
+class TimedDriver(DiodeDriver):
+    """A driver that works from ``start`` to ``end``."""
+
+    start: Time = Field(default=0.0, ge=0, description="When the driver switches on.")
+    end: Time | None = Field(default=None, gt=0, description="When it switches off; default never.")
 
     @model_validator(mode="after")
     def _order_of_times(self) -> Self:
@@ -245,28 +301,12 @@ class TimedDriver(Driver):
                 expected=f"a time after the start at {self.start:g} s",
                 hint="times count from the start of the run.",
             )
-        if self.repeat_every is not None and (self.end is None or self.repeat_every < self.end):
-            raise CaseProblem(
-                ("repeat_every",),
-                got=f"a period of {self.repeat_every:g} s",
-                expected="an end, and a period that is not shorter",
-                hint="give 'end', or a longer period.",
-            )
+        self.require_period(self.end)
         return self
 
     def framed(self, *working: DriveState) -> DriveProgram:
         """Program of the working states, the first one entered at ``start``, with both ends."""
-        down = -(self.freewheel if self.decay is None else self.decay)
-        states = [DriveState("idle", down, (Switch(When.TIME, self.start, working[0].name),))]
-        for state in working:
-            end = () if self.end is None else (Switch(When.TIME, self.end, "off"),)
-            states.append(replace(state, switches=(*end, *state.switches)))
-        if self.end is not None:
-            again: tuple[Switch, ...] = ()
-            if self.repeat_every is not None:
-                again = (Switch(When.TIME, self.repeat_every, "idle", new_cycle=True),)
-            states.append(DriveState("off", down, again))
-        return DriveProgram(tuple(states))
+        return self.between(self.start, self.end, *working)
 
 
 def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:

@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.input.problem import CaseProblem
-from klack.magnetics.driver import DriveProgram, Driver, DriveState, VoltageCourse
+from klack.magnetics.driver import DriveCourse, DriveProgram, Driver, DriveState
 from klack.units import Time, Voltage
 
 __all__ = ["VoltageTable"]
@@ -39,5 +39,5 @@ class VoltageTable(Driver):
 
     def program(self) -> DriveProgram:
         """One state."""
-        course = VoltageCourse(self.time, self.voltage)
+        course = DriveCourse(self.time, self.voltage)
         return DriveProgram((DriveState("table", course, diode=False),))

@@ -43,6 +43,7 @@ COMPONENTS = (
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
     ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
     ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),
+    ("drive-profile", "klack.magnetics.drive_profile.DriveProfile"),
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),

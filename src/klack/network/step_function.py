@@ -145,8 +145,8 @@ def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any)
     signature = types.int64(address, par, state, inp, out)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer_type = context.get_value_type(_POINTER)
-        prototype = ir.FunctionType(context.get_value_type(types.int64), [pointer_type] * 4)
+        kinds = [context.get_value_type(kind) for kind in sig.args[1:]]
+        prototype = ir.FunctionType(context.get_value_type(types.int64), kinds)
         function = builder.inttoptr(args[0], prototype.as_pointer())
         return builder.call(function, args[1:])
 
