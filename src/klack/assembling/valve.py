@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import assemble_body, find_touch, mesh_body
 from klack.assembling.damping_choice import damping_of
@@ -34,6 +35,9 @@ from klack.reduction.structure import Structure
 from klack.stages import warnings_of
 
 __all__ = ["Valve", "build_valve", "build_valve_bodies", "filled_network"]
+
+_FEW = 100_000
+"""Unknowns of all bodies up to which several threads cost more than they save."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,12 +74,29 @@ def build_valve(
 ) -> Valve:
     """Mesh and factorise each body once, solve the static contact of each stop, reduce, join.
 
+    Parameters
+    ----------
+    case : ValveCase
+    progress : callable
+    threads : int, optional
+        Of the solvers, which decide the last bits; all cores by default.  Bodies of few unknowns
+        take one in any case, which is faster: their bits are the same on any number of cores.
+
     Raises
     ------
     InputError
         For geometry, surfaces, supports or connections that cannot be used.
     """
     bodies = build_valve_bodies(case, progress)
+    if sum(body.dof_count for body in bodies.values()) <= _FEW:
+        threads = 1
+    with threadpool_limits(limits=threads, user_api="blas"):
+        return _built(case, bodies, progress, threads)
+
+
+def _built(
+    case: ValveCase, bodies: Mapping[str, ElasticBody], progress: Progress, threads: int | None
+) -> Valve:
     flexibilities: dict[str, Flexibility] = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("factorise", i / len(bodies))

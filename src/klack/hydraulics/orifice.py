@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from klack.compiling.constant import with_slope_of
 from klack.compiling.jit import njit
 from klack.hydraulics.network_fluid import ambient_viscosity
 from klack.input.problem import CaseProblem
@@ -123,7 +124,10 @@ def orifice_flow(
     drop = abs(p_a - p_b)
     root = sqrt(2.0 * density * drop)
     t, ratio = _tanh(number * root)
-    flow = conductance * root * t
+    # without a drop the root has no slope, but the flow has
+    flow = with_slope_of(
+        conductance * root * t, 2.0 * conductance * number * density * drop * ratio
+    )
     slope = conductance * number * density * (ratio + 1.0 - t * t)
     flow, up, down = choked_flow(
         flow, slope, -slope, p_a if forward else p_b, density, throat, vapour

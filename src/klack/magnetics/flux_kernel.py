@@ -41,15 +41,18 @@ __all__ = [
 
 
 @intrinsic(prefer_literal=True)
-def stack(typingctx: Any, size: Any) -> Any:
-    """Return ``size`` (a literal) numbers of work space on the stack of the calling function."""
+def stack(typingctx: Any, of: Any, size: Any) -> Any:
+    """Return ``size`` (a literal) numbers of work space on the stack of the calling function.
+
+    They are of the kind that ``of``, a pointer, points to.
+    """
     if not isinstance(size, types.IntegerLiteral):
         return None
-    signature = types.CPointer(types.float64)(size)
+    signature = of(of, size)
     count = size.literal_value
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        number = context.get_value_type(types.float64)
+        number = context.get_value_type(sig.args[0].dtype)
         return cgutils.alloca_once(builder, number, size=count)
 
     return signature, codegen
@@ -349,7 +352,7 @@ def circuit_step(
     is open: no current, whatever the voltage.  The current is eliminated last, so that a small
     resistance does no harm.  False if the iteration does not settle.
     """
-    A, g, z = stack(36), stack(6), stack(6)
+    A, g, z = stack(phi, 36), stack(phi, 6), stack(phi, 6)
     loops, tubes = int(par[at]), int(par[at + 1])
     turns = at + _HEADER
     most = int(par[at + 2])

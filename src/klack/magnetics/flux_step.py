@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from klack.compiling.constant import constant
 from klack.compiling.jit import inner
 from klack.errors import require_positive
 from klack.magnetics.circuit import MagneticCircuit
@@ -29,6 +30,7 @@ from klack.magnetics.drive_kernel import (
     next_time,
     state_block,
     state_voltage,
+    switch_current,
 )
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_kernel import (
@@ -164,16 +166,18 @@ def _locate(
     before: float,
     after: float,
     target: float,
+    rise: float,
 ) -> tuple[float, float]:
-    """Length of the piece at whose end the current is ``target``, and its mean current.
+    """Length of the piece at whose end the current meets its target, and its mean current.
 
-    The length is negative if that fails.  ``change`` comes with the change over ``length`` and
+    The target is ``target`` now and rises evenly by ``rise`` over ``length``.  The length is
+    negative if that fails.  ``change`` comes with the change over ``length`` and
     leaves with that of the located piece.
     """
-    middle, end, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
+    middle, end, slope = stack(phi, _TUBES), stack(phi, _TUBES), stack(phi, _TUBES)
     loops = int(par[at])
     low, high = 0.0, length
-    f_low, f_high = before - target, after - target
+    f_low, f_high = before - target, after - target - rise
     accepted = _LOCATED * (abs(target) + abs(before))
     side = 0
     size = length
@@ -187,7 +191,7 @@ def _locate(
         found, mean = _advance(par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True)
         if not found:
             return -1.0, 0.0
-        f = _current(par, at, hints, phi, change, end) - target
+        f = _current(par, at, hints, phi, change, end) - target - rise * (size / length)
         if abs(f) <= accepted or high - low <= _LOCATED * length:
             return size, mean
         if f * f_high > 0.0:
@@ -204,19 +208,25 @@ def _locate(
 
 
 @inner(error_model="numpy", forceinline=True)
-def _crossing(par: Any, block: int, current: float, end: float) -> tuple[float, int]:
-    """Return the current and the first transition before ``end``."""
-    target, which, earliest = 0.0, _NONE, 2.0
+def _crossing(
+    par: Any, block: int, current: float, end: float, begin: float, over: float
+) -> tuple[float, float, int]:
+    """Return the first transition before ``end``, its current now, and how far that rises.
+
+    ``begin`` and ``over`` are the times of the two ends since the start of the cycle.
+    """
+    target, rise, which, earliest = 0.0, 0.0, _NONE, 2.0
     if par[block + 1] != 0.0 and end < 0.0:
         which, earliest = _BLOCKS, current / (current - end)
-    k = crossed_switch(par, block, 0, end)
+    k = crossed_switch(par, block, 0, end, over)
     while k >= 0:
-        value = par[block + 4 + 4 * k]
-        part = (value - current) / (end - current)
+        value = switch_current(par, block, k, begin)
+        more = switch_current(par, block, k, over) - value
+        part = (value - current) / (end - current - more)
         if part < earliest:
-            target, which, earliest = value, k, part
-        k = crossed_switch(par, block, k + 1, end)
-    return target, which
+            target, rise, which, earliest = value, more, k, part
+        k = crossed_switch(par, block, k + 1, end, over)
+    return target, rise, which
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -247,9 +257,9 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     mode, entered, cycle = state[0], state[1], state[2]
     is_open, current, last = state[3] != 0.0, state[4], state[7]
     # on the stack, where nothing else can be meant: the compiler keeps what it has read
-    phi, rate, bend, change, told_of = stack(6), stack(6), stack(6), stack(6), stack(6)
-    hints = stack(_SPOTS)
-    middle, final, slope = stack(_TUBES), stack(_TUBES), stack(_TUBES)
+    phi, rate, bend = stack(out, 6), stack(out, 6), stack(out, 6)
+    change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, _SPOTS)
+    middle, final, slope = stack(out, _TUBES), stack(out, _TUBES), stack(out, _TUBES)
     for j in range(loops):
         phi[j] = state[_FRONT + j]
         rate[j] = state[_FRONT + loops + j]
@@ -289,7 +299,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             piece = due
         longest = min(longest, max(2.0 * last if last > 0.0 else _FIRST * h, _LEAST * h))
         if longest < piece - close:
-            piece, whole = longest, False
+            piece, whole = constant(longest), False
         if piece != h:
             per_time = 1.0 / piece
         xa = x0 if done == 0.0 else x0 + speed * done
@@ -297,7 +307,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         voltage = state_voltage(par, block, now + 0.5 * piece - cycle)
         ahead = 0.5 * (last + piece)
         for j in range(loops):
-            told_of[j] = change[j] = piece * (rate[j] + bend[j] * ahead)
+            told_of[j] = change[j] = constant(piece * (rate[j] + bend[j] * ahead))
         _gaps(par, at, hints, xa, xb, middle, final, slope)
         found, mean = _advance(
             par, at, hints, phi, change, middle, final, per_time, voltage, not is_open
@@ -326,7 +336,10 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         which = _NONE
         if not is_open:
             end = _current(par, at, hints, phi, change, final)
-            target, which = _crossing(par, block, current, end)
+            begin, within = now - cycle, min(close, 0.25 * piece)  # a target may jump at the ends
+            target, rise, which = _crossing(
+                par, block, current, end, begin + within, begin + piece - within
+            )
             if which != _NONE:
                 if which == _BLOCKS and current <= 0.0:
                     is_open = blocked = True
@@ -335,15 +348,28 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                     if events > _MOST_EVENTS:
                         return 2
                     continue
+                length = piece
                 piece, mean = _locate(
-                    par, at, hints, phi, change, xa, speed, piece, voltage, current, end, target
+                    par,
+                    at,
+                    hints,
+                    phi,
+                    change,
+                    xa,
+                    speed,
+                    length,
+                    voltage,
+                    current,
+                    end,
+                    target,
+                    rise,
                 )
                 if piece <= 0.0:
                     return 1
                 per_time = 1.0 / piece
                 whole = False
                 xb = xa + speed * piece
-                end = target
+                end = target + rise * (piece / length)
                 _gaps(par, at, hints, xa, xb, middle, final, slope)
                 through = linked(par, at, change)
             heat = par[1] * mean * mean * piece

@@ -8,8 +8,9 @@ general step.
 
 from typing import Any
 
+from klack.compiling.constant import constant
 from klack.compiling.jit import inner
-from klack.magnetics.drive_kernel import state_block
+from klack.magnetics.drive_kernel import due_switch, next_time, state_block
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 
@@ -46,11 +47,30 @@ def allowed_bend(h: float) -> float:
     return min(rough * rough, _ROUGHEST)
 
 
+@inner(error_model="numpy")
+def _quiet_about(
+    par: Any, block: int, state: Any, begin: float, end: float, current: float
+) -> bool:
+    """The same for a state with a target, which must not bend in between."""
+    entered, cycle = state[1], state[2]
+    return (
+        next_time(par, block, begin, entered, cycle) > end
+        and due_switch(par, block, begin, entered, cycle, state[4], 0.0) < 0
+        and due_switch(par, block, end, entered, cycle, current, 0.0) < 0
+    )
+
+
 @inner(error_model="numpy", forceinline=True)
-def _quiet_until(par: Any, block: int, state: Any, end: float, current: float) -> bool:
-    """Whether no switch of a state is due up to the time ``end`` and its current."""
+def _quiet_until(
+    par: Any, block: int, state: Any, begin: float, end: float, current: float
+) -> bool:
+    """Whether no switch of a state is due from now up to the time ``end`` and its current."""
+    if par[block] == 1.0:
+        return False
+    if par[block] == 2.0:
+        return _quiet_about(par, block, state, begin, end, current)
     low, high = min(state[4], current), max(state[4], current)
-    quiet = par[block] == 0.0
+    quiet = True
     for k in range(int(par[block + 2])):
         s = block + 3 + 4 * k
         when, value = par[s], par[s + 1]
@@ -99,7 +119,8 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
     rate0, rate1 = state[_RATE], state[_RATE + 1]
     last = state[7]
     ahead = 0.5 * (last + h)
-    d0, d1 = h * (rate0 + state[_BEND] * ahead), h * (rate1 + state[_BEND + 1] * ahead)
+    d0 = constant(h * (rate0 + state[_BEND] * ahead))
+    d1 = constant(h * (rate1 + state[_BEND + 1] * ahead))
     g0 = g1 = a00 = a10 = a11 = 0.0
     p = first
     reluctance = gap_mean
@@ -186,7 +207,7 @@ def quiet_step(par: Any, state: Any, inp: Any, out: Any) -> bool:
         voltage = through
     elif par[drive + 1] != 0.0 and current < 0.0:
         return False
-    if not _quiet_until(par, drive, state, inp[0] + h, current):
+    if not _quiet_until(par, drive, state, inp[0], inp[0] + h, current):
         return False
 
     out[0], out[1] = force, -force

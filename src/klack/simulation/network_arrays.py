@@ -10,6 +10,7 @@ from klack.simulation.delay_line import Lines, LineState
 __all__ = [
     "AHEAD",
     "ANSWER",
+    "AT_ONCE",
     "BEFORE",
     "BEFORE_2",
     "BEFORE_3",
@@ -72,6 +73,9 @@ FINE, COARSE, NEAR, MIDDLE, CUT = 0, 1, 2, 3, 4
 """The fine step; macro steps of many of them, in flight and about a touch; sub-steps of a few, for
 smooth films; and parts of a sub-step in which a contact closes or opens."""
 
+
+AT_ONCE = 1e30
+"""Rate [1/s] of what follows at once, whatever the step: infinite has no derivative."""
 
 PARTS = 8
 """Parts of each fine step in a sub-step that is cut."""

@@ -25,6 +25,7 @@ from klack.simulation.modal_step import (
     ROW_V,
 )
 from klack.simulation.network_arrays import (
+    AT_ONCE,
     FINE,
     LOSS,
     PORTS,
@@ -392,7 +393,7 @@ def _nodes(
         p=p,
         before=p.copy(),
         g=g,
-        rate=np.full(count, np.inf),
+        rate=np.full(count, AT_ONCE),
         slope=np.zeros(count),
         hint=hint,
     )

@@ -144,7 +144,7 @@ def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
             u, low = rows.upper[c], rows.lower[c]
             _solve_interface(contacts, S, c, step)
             change = trial.contact[c] + trial.film[c] - trial.force[c]
-            if change != 0.0:
+            if change != 0.0 or trial.force[c] != 0.0:
                 trial.force[c] += change
                 S[FORCE + u] += change
                 S[FORCE + low] -= change

@@ -160,6 +160,7 @@ def run_network(
     M: int,
     near: int,
     R: int,
+    origin: float,
     h: float,
     allow_macro: bool,
     network: NetworkArrays,
@@ -170,8 +171,8 @@ def run_network(
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
     ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while films are
-    smooth.  ``clock`` counts: see :data:`CLOCK`; ``report`` gets the row of a failure,
-    its status and its time.
+    smooth.  ``clock`` counts: see :data:`CLOCK`; its time zero is at ``origin``.  ``report`` gets
+    the row of a failure, its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
@@ -180,7 +181,7 @@ def run_network(
     in_record, record, record_time = 0, 0, 0.0
     for _macro in range(macros):
         together = allow_macro
-        flight = together and may_fly(contacts, now * h, M * h)
+        flight = together and may_fly(contacts, origin + now * h, M * h)
         smooth, apart = R > 1, True
         done = 0
         while done < M:
@@ -198,8 +199,9 @@ def run_network(
                 smooth = smooth and smooth_films(contacts, near * h, R * h)
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
-            step = Step(level, steps, now * h, steps * h, 1.0 / (steps * h))
-            sub = Step(of_sub, steps // parts, now * h, steps // parts * h, parts / (steps * h))
+            begin = origin + now * h
+            step = Step(level, steps, begin, steps * h, 1.0 / (steps * h))
+            sub = Step(of_sub, steps // parts, begin, steps // parts * h, parts / (steps * h))
             if at != of_sub:
                 bring(bodies, at, of_sub)
                 at = of_sub

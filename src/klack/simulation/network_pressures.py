@@ -7,7 +7,7 @@ import numpy as np
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step
+from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
 from klack.simulation.step_status import (
@@ -452,7 +452,7 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
         state.held[i] = V[i]
         state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
         if abs(trial.slope[i] - state.slope[i]) > _CURVED * trial.slope[i]:
-            state.rate[i] = np.inf  # boiling, or about to fill
+            state.rate[i] = AT_ONCE  # boiling, or about to fill
         state.slope[i] = trial.slope[i]
     for i in range(nodes.volumes, nodes.nodes):
         accounts.supply[i - nodes.volumes] -= g[i] * inflow[i]

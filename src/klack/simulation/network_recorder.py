@@ -94,7 +94,7 @@ class Recorder:
             *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
         ]
         self.peaks = [_Column(f"{row.component} peak force", "N") for row in rows.interfaces]
-        self._moving = {rows.bodies[b].component: 2 * len(ports) + i for i, b in enumerate(free)}
+        self.moving = {rows.bodies[b].component: 2 * len(ports) + i for i, b in enumerate(free)}
         count = len(rows.interfaces)
         columns = len(self.means) + len(self.points) + count
         _require_memory(records, columns)
@@ -221,7 +221,7 @@ class Recorder:
 
     def _velocities(self, count: int) -> dict[str, Vector]:
         """Of the centres of mass [m/s] in the present chunk, by component."""
-        return {name: self.recording.points[:count, i] for name, i in self._moving.items()}
+        return {name: self.recording.points[:count, i] for name, i in self.moving.items()}
 
     def _thin(self, count: int) -> None:
         """Records of the present chunk: means of means, largest peaks, last points."""

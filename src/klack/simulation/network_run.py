@@ -51,7 +51,7 @@ from klack.simulation.step_status import (
 )
 from klack.units import format_si
 
-__all__ = ["has_python_steps", "simulate_network"]
+__all__ = ["Grid", "grid_of", "has_python_steps", "simulate_network"]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
@@ -129,7 +129,7 @@ def simulate_network(
             require_positive(f"simulate_network: {name}", value, "s")
     sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
     network = compile_network(rows, sizes)
-    grid = _grid(duration, sizes, record)
+    grid = grid_of(duration, sizes, record)
     step = sizes.step
     chunk = _PYTHON_CHUNK if has_python_steps(rows) else _CHUNK
     recorder = Recorder(
@@ -206,7 +206,7 @@ def simulate_network(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Grid:
+class Grid:
     """How fine steps make blocks, blocks looks, and looks records."""
 
     sizes: StepSizes
@@ -226,13 +226,14 @@ class _Grid:
         return self.look * self.block
 
 
-def _grid(duration: float, sizes: StepSizes, record: float) -> _Grid:
+def grid_of(duration: float, sizes: StepSizes, record: float) -> Grid:
+    """Choose blocks and looks of a run: see :func:`simulate_network`."""
     step, block = sizes.step, sizes.coarse
     if block == 1:  # no macro steps: as many fine ones at a time as divide a record
         block = largest_divisor(max(1, round(record / step)), _BLOCK)
     of_record = max(1, round(record / (block * step)))
     look = largest_divisor(of_record, int(_LOOK / (block * step)))
-    return _Grid(
+    return Grid(
         sizes=sizes,
         block=block,
         look=look,
@@ -253,7 +254,7 @@ def _run(
     finder: ImpactFinder,
     limits: Limits,
     clock: NDArray[np.int64],
-    grid: _Grid,
+    grid: Grid,
     progress: Callable[[float], None],
 ) -> ConvergenceError | None:
     """Run chunk by chunk; the error that ended it early, with the record up to the look before."""
@@ -284,7 +285,7 @@ def _up_to(
     recorder: Recorder,
     limits: Limits,
     clock: NDArray[np.int64],
-    grid: _Grid,
+    grid: Grid,
     kept: Kept,
     good: int,
     failure: ConvergenceError,
@@ -325,7 +326,7 @@ def _try_chunk(
     recorder: Recorder,
     limits: Limits,
     clock: NDArray[np.int64],
-    grid: _Grid,
+    grid: Grid,
     count: int,
 ) -> tuple[int, ConvergenceError | None]:
     """Advance by so many looks; how many of them are good, and why not all."""
@@ -360,7 +361,7 @@ def _try_chunk(
 
 
 def _compile(
-    network: CompiledNetwork, recording: Recording, clock: NDArray[np.int64], grid: _Grid
+    network: CompiledNetwork, recording: Recording, clock: NDArray[np.int64], grid: Grid
 ) -> None:
     """Compile the time loop, or load it, by a run of no steps: not a part of its wall time."""
     _advance(network, recording, clock, grid, 0, report=np.zeros(3))
@@ -370,7 +371,7 @@ def _advance(
     network: CompiledNetwork,
     recording: Recording,
     clock: NDArray[np.int64],
-    grid: _Grid,
+    grid: Grid,
     macros: int,
     *,
     report: Vector,
@@ -382,6 +383,7 @@ def _advance(
         grid.block,
         grid.sizes.near,
         grid.sizes.middle,
+        0.0,
         grid.step,
         grid.sizes.coarse > 1,
         network.arrays,

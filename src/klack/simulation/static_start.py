@@ -60,7 +60,7 @@ from klack.simulation.static_newton import (
 from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.units import format_si
 
-__all__ = ["start_at_rest"]
+__all__ = ["RestState", "begin_at_rest", "start_at_rest"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -98,6 +98,15 @@ class _State:
         return _State(self.z.copy(), self.y.copy(), self.p.copy(), self.m.copy())
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RestState:
+    """Equilibrium of a network, from which that of one hardly different is found at once."""
+
+    _state: _State
+    _held: frozenset[int]
+    _enclosed: bool
+
+
 class _RunawayError(Exception):
     """The bodies that go far, or the volumes whose pressure has no end."""
 
@@ -130,13 +139,28 @@ def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
     AccuracyWarning
         For a volume whose pressure has no steady state; it starts from ambient pressure.
     """
-    held: set[int] = set()
+    return begin_at_rest(network, step)[0]
+
+
+def begin_at_rest(
+    network: CompiledNetwork, step: float, near: RestState | None = None
+) -> tuple[StaticStart, RestState]:
+    """:func:`start_at_rest`, from the equilibrium of a network that hardly differs.
+
+    Parameters
+    ----------
+    network, step
+        As of :func:`start_at_rest`.
+    near : RestState, optional
+        Of a network of the same parts; it has warned already.
+    """
+    held = set(near._held) if near is not None else set[int]()
     notes: list[str] = []
-    enclosed = False
+    enclosed = near is not None and near._enclosed
     while True:
         problem = _Balance(network, step, held, enclosed=enclosed)
         try:
-            state = _march(problem)
+            state = _march(problem, None if near is None else near._state)
             break
         except _RunawayError as away:
             if away.volumes:
@@ -147,17 +171,19 @@ def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
             else:
                 raise _unheld(network, away.bodies) from None
     for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=3)
-    return problem.put(state, tuple(notes))
+        warnings.warn(note, AccuracyWarning, stacklevel=4)
+    found = RestState(state, frozenset(held), enclosed)
+    return problem.put(state, tuple(notes)), found
 
 
-def _march(problem: "_Balance") -> _State:
-    """Lead the start through pseudo-time to the equilibrium.
+def _march(problem: "_Balance", near: _State | None) -> _State:
+    """Lead the start through pseudo-time to the equilibrium, with long steps from a near one.
 
     A body that is held by nothing and on which nothing acts stays: in a long step it would drift.
     """
-    state, step = problem.first(), problem.step
-    tau, longest = _FIRST * step, _LONGEST * step
+    state, step = problem.first() if near is None else near.copy(), problem.step
+    longest = _LONGEST * step
+    tau = _FIRST * step if near is None else longest
     while tau >= _SHORTEST * step:
         open_modes = problem.unbalanced(state)
         if open_modes is None:

@@ -1,0 +1,87 @@
+"""``klack sensitivities``: derivatives of the measures of a stroke with its parameters."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from klack.terminal.options import CaseArgument, Components, imported, require_files
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED, Wanted
+
+__all__ = ["sensitivities"]
+
+_File = Annotated[
+    Path | None,
+    Parameter(name="--study", help="File with a section 'study'. [default: that of the case]"),
+]
+_Names = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--parameter",
+        consume_multiple=True,
+        negative="",
+        help="Keys of the case, network.components.spring.preload, or parameters of the study. "
+        "[default: those of the study]",
+    ),
+]
+_Measures = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--measure",
+        consume_multiple=True,
+        negative="",
+        help="closing_time, seat.peak_force, ... [default: those of the study, or the main ones]",
+    ),
+]
+_Variant = Annotated[
+    str | None, Parameter(name="--variant", help="Of the stroke. [default: the first one]")
+]
+_Check = Annotated[
+    bool, Parameter(name="--check", help="Compare with strokes with all parameters changed by 1 %.")
+]
+
+
+def sensitivities(
+    case: CaseArgument,
+    /,
+    *,
+    study: _File = None,
+    parameter: _Names = None,
+    measure: _Measures = None,
+    variant: _Variant = None,
+    check: _Check = True,
+    component: Components = None,
+    wanted: Wanted = WANTED,
+) -> int:
+    """Derivatives of times and impacts of a stroke with its parameters, by exact tangents."""
+    if study is not None:
+        require_files("--study", [study])
+
+    with show_progress(wanted.quiet):
+        from klack.analyses.sensitivities.analysis import SENSITIVITIES
+        from klack.analyses.sensitivities.run import run_sensitivities
+        from klack.case.case_tree import read_case_tree
+        from klack.case.shipped import find_case
+        from klack.case.study_source import study_of
+
+    tree = read_case_tree(find_case(case), imported(component))
+    checked = tree.case()
+    given = study is not None or checked.study is not None
+    source = study_of(checked, tree, study) if given else None
+    with show_progress(wanted.quiet) as progress:
+        record = run_sensitivities(
+            checked,
+            tree,
+            source,
+            parameters=parameter or (),
+            measures=measure or (),
+            variant=variant,
+            check=check,
+            threads=wanted.threads,
+            progress=progress,
+        )
+    wanted.show(SENSITIVITIES.told(record))
+    wanted.note(record.warnings)
+    wanted.write(lambda: SENSITIVITIES.to_json(record))
+    return 0

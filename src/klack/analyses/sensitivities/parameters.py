@@ -1,0 +1,195 @@
+"""Parameters whose derivatives are wanted: of a study, or keys of the case."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from klack.analyses.study.parameters import unit_of, written
+from klack.analyses.study.points import Linked, Space, space_of
+from klack.analyses.study.strokes import makes_bodies
+from klack.case.key_path import quantity_at, split_path
+from klack.case.points import PointValue
+from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.studies.spread import Normal, Range, Spread
+from klack.units import RATIO, Kind
+
+__all__ = ["SlopeSpace", "VariedKey", "slope_space"]
+
+_WHERE = "--parameter"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariedKey:
+    """A parameter, its value, and the size by which its changes are small or large.
+
+    Parameters
+    ----------
+    name : str
+    kind : Kind
+    value : float [SI]
+    size : float [SI]
+        Of the value; of its range where that is zero.
+    """
+
+    name: str
+    kind: Kind
+    value: float
+    size: float
+
+    @property
+    def unit(self) -> str:
+        """SI unit; ``"1"`` for a pure number."""
+        return unit_of(self.kind)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlopeSpace:
+    """Parameters with what follows from them, about one point.
+
+    Parameters
+    ----------
+    varied : tuple of VariedKey
+    others : mapping of str to value [SI]
+        Parameters of the study that stay as they are.
+    kinds : mapping of str to Kind or None
+        Of all keys of the case that are set.
+    linked : tuple of Linked
+    skipped : tuple of str
+        Parameters of the study that have no derivative here.
+    """
+
+    varied: tuple[VariedKey, ...]
+    others: Mapping[str, float | str]
+    kinds: Mapping[str, Kind | None]
+    linked: tuple[Linked, ...]
+    skipped: tuple[str, ...] = ()
+
+    def written(self, shifts: Mapping[str, float]) -> dict[str, PointValue]:
+        """What the case has where parameters are shifted by so much [SI], by the path of the key.
+
+        Parameters
+        ----------
+        shifts : mapping of str to float
+            By name; 0 for those not named.
+        """
+        values = dict(self.others)
+        values |= {item.name: item.value + shifts.get(item.name, 0.0) for item in self.varied}
+        for item in self.linked:
+            values[item.name] = item.value(values)
+        return {name: written(values[name], kind) for name, kind in self.kinds.items()}
+
+
+def slope_space(
+    case: ValveCase, source: StudySource | None, names: Sequence[str] = ()
+) -> SlopeSpace:
+    """Find the parameters in the case.
+
+    Parameters
+    ----------
+    case : ValveCase
+    source : StudySource or None
+        Whose parameters are meant, with what is linked to them.
+    names : sequence of str
+        Keys of the case, or parameters of the study; all numbers that vary in it by default.
+
+    Raises
+    ------
+    InputError
+        For a key that the case does not have, one that is no number with a unit, and one that
+        bodies, contact laws or the run itself follow from.
+    """
+    space = space_of(case, source) if source is not None else Space(parameters=(), linked=())
+    found: dict[str, VariedKey] = {}
+    own = {
+        name: item.today
+        for item in space.linked
+        for word, name in item.words.items()
+        if item.expression.text == word
+    }
+    others: dict[str, float | str] = {}
+    for item in space.parameters:
+        today = own.get(item.name) if item.today is None else item.today
+        value = item.spread.at(0.5) if today is None or item.is_fixed else today
+        others[item.name] = value
+        if item.kind is not None and not isinstance(value, str) and not item.is_fixed:
+            size = abs(value) or _width(item.spread)
+            found[item.name] = VariedKey(name=item.name, kind=item.kind, value=value, size=size)
+    chosen = list(dict.fromkeys(names)) or [
+        name for name, item in found.items() if _reason(case, item, space.linked) is None
+    ]
+    if not chosen:
+        raise InputError(
+            _WHERE,
+            got="no parameter of the network that is a number",
+            expected="keys of the case with a number and unit",
+            hint="--parameter network.components.spring.preload, or a section 'study'.",
+        )
+    varied = tuple(found.get(name) or _key(case, name, list(found)) for name in chosen)
+    for key in varied:
+        if (reason := _reason(case, key, space.linked)) is not None:
+            raise InputError(
+                f"{_WHERE} {key.name}",
+                got=reason[0],
+                expected="a number of the network around the bodies",
+                hint=reason[1],
+            )
+    kinds: dict[str, Kind | None] = {p.name: p.kind for p in space.parameters if p.is_key}
+    kinds |= {key.name: key.kind for key in varied if "." in key.name}
+    kinds |= {item.name: item.kind for item in space.linked}
+    skipped = () if names else tuple(p.name for p in space.parameters if p.name not in chosen)
+    return SlopeSpace(
+        varied=varied,
+        others=others,
+        kinds=kinds,
+        linked=space.linked,
+        skipped=tuple(name for name in skipped if not _is_fixed(space, name)),
+    )
+
+
+def _width(spread: Spread) -> float:
+    if isinstance(spread, Range):
+        return spread.high - spread.low
+    return spread.deviation if isinstance(spread, Normal) else 0.0
+
+
+def _key(case: ValveCase, name: str, known: Sequence[str]) -> VariedKey:
+    if "." not in name and known:
+        raise InputError(
+            _WHERE,
+            got=f"'{name}'",
+            expected=f"a parameter of the study, {one_of(known)}, or the path of a key",
+            hint=nearest(name, known, "write the path from the top of the case."),
+        )
+    try:
+        found = quantity_at(case, split_path(name))
+    except CaseProblem as problem:
+        raise InputError(
+            _WHERE, got=problem.got, expected=problem.expected, hint=problem.hint
+        ) from None
+    size = abs(found.value)
+    return VariedKey(name=name, kind=found.kind or RATIO, value=found.value, size=size)
+
+
+def _is_fixed(space: Space, name: str) -> bool:
+    return any(item.name == name and item.is_fixed for item in space.parameters)
+
+
+def _reason(case: ValveCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
+    """Why there is no derivative with a parameter, and what to do instead; None if there is."""
+    if item.size == 0.0:
+        return "a value of zero", "a range in a study tells how large a small change of it is."
+    follow = [other.name for other in linked if item.name in other.words.values()]
+    for name in (item.name, *follow):
+        place = split_path(name)
+        if len(place) == 1:
+            continue
+        if place[0] == "run":
+            return "a setting of the run", "klack advise tells what its steps change."
+        if place[0] != "network" or makes_bodies(case, place):
+            return (
+                "a key that meshes, modes, contact laws or the noise follow from",
+                "klack study with a few values of it computes the valve at each of them.",
+            )
+    return None

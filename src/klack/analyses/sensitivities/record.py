@@ -1,0 +1,186 @@
+"""What ``klack sensitivities`` finds: derivatives of measures, and how far they hold."""
+
+from dataclasses import dataclass
+
+from klack.analyses.record import CaseRecord
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+
+__all__ = ["HOLDS", "ImpactSlope", "MeasureSlopes", "SensitivityRecord", "SlopeParameter"]
+
+HOLDS = 0.25
+"""Deviation from two runs beyond which a derivative says nothing about them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlopeParameter:
+    """A parameter and its value.
+
+    Parameters
+    ----------
+    name : str
+        Path of its key, or a word of the study.
+    unit : str
+        SI; ``"1"`` for a pure number.
+    value : float
+    """
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureSlopes:
+    """A measure and its derivatives.
+
+    Parameters
+    ----------
+    name : str
+    title : str
+        What it is.
+    unit : str
+        SI.
+    value : float or None
+        None where the run does not have it.
+    slopes : tuple of float or None
+        With each parameter, per its unit; None where it has no value a little further on.
+    predicted, secant : float or None
+        Change of the measure if all parameters change together by the share of the check, each in
+        the sense of its sign there: from the derivatives, and from two runs.
+    scale : float
+        Root of the sum of the squares of what each parameter adds to ``predicted``.
+    resolution : float
+        What the steps of a run resolve of the measure: a smaller difference is no doubt.
+    strayed : float
+        Difference of the value in the run with derivatives from that without, which differ by
+        round-off; 0 without a check.
+    """
+
+    name: str
+    title: str
+    unit: str
+    value: float | None
+    slopes: tuple[float | None, ...]
+    predicted: float | None
+    secant: float | None
+    scale: float
+    resolution: float
+    strayed: float = 0.0
+
+    def elasticity(self, k: int, parameter: SlopeParameter) -> float | None:
+        """Relative change of the measure over that of a parameter; None at a value of zero."""
+        slope = self.slopes[k]
+        if slope is None or not self.value or parameter.value == 0.0:
+            return None
+        return slope * parameter.value / self.value
+
+    @property
+    def deviation(self) -> float | None:
+        """Difference of both predictions over the scale of the change; None without both."""
+        if self.predicted is None or self.secant is None or self.scale == 0.0:
+            return None
+        return abs(self.predicted - self.secant) / self.scale
+
+    @property
+    def has_strayed(self) -> bool:
+        """Whether round-off changes the value by more than the steps resolve."""
+        return self.strayed > self.resolution
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether other runs tell something else."""
+        if self.has_strayed:
+            return True
+        if self.deviation is None or self.predicted is None or self.secant is None:
+            return False
+        resolved = abs(self.predicted - self.secant) > self.resolution
+        return resolved and self.deviation > HOLDS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImpactSlope:
+    """Time of an impact, and how well its derivatives predict another run.
+
+    Parameters
+    ----------
+    stop : str
+    number : int
+        On that stop, from 1.
+    time : float [s]
+    growth : float [s]
+        Change of the time for all parameters changed by their whole size, root of the sum of the
+        squares: how strongly the motion up to here answers.
+    deviation : float or None
+        As of :attr:`MeasureSlopes.deviation`.
+    is_doubtful : bool
+        Whether two runs tell something else.
+    """
+
+    stop: str
+    number: int
+    time: float
+    growth: float
+    deviation: float | None
+    is_doubtful: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SensitivityRecord(CaseRecord):
+    """Derivatives of the measures of a stroke.
+
+    Parameters
+    ----------
+    variant : str
+    parameters : tuple of SlopeParameter
+    measures : tuple of MeasureSlopes
+    impacts : tuple of ImpactSlope
+        In order of time.
+    share : float
+        By which the check changed each parameter; 0 without a check.
+    runs_time, run_time : float [s]
+        Processor time of the derivatives, and of one run without them.
+    """
+
+    variant: str
+    parameters: tuple[SlopeParameter, ...]
+    measures: tuple[MeasureSlopes, ...]
+    impacts: tuple[ImpactSlope, ...]
+    share: float
+    runs_time: float
+    run_time: float
+
+    def derivative(self, measure: str, parameter: str) -> float | None:
+        """Derivative in the unit of the measure per unit of the parameter [SI].
+
+        Raises
+        ------
+        InputError
+            For a name that the record does not have.
+        """
+        of, k = self._at(measure, parameter)
+        return of.slopes[k]
+
+    def elasticity(self, measure: str, parameter: str) -> float | None:
+        """Relative change of a measure over that of a parameter; None at a value of zero.
+
+        Raises
+        ------
+        InputError
+            For a name that the record does not have.
+        """
+        of, k = self._at(measure, parameter)
+        return of.elasticity(k, self.parameters[k])
+
+    def _at(self, measure: str, parameter: str) -> tuple[MeasureSlopes, int]:
+        measures = {item.name: item for item in self.measures}
+        places = {item.name: k for k, item in enumerate(self.parameters)}
+        for what, name, known in (("measure", measure, measures), ("parameter", parameter, places)):
+            if name not in known:
+                raise InputError(
+                    what,
+                    got=f"'{name}'",
+                    expected=f"one of: {one_of(known)}",
+                    hint=nearest(name, known, "names are those of the record."),
+                )
+        return measures[measure], places[parameter]

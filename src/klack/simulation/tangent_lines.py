@@ -1,0 +1,86 @@
+"""Delay lines while the steps of a run stretch: what their memory holds belongs to other times.
+
+A line keeps its waves as means over fine steps.  Where these are longer by a share ``c``, a wave
+that was sent ``a`` steps ago is one of an earlier time, ``- a c h`` of its slope.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.simulation.delay_line import Lines, LineState
+
+__all__ = ["begin_stretch", "delay_slopes", "end_stretch", "wave_slopes", "waves_under_way"]
+
+Vector = NDArray[np.float64]
+
+
+def delay_slopes(lines: Lines) -> Vector:
+    """Change of :attr:`Lines.fraction` with the logarithm of the step: the delays stay.
+
+    Only the last segment of a line has a fraction of a step, and takes the change of all.
+    """
+    delays = lines.depth - 1.0 + lines.fraction
+    found = np.zeros(len(delays))
+    for begin, end in zip(lines.first_segment[:-1], lines.first_segment[1:], strict=True):
+        found[end - 1] = -float(delays[begin:end].sum())
+    return found
+
+
+def wave_slopes(base: Any, plus: Any, minus: Any, distance: float) -> Vector:
+    """Change of the waves of lines at rest per unit, between two networks of other delays.
+
+    Parameters
+    ----------
+    base, plus, minus : NetworkArrays
+    distance : float
+        Between the last two.
+    """
+    found = np.zeros(len(base.line_state.samples))
+    for place, depth in _windows(base.lines, base.line_state.head):
+        segment, wave = place
+        first = base.lines.start[segment, wave]
+        ends = [n.line_state.samples[n.lines.start[segment, wave]] for n in (plus, minus)]
+        found[first : first + depth] = (ends[0] - ends[1]) / distance
+    return found
+
+
+def waves_under_way(lines: Any, state: Any) -> list[Any]:
+    """Samples of all waves that have not arrived, where they lie now; the others mean nothing."""
+    return [window for window, _ in _memory(lines, state)]
+
+
+def begin_stretch(lines: Any, state: Any, lane: int) -> None:
+    """Let the waves in memory be those of steps that have been longer all the time."""
+    for window, sent in _memory(lines, state):
+        window[:, lane] = -sent * _change(window[:, 0])
+
+
+def end_stretch(lines: Any, state: Any, lane: int) -> None:
+    """Let the waves in memory be those of steps that are no longer, whatever they were."""
+    for window, sent in _memory(lines, state):
+        window[:, lane] += sent * _change(window[:, 0])
+
+
+def _change(waves: Vector) -> Vector:
+    """Change of the waves from one fine step to the next."""
+    return np.asarray(np.gradient(waves)) if len(waves) > 1 else np.zeros(len(waves))
+
+
+def _windows(lines: Any, head: Any) -> list[tuple[tuple[int, int], int]]:
+    return [((s, wave), int(lines.depth[s])) for s in range(len(head)) for wave in range(2)]
+
+
+def _memory(lines: Lines, state: LineState) -> list[tuple[Any, Vector]]:
+    """Samples under way of each wave, and how many steps ago each was sent into the line."""
+    found = []
+    delays = lines.depth - 1.0 + lines.fraction[..., 0]
+    for begin, end in zip(lines.first_segment[:-1], lines.first_segment[1:], strict=True):
+        for s in range(begin, end):
+            depth = int(lines.depth[s])
+            age = depth - 0.5 - np.arange(depth)
+            for wave, before in ((0, delays[begin:s].sum()), (1, delays[s + 1 : end].sum())):
+                first = lines.start[s, wave] + state.head[s]
+                found.append((state.samples[first : first + depth], age + before))
+    return found

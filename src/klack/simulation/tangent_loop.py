@@ -1,0 +1,75 @@
+"""The time loop of a network with derivatives beside all its numbers."""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
+from klack.compiling.tangent_number import tangent_number, with_tangents
+from klack.network.step_function import StepFunction
+from klack.simulation.network_kernel import run_network
+
+__all__ = ["LANES", "lanes_of", "run_with_tangents", "tangent_address"]
+
+LANES = 8
+"""Numbers of a number with its derivatives: a vector register, or two."""
+
+_ALIGNED = 8 * LANES  # bytes
+_POINTER = types.CPointer(tangent_number(LANES))
+_STEP = types.int64(_POINTER, _POINTER, _POINTER, _POINTER)
+
+
+@njit
+def run_with_tangents(
+    macros: int,
+    per_record: int,
+    clock: Any,
+    M: int,
+    near: int,
+    R: int,
+    origin: Any,
+    h: Any,
+    allow_macro: bool,
+    network: Any,
+    recording: Any,
+    scratch: Any,
+    report: Any,
+) -> int:
+    """:func:`klack.simulation.network_kernel.run_network` with derivatives.
+
+    Every array of floats, and every float but for those of the compiled code itself, has a last
+    axis of :data:`LANES`: the value and its derivatives.  They are made by :func:`lanes_of`; the
+    step functions are those of :func:`tangent_address`.
+    """
+    return run_network(
+        macros,
+        per_record,
+        clock,
+        M,
+        near,
+        R,
+        with_tangents(LANES, origin),
+        with_tangents(LANES, h),
+        allow_macro,
+        with_tangents(LANES, network),
+        with_tangents(LANES, recording),
+        with_tangents(LANES, scratch),
+        with_tangents(LANES, report),
+    )
+
+
+def lanes_of(shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Zeros for numbers with derivatives, a last axis of :data:`LANES`, where vectors may lie."""
+    count = int(np.prod(shape)) * LANES
+    raw = np.zeros(count + LANES)
+    first = (-raw.ctypes.data % _ALIGNED) // 8
+    return raw[first : first + count].reshape(*shape, LANES)
+
+
+def tangent_address(step: StepFunction) -> int:
+    """Address of a step function for numbers with derivatives; compiles it the first time."""
+    result = step.get_compile_result(_STEP)
+    name = result.fndesc.llvm_cfunc_wrapper_name
+    return int(result.library.get_pointer_to_function(name))

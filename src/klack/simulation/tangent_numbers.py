@@ -1,0 +1,252 @@
+"""The numbers of a network with their derivatives, before the first step."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from klack.errors import InputError
+from klack.network.rows import Rows
+from klack.simulation.modal_step import ROW, ROW_V
+from klack.simulation.network_arrays import NetworkArrays
+from klack.simulation.network_compile import CompiledNetwork, compile_network
+from klack.simulation.static_start import RestState, begin_at_rest
+from klack.simulation.step_sizes import StepSizes
+from klack.simulation.tangent_lines import delay_slopes, wave_slopes
+from klack.simulation.tangent_loop import lanes_of, tangent_address
+
+__all__ = [
+    "STRETCH",
+    "Direction",
+    "TangentNumbers",
+    "arrays_of",
+    "lifted",
+    "mode_places",
+    "numbers_at_rest",
+    "set_stretch",
+    "state_arrays",
+]
+
+STRETCH = 1
+"""Lane of the derivatives with the logarithm of the step; those of the directions follow."""
+
+_LONGER = 1e-4  # of the step, to either side: what a longer one changes
+_BENT = 0.1  # of a small change: more than this to one side only is a jump
+_ROUND_OFF = 1e-10  # of the largest number of a bundle: a change that tells nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Direction:
+    """A direction in which a network changes.
+
+    Parameters
+    ----------
+    name : str
+    plus, minus : Rows
+        A little further on, and as much before.
+    distance : float
+        Between both.
+    """
+
+    name: str
+    plus: Rows
+    minus: Rows
+    distance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TangentNumbers:
+    """Numbers of a network with their derivatives, and what changes with the length of the steps.
+
+    Parameters
+    ----------
+    arrays : NetworkArrays
+    by_step : list of (array, places, array)
+        Of each array the numbers that stay but depend on the step, and their change with its
+        logarithm.
+    """
+
+    arrays: NetworkArrays
+    by_step: list[tuple[Any, Any, Any]]
+
+
+def numbers_at_rest(
+    network: CompiledNetwork,
+    rest: RestState | None,
+    directions: Sequence[Direction],
+    sizes: StepSizes,
+) -> TangentNumbers:
+    """Numbers of a network with their derivatives in each direction, none with the step.
+
+    What a component makes of its parameters, and the static equilibrium, are differentiated by
+    central differences.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+    rest : RestState or None
+        Of it; None for one that starts undeformed.
+    directions : sequence of Direction
+    sizes : StepSizes
+
+    Raises
+    ------
+    InputError
+        For a direction in which a number of the network jumps, or a table changes its length.
+    """
+    slopes = [_slopes(network, rest, item, sizes) for item in directions]
+    arrays = _with_functions(lifted(network.arrays, slopes), network.rows)
+    by_step = zip(_floats(arrays), _floats(_slopes_by_step(network, sizes)), strict=True)
+    return TangentNumbers(
+        arrays=arrays,
+        by_step=[(found, slope != 0.0, slope[slope != 0.0]) for found, slope in by_step],
+    )
+
+
+def _slopes(
+    network: CompiledNetwork, rest: RestState | None, direction: Direction, sizes: StepSizes
+) -> NetworkArrays:
+    """What changes in all numbers of a network at rest in a direction, per unit."""
+    base, distance = network.arrays, direction.distance
+    plus, minus = (_at_rest(rows, rest, sizes) for rows in (direction.plus, direction.minus))
+    further, before = _without_waves(plus, base), _without_waves(minus, base)
+    found: NetworkArrays = _difference(base, further, before, distance, direction.name)
+    delays = [end.lines.depth + end.lines.fraction for end in (plus, minus)]
+    return found._replace(
+        lines=found.lines._replace(fraction=(delays[0] - delays[1]) / distance),
+        line_state=found.line_state._replace(samples=wave_slopes(base, plus, minus, distance)),
+    )
+
+
+def _at_rest(rows: Rows, rest: RestState | None, sizes: StepSizes) -> NetworkArrays:
+    network = compile_network(rows, sizes)
+    if rest is not None:
+        begin_at_rest(network, sizes.step, rest)
+    return network.arrays
+
+
+def _without_waves(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
+    """The same but for the waves in lines, of which another delay keeps another number."""
+    return numbers._replace(
+        lines=numbers.lines._replace(fraction=base.lines.fraction),
+        line_state=numbers.line_state._replace(samples=base.line_state.samples),
+    )
+
+
+def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays:
+    """What changes with the length of the steps, in what stays; states do not yet."""
+    base, *ends = (
+        compile_network(network.rows, replace(sizes, step=sizes.step * factor)).arrays
+        for factor in (1.0, 1.0 + _LONGER, 1.0 - _LONGER)
+    )
+    longer, shorter = (_without_waves(end, base) for end in ends)
+    found = _difference(base, longer, shorter, 2.0 * _LONGER, "length of the steps")
+    found = found._replace(lines=found.lines._replace(fraction=delay_slopes(base.lines)))
+    for array in state_arrays(found):
+        array[...] = 0.0
+    return found
+
+
+def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) -> Any:
+    if isinstance(base, tuple):
+        return type(base)(
+            *(_difference(*parts, distance, name) for parts in zip(base, plus, minus, strict=True))
+        )
+    if isinstance(base, np.ndarray):
+        if base.dtype != np.float64:
+            return base
+        if base.shape != plus.shape or base.shape != minus.shape:
+            raise _jumps(name)
+        with np.errstate(invalid="ignore"):
+            found, bend = plus - minus, plus + minus - 2.0 * base
+        known = np.isfinite(found)
+        found, bend = np.where(known, found, 0.0), np.where(known, bend, 0.0)
+        size = np.max(np.abs(base), initial=0.0, where=np.isfinite(base))
+        if np.any(np.abs(bend) > _BENT * np.abs(found) + _ROUND_OFF * size):
+            raise _jumps(name)
+        return found / distance
+    return (plus - minus) / distance if isinstance(base, float) else base
+
+
+def _jumps(name: str) -> InputError:
+    return InputError(
+        name,
+        got="a parameter with which numbers of the valve jump: a table gets other points",
+        expected="one with which they change smoothly",
+        hint="klack study with a few values of it computes the valve at each of them.",
+    )
+
+
+def lifted(base: Any, slopes: Sequence[Any]) -> Any:
+    """Numbers of a bundle with these derivatives."""
+    if isinstance(base, tuple):
+        return type(base)(*(lifted(value, [s[i] for s in slopes]) for i, value in enumerate(base)))
+    if isinstance(base, np.ndarray) and base.dtype == np.float64:
+        found = lanes_of(base.shape)
+        found[..., 0] = base
+        for lane, slope in enumerate(slopes, STRETCH + 1):
+            found[..., lane] = slope
+        return found
+    if isinstance(base, float):
+        number = lanes_of(())
+        number[0] = base
+        for lane, slope in enumerate(slopes, STRETCH + 1):
+            number[lane] = slope
+        return number
+    return base
+
+
+def _with_functions(numbers: NetworkArrays, rows: Rows) -> NetworkArrays:
+    return numbers._replace(
+        elements=numbers.elements._replace(
+            function=np.array([tangent_address(row.step) for row in rows.elements], np.int64)
+        ),
+        branches=numbers.branches._replace(
+            function=np.array([tangent_address(row.step) for row in rows.branches], np.int64)
+        ),
+    )
+
+
+def arrays_of(bundle: Any) -> list[Any]:
+    """All arrays of a bundle and of those in it."""
+    if isinstance(bundle, tuple):
+        return [array for part in bundle for array in arrays_of(part)]
+    return [bundle] if isinstance(bundle, np.ndarray) else []
+
+
+def set_stretch(numbers: TangentNumbers, on: bool) -> None:
+    """Let the steps change from here on, or not, in all numbers that stay."""
+    for array, places, slopes in numbers.by_step:
+        array[places, STRETCH] = slopes if on else 0.0
+
+
+def _floats(bundle: Any) -> list[Any]:
+    """Arrays of floats, and floats as arrays of one."""
+    if isinstance(bundle, tuple):
+        return [array for part in bundle for array in _floats(part)]
+    if isinstance(bundle, float):
+        return [np.array(bundle)]
+    is_array = isinstance(bundle, np.ndarray) and bundle.dtype == np.float64
+    return [bundle] if is_array else []
+
+
+def state_arrays(numbers: NetworkArrays) -> list[Any]:
+    """Arrays that a step changes, but for the modes."""
+    found = [numbers.bodies.at]
+    for rows in (numbers.elements, numbers.branches):
+        found += [rows.state, rows.inputs, rows.outputs]
+    groups = (
+        numbers.node_state,
+        numbers.line_state,
+        numbers.interface_state,
+        numbers.accounts,
+    )
+    return found + arrays_of(groups)
+
+
+def mode_places(numbers: NetworkArrays) -> tuple[Any, Any]:
+    """All numbers of the modes, and the places of their displacements and velocities."""
+    rows = (ROW_V + 1) * ROW
+    places = [np.arange(start, start + rows) for start in numbers.bodies.start[:-1]]
+    return numbers.bodies.laid_out, np.concatenate(places)

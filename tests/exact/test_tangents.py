@@ -1,0 +1,275 @@
+"""Derivatives of a run; truth: motions that are known in closed form, differences of the program.
+
+A flight under a constant force and impacts on a linear stop, a mass on a spring, two elastic balls.
+"""
+
+from collections.abc import Callable
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from numba import types
+from numba.core.registry import cpu_target
+
+from klack.compiling.jit import inner, njit
+from klack.compiling.tangent_number import tangent_number, with_tangents
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.network import Network
+from klack.network.rows import Rows
+from klack.simulation import tangent_run
+from klack.simulation.network_run import simulate_network
+from klack.simulation.tangent_loop import LANES, lanes_of
+from klack.simulation.tangent_numbers import Direction
+from klack.simulation.tangent_run import TangentRun, run_tangents
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning"),
+    pytest.mark.slow,  # the loop with derivatives compiles for a minute
+]
+
+SMALL = 3e-5  # of a parameter: its numbers are differentiated by that
+MASS, FORCE, GAP, STIFFNESS = 3e-3, 30.0, 100e-6, 1e9
+
+
+def tangents(rows: Callable[..., Rows], given: dict[str, float], **run) -> TangentRun:
+    """A run with its derivatives with each of the arguments of ``rows``."""
+    directions = []
+    for name, value in given.items():
+        shift = SMALL * (abs(value) or 1.0)
+        ends = [rows(**given | {name: value + way * shift}) for way in (1, -1)]
+        directions.append(Direction(name=name, plus=ends[0], minus=ends[1], distance=2 * shift))
+    return run_tangents(rows(**given), directions, **run)
+
+
+def slopes(run: TangentRun, given: dict[str, float], read) -> dict[str, float]:
+    """Derivatives of what is read from a run, each times the size of its parameter."""
+    found = {}
+    for k, (name, value) in enumerate(given.items()):
+        size = abs(value) or 1.0
+        ahead = 1e-6 * size
+        ends = [read(run.moved(k, way * ahead)) for way in (1, -1)]
+        found[name] = (ends[0] - ends[1]) / 2e-6
+    return found
+
+
+# --------------------------------------------------------------------------- numbers
+
+
+def _polynomial(x, y):
+    return 3.0 * x * y - y**3 + x / (1.0 + y) - 2.0 / x + x**1.5 - (1 - x)
+
+
+def _functions(x, y):
+    return sqrt(x) * cos(y) + sin(x * y) + abs(-y) + max(x, y, 0.1) - min(x, 2.0)
+
+
+def _branches(x, y):
+    total = 0.0
+    for k in range(3):
+        if x > y:
+            total += k * x
+        else:
+            total -= y
+    return total if not x < 0.0 else y
+
+
+@pytest.mark.parametrize("formula", [_polynomial, _functions, _branches])
+def test_numbers_follow_the_rules_of_calculus(formula):
+    compiled = njit(formula)
+
+    @njit
+    def both(values):
+        of = with_tangents(LANES, values)
+        of[2] = compiled(of[0], of[1])
+
+    values = lanes_of((3,))
+    x, y = 1.3, 0.4
+    values[0, :2], values[1, 0], values[1, 2] = (x, 1.0), y, 1.0
+    both(values)
+
+    h = 1e-6
+    assert values[2, 0] == formula(x, y)
+    by_x = (formula(x + h, y) - formula(x - h, y)) / (2 * h)
+    by_y = (formula(x, y + h) - formula(x, y - h)) / (2 * h)
+    assert values[2, 1] == pytest.approx(by_x, rel=1e-9, abs=1e-9)
+    assert values[2, 2] == pytest.approx(by_y, rel=1e-9, abs=1e-9)
+    assert not values[2, 3:].any()
+
+
+# --------------------------------------------------------------------------- a bouncing ball
+
+
+def ball(mass: float, force: float, gap: float, stiffness: float) -> Rows:
+    """A mass that a constant force drives against an elastic stop."""
+    parts = {
+        "ball": RigidMass(mass=mass),
+        "push": ConstantForce(force=force),
+        "stop": EndStop(gap=gap, law=LinearStopLaw(kind="linear", stiffness=stiffness)),
+    }
+    joints = [["ball.body", "push.end", "stop.lower"], ["stop.upper", "ground"]]
+    return Network(parts, joints).rows()
+
+
+BALL = {"mass": MASS, "force": FORCE, "gap": GAP, "stiffness": STIFFNESS}
+
+
+def closed(mass: float, force: float, gap: float, stiffness: float) -> float:
+    """Time of contact: more than half a swing about the rest position on the stop."""
+    speed, w = sqrt(2 * force * gap / mass), sqrt(stiffness / mass)
+    return 2 * (pi - float(np.arctan2(speed / w, force / stiffness))) / w
+
+
+FORMULAS = {
+    "first touch": lambda mass, force, gap, stiffness: sqrt(2 * mass * gap / force),
+    "approach_speed": lambda mass, force, gap, stiffness: sqrt(2 * force * gap / mass),
+    "contact_time": closed,
+    "peak_force": lambda mass, force, gap, stiffness: (
+        force + sqrt(force**2 + 2 * stiffness * force * gap)
+    ),
+    "impulse": lambda mass, force, gap, stiffness: (
+        2 * sqrt(2 * force * gap * mass) + force * closed(mass, force, gap, stiffness)
+    ),
+    "second touch": lambda mass, force, gap, stiffness: (
+        3 * sqrt(2 * mass * gap / force) + closed(mass, force, gap, stiffness)
+    ),
+}
+LEFT = {  # over the largest derivative: of steps of 5 ns
+    "first touch": 1e-9,
+    "approach_speed": 3e-5,  # it is that of the start of a step
+    "contact_time": 1e-4,
+    "peak_force": 1e-5,
+    "impulse": 5e-6,
+    "second touch": 1e-7,
+}
+
+
+def by_formula(read: Callable[..., float]) -> dict[str, float]:
+    """Derivatives of a formula of the ball, each times its parameter."""
+    found = {}
+    for name, value in BALL.items():
+        ends = [read(**BALL | {name: value * (1 + way * 1e-5)}) for way in (1, -1)]
+        found[name] = (ends[0] - ends[1]) / 2e-5
+    return found
+
+
+@pytest.fixture(scope="module")
+def ball_run():
+    return tangents(ball, BALL, duration=480e-6, step=5e-9, coarse=1, start="free")
+
+
+def test_plain_numbers_stay_plain_where_the_same_function_has_taken_tangents():
+    """Truth: exact; what is compiled first must not decide what the other calls."""
+
+    @inner
+    def scaled(x, by):
+        return x * by
+
+    number, plain = tangent_number(LANES), types.float64
+    scaled.get_call_template((number, plain), {})
+    for args in ((plain, plain), (number, plain)):
+        template, *_ = scaled.get_call_template(args, {})
+        assert template(cpu_target.typing_context).apply(args, {}).args == args
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_impacts_of_a_ball_have_the_derivatives_of_their_formulas(ball_run, name):
+    def read(result):
+        if name.endswith("touch"):
+            return result.events[0 if name.startswith("first") else 1].time
+        return getattr(result.events[0], name)
+
+    found = slopes(ball_run, BALL, read)
+
+    exact = by_formula(FORMULAS[name])
+    largest = max(abs(value) for value in exact.values())
+    for key, value in exact.items():
+        assert abs(found[key] - value) < LEFT[name] * largest, key
+
+
+def test_touches_at_fixed_steps_would_have_other_derivatives(ball_run, monkeypatch):
+    """Why steps follow the touches: the force of the program at fixed steps is a saw-tooth."""
+    monkeypatch.setattr(tangent_run._Running, "_touch", lambda self, part: None)
+    fixed = tangents(ball, BALL, duration=200e-6, step=5e-9, coarse=1, start="free")
+
+    exact, kept, lost = (
+        by_formula(FORMULAS["peak_force"])["gap"],
+        slopes(ball_run, BALL, lambda result: result.events[0].peak_force)["gap"],
+        slopes(fixed, BALL, lambda result: result.events[0].approach_speed)["gap"],
+    )
+
+    assert kept == pytest.approx(exact, rel=1e-5)
+    assert lost == pytest.approx(0.0, abs=1e-6)  # at a given time the ball has its speed
+
+
+# --------------------------------------------------------------------------- two elastic balls
+
+
+def balls(upper: float, lower: float) -> Rows:
+    """Two equal masses that fly freely; only their speeds differ."""
+    parts = {
+        "upper": RigidMass(mass=MASS, speed=upper),
+        "lower": RigidMass(mass=MASS, speed=lower),
+        "stop": EndStop(gap=20e-6, law=LinearStopLaw(kind="linear", stiffness=STIFFNESS)),
+    }
+    return Network(parts, [["upper.body", "stop.upper"], ["lower.body", "stop.lower"]]).rows()
+
+
+def test_equal_elastic_balls_exchange_their_speeds():
+    given = {"upper": -0.2, "lower": 0.5}
+    run = tangents(balls, given, duration=60e-6, start="free")
+
+    for body, exact in (("upper", (0.0, 1.0)), ("lower", (1.0, 0.0))):
+        channel = f"{body} velocity"
+        found = slopes(run, given, lambda result, c=channel: result.channels[c].values[-1])
+        shares = [found[name] / abs(value) for name, value in given.items()]
+        assert shares == pytest.approx(exact, abs=1e-9)
+
+
+# --------------------------------------------------------------------------- a mass on a spring
+
+
+def swing(mass: float, stiffness: float, preload: float) -> Rows:
+    parts = {
+        "mass": RigidMass(mass=mass),
+        "spring": Spring(stiffness=stiffness, preload=preload),
+    }
+    return Network(parts, [["mass.body", "spring.end"]]).rows()
+
+
+def test_mass_on_a_spring_follows_its_formula():
+    given = {"mass": 3e-3, "stiffness": 5e6, "preload": 20.0}
+    run = tangents(swing, given, duration=100e-6, step=20e-9, coarse=1, start="free")
+
+    def exact(mass, stiffness, preload):
+        return -preload / stiffness * (1 - cos(sqrt(stiffness / mass) * 100e-6))
+
+    found = slopes(run, given, lambda r: r.channels["mass.body displacement"].values[-1])
+
+    for name, value in given.items():
+        ends = [exact(**given | {name: value * (1 + way * 1e-5)}) for way in (1, -1)]
+        assert found[name] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-5), name
+
+
+@pytest.mark.parametrize("coarse", [1, None])
+def test_program_itself_is_differentiated(coarse):
+    """Central differences of the program, whose decisions are the same so close to each other."""
+    given = {"mass": 3e-3, "stiffness": 5e6, "preload": 20.0}
+    steps = {"duration": 100e-6, "coarse": coarse, "start": "free"}
+    run = tangents(swing, given, **steps)
+
+    for name, value in given.items():
+        h = 1e-5
+        ends = [
+            simulate_network(swing(**given | {name: value * (1 + way * h)}), **steps)
+            for way in (1, -1)
+        ]
+        for channel in ("mass.body displacement", "mass.body velocity"):
+            found = slopes(run, given, lambda r, c=channel: r.channels[c].values[1:])[name]
+            plus, minus = (end.channels[channel].values[1:] for end in ends)
+            np.testing.assert_allclose(
+                found, (plus - minus) / (2 * h), rtol=1e-6, atol=1e-8 * np.abs(found).max()
+            )

@@ -1,0 +1,248 @@
+"""Derivatives of a stroke: what the command tells, and what it refuses.
+
+Truth: two further strokes with all parameters changed; a stroke itself for the values.
+"""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import klack
+from klack.analyses.sensitivities.run import _impacts
+from klack.cli.main import main
+from klack.errors import InputError
+
+pytestmark = pytest.mark.slow  # the loop with derivatives compiles for a minute
+
+SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
+STUDY = SMALL.with_name("small_study.yaml")
+PRELOAD = "network.components.spring.preload"
+MASS = "network.components.needle.mass"
+GAP = "network.components.opening.gap"
+
+
+@pytest.fixture(scope="module")
+def dry():
+    return klack.sensitivities(SMALL, STUDY)
+
+
+COIL = """coil:
+      type: solenoid
+      turns: 60
+      resistance: 0.6 ohm
+      gap: 100 um
+      residual_gap: 50 um
+      poles:
+        - {inner_radius: 1.95 mm, outer_radius: 3.8 mm, fringing: plane, shoulder: 1 mm}
+        - {inner_radius: 4.8 mm, outer_radius: 6 mm, fringing: plane, shoulder: 1 mm}
+      iron:
+        - {material: X6Cr17, length: 20 mm, area: 33 mm^2}
+      leakage_share: 10 %
+    driver:
+      type: peak-hold
+      boost_voltage: 65 V
+      peak_current: 10 A
+      supply_voltage: 14 V
+      hold_current: 3.5 A
+      hold_band: 0.8 A
+      peak_until: 0.5 ms
+      decay: 65 V
+      end: 1 ms"""
+
+
+def with_coil(folder):
+    """The small valve with a coil in place of its force."""
+    text = SMALL.read_text().replace("magnet.end", "coil.armature")
+    force = next(line for line in text.splitlines() if "magnet: {type" in line)
+    text = text.replace(force.strip(), COIL)
+    text = text.replace("[bores.b, ambient]", "[bores.b, ambient]\n    - [coil.base, ground]")
+    text = text.replace("[coil.base", "[driver.terminals, coil.terminals]\n    - [coil.base")
+    file = folder / "coil.yaml"
+    file.write_text(text)
+    return file
+
+
+class TestNumbers:
+    def test_coils_and_their_controllers_do_not_let_derivatives_grow(self, tmp_path):
+        keys = [PRELOAD, "network.components.coil.resistance", MASS]
+        record = klack.sensitivities(
+            with_coil(tmp_path),
+            parameters=keys,
+            measures=["opening_time", "opening.impulse", "seat.peak_force"],
+        )
+        time, impulse, force = record.measures
+        assert abs(time.predicted - time.secant) < 1.5 * 20e-9  # steps of the two strokes
+        assert impulse.deviation < 0.02
+        assert force.deviation < 0.15
+        assert max(impact.growth for impact in record.impacts) < 1e-3
+        assert record.elasticity("opening.impulse", MASS) == pytest.approx(0.74, abs=0.02)
+
+    @pytest.mark.parametrize("coarse", [4, 16, 64])
+    def test_derivatives_stay_at_rest(self, coarse):
+        """A needle on its stop for half a millisecond, with forces that round-off changes."""
+        case = klack.load_case(SMALL).with_value("run.coarse", coarse)
+        record = klack.sensitivities(
+            case, parameters=[PRELOAD], measures=["closing_time"], variant="wet"
+        )
+        assert record.measures[0].deviation < 0.03
+
+    def test_measures_are_those_of_the_stroke(self, dry):
+        stroke = klack.run_stroke(SMALL, variants=["dry"]).record.variants["dry"]
+        values = {item.name: item.value for item in dry.measures}
+
+        assert dry.variant == "dry"
+        assert values["opening_time"] == pytest.approx(stroke.opening_time, rel=1e-9)
+        assert values["opening.peak_force"] == pytest.approx(
+            stroke.impacts("opening")[0].peak_force, rel=1e-4
+        )
+
+    def test_derivatives_predict_other_strokes(self, dry):
+        assert [item.name for item in dry.parameters] == [PRELOAD, MASS, "lift"]
+        for item in dry.measures:
+            assert item.deviation < 0.01, item.name
+        assert len(dry.impacts) == 10
+        for impact in dry.impacts:
+            assert impact.deviation < 0.01, impact
+
+    @pytest.mark.parametrize(("variant", "deviation"), [("dry", 0.01), ("wet", 0.03)])
+    def test_closing_is_predicted_behind_all_bounces(self, variant, deviation):
+        record = klack.sensitivities(
+            SMALL, parameters=[PRELOAD, GAP], measures=["closing_time"], variant=variant
+        )
+        assert record.measures[0].deviation < deviation
+
+    def test_a_rigid_needle_arrives_with_the_work_that_it_was_given(self):
+        """M v^2 / 2 = W, a force that reaches as deep as the square root of it."""
+        found = klack.sensitivities(
+            SMALL,
+            parameters=[MASS],
+            measures=["opening.approach_speed", "opening.peak_force"],
+            variant="dry",
+            check=False,
+        )
+        assert found.elasticity("opening.approach_speed", MASS) == pytest.approx(-0.5, abs=1e-3)
+        assert found.elasticity("opening.peak_force", MASS) == pytest.approx(0.0, abs=1e-3)
+        assert found.share == 0.0
+        assert found.measures[0].secant is None
+
+    def test_linked_keys_follow_their_parameter(self, dry):
+        alone = klack.sensitivities(
+            SMALL, parameters=[GAP], measures=["opening_time"], variant="dry", check=False
+        )
+        assert dry.elasticity("opening_time", "lift") == pytest.approx(
+            alone.elasticity("opening_time", GAP), rel=1e-6
+        )
+
+    def test_more_parameters_than_one_run_carries(self, dry):
+        names = [
+            PRELOAD,
+            MASS,
+            GAP,
+            "network.components.spring.stiffness",
+            "network.components.magnet.force.1",
+            "network.components.magnet.force.2",
+            "network.components.opening.restitution",
+            "network.components.magnet.time.0",
+        ]
+        record = klack.sensitivities(
+            SMALL, parameters=names, measures=["opening_time"], variant="dry", check=False
+        )
+        slopes = record.measures[0].slopes
+        assert len(slopes) == len(names)
+        assert slopes[0] == pytest.approx(dry.derivative("opening_time", PRELOAD), rel=1e-9)
+        assert slopes[names.index("network.components.opening.restitution")] == pytest.approx(
+            0.0, abs=1e-9
+        )
+        assert slopes[-1] > 0.0  # the force begins later
+
+    def test_notebook_asks_for_names_that_are_there(self, dry):
+        with pytest.raises(InputError, match="opening_time"):
+            dry.derivative("opening_tim", PRELOAD)
+        with pytest.raises(InputError, match="preload"):
+            dry.elasticity("opening_time", "preload")
+
+
+class TestCommand:
+    def test_writes_tables_and_numbers(self, tmp_path, capsys):
+        file = tmp_path / "numbers.json"
+        code = main(["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)])
+
+        assert code == 0
+        told = capsys.readouterr().out
+        assert "elasticity" in told
+        assert "Impacts, and how strongly their times answer" in told
+        numbers = json.loads(file.read_text())
+        assert numbers["schema"] == "klack-sensitivities/1"
+        slope = numbers["measures"]["opening_time"]["slopes"][PRELOAD]
+        assert slope["elasticity"] == pytest.approx(
+            slope["derivative"] * 12.0 / numbers["measures"]["opening_time"]["value"]
+        )
+        assert numbers["derivatives_cpu_time_s"] > 0.0
+
+    @pytest.mark.parametrize(
+        ("parameter", "words"),
+        [
+            ("network.components.spring.preloat", "'preload'"),
+            ("network.fluid", "no number with a unit"),
+            ("network.components.bores.count", "no number with a unit"),
+            ("network.components.seat.gap", "a value of zero"),
+            ("network.components.opening.law.stiffness", "klack study with a few values"),
+            ("network.ambient.temperature", "a table gets other points"),
+            ("run.step", "a setting of the run"),
+        ],
+    )
+    def test_refuses_what_has_no_derivative(self, parameter, words, capsys):
+        code = main(
+            ["sensitivities", str(SMALL), "--parameter", parameter, "--variant", "wet", "-q"]
+        )
+        assert code == 2
+        assert words in capsys.readouterr().err
+
+    @pytest.mark.parametrize(
+        ("measure", "words"),
+        [
+            ("impacts", "no derivative here"),
+            ("noise.loudness", "noise"),
+            ("seat.peak_forc", "seat.peak_force"),
+        ],
+    )
+    def test_refuses_measures_without_a_derivative(self, measure, words, capsys):
+        code = main(
+            ["sensitivities", str(SMALL), "--parameter", PRELOAD, "--measure", measure, "-q"]
+        )
+        assert code == 2
+        assert words in capsys.readouterr().err
+
+    def test_refuses_a_case_without_parameters(self, capsys):
+        assert main(["sensitivities", str(SMALL), "-q"]) == 2
+        assert "--parameter" in capsys.readouterr().err
+
+    def test_study_is_taken_as_far_as_it_can_be(self, tmp_path, capsys):
+        study = tmp_path / "study.yaml"
+        study.write_text(
+            "klack: 1\nstudy:\n  parameters:\n"
+            f"    {PRELOAD}: {{from: 10 N, to: 14 N}}\n"
+            "    network.components.opening.law.stiffness: {from: 0.9 N/nm, to: 1.1 N/nm}\n"
+            "  measures: [opening_time, impacts]\n"
+        )
+        code = main(["sensitivities", str(SMALL), "--study", str(study), "--no-check"])
+
+        told = capsys.readouterr().out
+        assert code == 0
+        assert "No derivatives with network.components.opening.law.stiffness" in told
+        assert "No derivatives of impacts" in told
+
+
+def test_growth_of_derivatives_tells_of_chaos_without_a_check():
+    """Impacts of which each answers ten times as strongly as the one before."""
+    touches = [
+        SimpleNamespace(stop="stop", time=(1 + k) * 1e-4, slopes=[1e-5 * 10.0**k]) for k in range(4)
+    ]
+    space = SimpleNamespace(varied=[SimpleNamespace(size=1.0)])
+
+    found = _impacts([SimpleNamespace(touches=touches)], space, None)
+
+    assert [item.growth for item in found] == pytest.approx([1e-5, 1e-4, 1e-3, 1e-2])
+    assert [item.is_doubtful for item in found] == [False, False, True, True]
