@@ -33,6 +33,7 @@ collect_ignore_glob = [
     "property_profiles.py",
     "quoted_output.py",
     "rigid_valve.py",
+    "rod_valve.py",
     "data/*.py",
 ]
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from energy_ledger import allowed
+from rod_valve import ROD
 
 import klack
 from klack.analyses.point_table import NOT_COMPUTED
@@ -35,44 +36,6 @@ MEASURES = (
     "opening.1.restitution",
     "opening.2.approach_speed",
 )
-
-ROD = """
-klack: 1
-title: A rod between two stops
-materials: {steel: {young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}
-bodies:
-  needle:
-    geometry:
-      model: axisymmetric
-      profile:
-        unit: mm
-        parts:
-          needle:
-            start: [0, 0]
-            edges:
-              - {line: [1.5, 0], name: tip}
-              - {line: [1.5, 20], name: shaft}
-              - {line: [0, 20], name: top}
-              - {close: true, name: axis}
-    material: steel
-    mesh: {size: 1 mm}
-    damping: {modal: 1 %}
-reduction: {modes: {needle: {count: 5}}, correction: none}
-network:
-  components:
-    needle: {type: flexible-body, body: needle, points: [tip, top]}
-    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}}
-    opening: {type: end-stop, gap: 50 um, law: {kind: linear, stiffness: 1e8 N/m}}
-    spring: {type: spring, stiffness: 10 N/mm, preload: 5 N}
-    magnet: {type: force-over-time, time: [10 us, 11 us, 300 us, 301 us],
-             force: [0 N, 20 N, 20 N, 0 N]}
-  connections:
-    - [needle.tip, seat.upper]
-    - [seat.lower, ground]
-    - [opening.upper, ground]
-    - [needle.top, opening.lower, spring.end, magnet.end]
-run: {duration: 0.6 ms, step: 50 ns, variants: [dry]}
-"""
 
 PLAIN = '''
 from typing import Any, ClassVar
@@ -252,7 +215,7 @@ class TestFailures:
             {"network.components.chamber.volume": "0.2 mm^3"},
             {PRELOAD: "13 N"},
         ]
-        table = klack.run_many(small, points, MEASURES, threads=2)
+        table = klack.run_many(small, points, MEASURES, variant="wet", threads=2)
         assert table.failed.tolist() == [False, True, True, False]
         assert "network.components.needle.mass" in table.failures[1]
         assert "got '-3 g', expected a value above 0" in table.failures[1]
@@ -265,7 +228,7 @@ class TestFailures:
 
     def test_doubts_of_a_point_stay_with_it(self, small: klack.CaseOnHand):
         points: list[Point] = [{PRELOAD: "12 N"}, {PRELOAD: "60 N"}, {PRELOAD: "14 N"}]
-        table = klack.run_many(small, points, ["impacts"], threads=3)
+        table = klack.run_many(small, points, ["impacts"], variant="wet", threads=3)
         alone = klack.run_stroke(small.with_value(PRELOAD, "60 N"), ["wet"]).record.warnings
         assert any("never left its seat" in note for note in alone)
         assert list(table.warnings[1]) == list(alone)
@@ -346,7 +309,7 @@ class TestInterruption:
                 raise KeyboardInterrupt
 
         with pytest.raises(klack.RunsInterrupted) as raised:
-            klack.run_many(small, points, MEASURES, threads=2, progress=progress)
+            klack.run_many(small, points, MEASURES, variant="wet", threads=2, progress=progress)
         table = raised.value.table
         assert isinstance(raised.value, KeyboardInterrupt)
         assert len(table) == 8

@@ -75,6 +75,45 @@ def test_an_error_of_the_work_names_its_place_and_answers_do_not_mix():
         assert sorted(pool.completed(neg, range(4))) == [(i, -i) for i in range(4)]
 
 
+MORTAL = """
+import os, signal
+from pathlib import Path
+def attempt(item):
+    folder, deaths, value = item
+    for k in range(deaths):
+        try:
+            Path(folder, f"{value}-{k}").touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        os.kill(os.getpid(), signal.SIGKILL)
+    return -value
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_who_dies_is_replaced_and_its_item_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Truth = the number of deaths: none is tried more often, nothing is lost or comes twice."""
+    (tmp_path / "mortal_work.py").write_text(MORTAL)
+    monkeypatch.syspath_prepend(tmp_path)
+    from mortal_work import attempt  # type: ignore[import-not-found]
+
+    items = [(str(tmp_path), deaths, value) for value, deaths in enumerate([0, 1, 3, 2, 0, 9, 0])]
+    left = items.copy()
+    with WorkerPool(2, None) as pool:
+        found = dict(pool.answers(attempt, lambda _: left.pop(0) if left else None, 3))
+        assert sorted(found) == sorted(items)
+        for (_, deaths, value), answer in found.items():
+            if deaths < 3:
+                assert answer == -value
+            else:
+                assert str(answer) == "a worker process died by signal 9"
+                assert len(list(tmp_path.glob(f"{value}-*"))) == 3
+        assert sorted(pool.completed(neg, range(4))) == [(i, -i) for i in range(4)]
+    sys.modules.pop("mortal_work")
+
+
 def test_what_is_not_wanted_any_more_is_not_waited_for():
     begin = time.monotonic()
     with WorkerPool(2, None) as pool:

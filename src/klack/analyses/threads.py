@@ -7,10 +7,13 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from queue import Empty, SimpleQueue
 from typing import Any, TextIO, TypeVar
 
-__all__ = ["Stopped", "on_threads", "warnings_of_threads"]
+from threadpoolctl import ThreadpoolController
+
+__all__ = ["Stopped", "on_threads", "one_thread_of_blas", "warnings_of_threads"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -98,6 +101,18 @@ def _taken(
         return False
     keep(item, result)
     return True
+
+
+@contextmanager
+def one_thread_of_blas() -> Iterator[None]:
+    """Let NumPy and SciPy take one thread each: points are what is computed side by side."""
+    with _controller().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache  # it looks at all libraries of the process, which takes milliseconds
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 @contextmanager

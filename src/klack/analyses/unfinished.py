@@ -7,7 +7,7 @@ a crash, and all behind it, is cut off and computed again.
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -24,7 +24,7 @@ from klack.errors import InputError
 from klack.folder_lock import try_lock
 from klack.own_file import open_own_file
 
-__all__ = ["LogForm", "UnfinishedLog", "fingerprint"]
+__all__ = ["LogForm", "UnfinishedLog", "code_of_klack", "fingerprint"]
 
 Key = TypeVar("Key")
 Part = TypeVar("Part")
@@ -237,10 +237,15 @@ def fingerprint(case: _Case, parts: Iterable[bytes]) -> str:
     for body in case.bodies.values():
         for file in _files_of(body):
             digest.update(file.read_bytes() + b"\0")
-    # klack itself, as it is on this machine
-    for file in sorted(Path(klack.__file__).parent.rglob("*.py")):
-        digest.update(file.read_bytes())
+    for part in code_of_klack():
+        digest.update(part)
     return digest.hexdigest()
+
+
+def code_of_klack() -> Iterator[bytes]:
+    """Files of klack itself, as they are on this machine."""
+    for file in sorted(Path(klack.__file__).parent.rglob("*.py")):
+        yield file.read_bytes()
 
 
 def _files_of(body: CaseBody) -> list[Path]:

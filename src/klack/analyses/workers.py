@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -31,6 +31,7 @@ __all__ = [
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+_STARTS = 10  # processes that may end one after another before they begin, if any may end
 _LAST_MOMENTS = 10.0  # [s] from the end of a connection to that of its process
 
 _shared: list[Any] = []
@@ -48,13 +49,22 @@ class WorkerDied(Exception):
     """A worker process ended without an answer; says how."""
 
 
+@dataclass(eq=False)
+class _Task(Generic[Item]):
+    """An item, and how many processes ended over it."""
+
+    item: Item
+    deaths: int = 0
+
+
 class WorkerPool(Closing):
     """Processes of one thread each that share one thing; see :func:`shared`.
 
     Each has a connection of its own, of which this process holds one end only: a worker that dies
     is seen at once, also while it starts.  (The pool of the standard library hands what is shared
     to a new process through a pipe of which it holds both ends; where that is more than the pipe
-    takes, 64 kB, and the process is gone, it waits endlessly.)
+    takes, 64 kB, and the process is gone, it waits endlessly.  Its executor, and that of loky, end
+    all work with the first process that dies, and take three and five times as long per item.)
 
     Parameters
     ----------
@@ -67,6 +77,9 @@ class WorkerPool(Closing):
     def __init__(self, workers: int, given: object) -> None:
         self.workers, self._given = workers, given
         self._processes: dict[Connection, BaseProcess] = {}
+        self._starting: set[Connection] = set()
+        self._tasks: dict[Connection, _Task[Any]] = {}
+        self._read_from: Connection | None = None
         self._is_busy = False
 
     def close(self) -> None:
@@ -77,6 +90,9 @@ class WorkerPool(Closing):
         for process in self._processes.values():
             process.join()
         self._processes.clear()
+        self._starting.clear()
+        self._tasks.clear()
+        self._read_from = None
         self._is_busy = False
 
     def completed(
@@ -97,54 +113,154 @@ class WorkerPool(Closing):
         Exception
             Of ``compute``.
         """
+        left = deque(items)
+        if not left:
+            return
+        for item, found in self.answers(compute, lambda _: left.popleft() if left else None):
+            if isinstance(found, WorkerDied):
+                raise found
+            yield item, found
+
+    def answers(
+        self,
+        compute: Callable[[Item], Result],
+        take: Callable[[object], Item | None],
+        attempts: int = 1,
+    ) -> Iterator[tuple[Item, "Result | WorkerDied"]]:
+        """Compute something for items that are taken one by one, in the order of their end.
+
+        A process that ends without an answer is replaced, and its item computed again, after all
+        others: not by a process that has still to start, which chance may end as well.
+
+        Parameters
+        ----------
+        compute : callable
+            Of a module, with one argument.
+        take : callable
+            Next item for a process, which it gets as a thing to compare with others; None if there
+            is none.
+        attempts : int
+            Processes that an item may end, until that is its answer.
+
+        Raises
+        ------
+        WorkerDied
+            If ten processes one after another ended before they could begin, and nothing was
+            answered meanwhile; the first one, where an item has a single attempt.
+        Exception
+            Of ``compute``.
+        """
         if self._is_busy:  # with what was asked for before, and given up
             self.close()
         self._is_busy = True
-        left = deque(items)
-        running: dict[Connection, Item] = {}
-        self._staff(min(self.workers, len(left)))
-        for connection in list(self._processes)[: len(left)]:
-            running[connection] = left.popleft()
-            self._send(connection, (compute, running[connection]))
-        while running:
-            for connection in _ready(running):
-                result, error = self._receive(connection)
+        again: deque[_Task[Item]] = deque()
+        in_vain, most = 0, _STARTS if attempts > 1 else 1
+
+        def next_task(worker: object) -> _Task[Item] | None:
+            item = take(worker)
+            if item is not None:
+                return _Task(item)
+            return again.popleft() if again else None
+
+        while True:
+            self._employ(compute, next_task)
+            if not self._tasks:
+                break
+            for connection in _ready(self._tasks):
+                task = self._tasks[connection]
+                try:
+                    result, error = self._receive(connection)
+                except (EOFError, OSError):
+                    died = self._buried(connection)
+                    if connection in self._starting:
+                        self._starting.remove(connection)
+                        in_vain += 1
+                        if in_vain >= most:
+                            raise died from None
+                    else:
+                        task.deaths += 1
+                    if task.deaths >= attempts:
+                        yield task.item, died
+                    else:
+                        again.append(task)
+                    continue
                 if error is not None:
                     raise error
-                item = running.pop(connection)
-                if left:
-                    running[connection] = left.popleft()
-                    self._send(connection, (compute, running[connection]))
-                yield item, result
+                in_vain = 0
+                if connection in self._starting:  # and now ready
+                    self._starting.remove(connection)
+                    continue
+                del self._tasks[connection]
+                self._employ(compute, next_task)
+                yield task.item, result
         self._is_busy = False
 
-    def _staff(self, count: int) -> None:
-        """Keep the given number of processes, all with the shared data."""
+    def finished(self) -> Iterator[tuple[Any, Any]]:
+        """Answers that have come to who gave up asking, each with its item."""
+        whole = {key: task for key, task in self._tasks.items() if key is not self._read_from}
+        for connection, task in whole.items():
+            with suppress(EOFError, OSError):
+                while connection in self._tasks and connection.poll():
+                    result, error = self._receive(connection)
+                    if connection in self._starting:
+                        self._starting.remove(connection)
+                    elif error is None:
+                        del self._tasks[connection]
+                        yield task.item, result
+
+    def _employ(
+        self, compute: Callable[[Item], Any], next_task: "Callable[[object], _Task[Item] | None]"
+    ) -> None:
+        """Give work to all processes without any; start further ones while there is some."""
+        for connection in [one for one in self._processes if one not in self._tasks]:
+            task = next_task(connection)
+            if task is not None:
+                self._tasks[connection] = task
+                self._send(connection, (compute, task.item))
+        new = []
+        while len(self._processes) < self.workers:
+            task = next_task(None)
+            if task is None:
+                break
+            new.append(self._started())
+            self._tasks[new[-1]] = task
+        for connection in new:  # all have begun to start: more than a pipe takes is waited for
+            self._send(connection, self._given)
+            self._send(connection, (compute, self._tasks[connection].item))
+
+    def _started(self) -> Connection:
+        """Connection to a new process, to which what is shared has not been sent yet."""
         # a fork would inherit the threads and locks of the libraries
         context = multiprocessing.get_context("spawn")
-        new = []
         with deaf_to_interrupts():
-            for _ in range(count - len(self._processes)):
-                here, there = context.Pipe()
-                process = context.Process(target=_work, args=(there, _start), daemon=True)
-                process.start()
-                there.close()
-                self._processes[here] = process
-                new.append(here)
-        for connection in new:
-            self._send(connection, self._given)
+            here, there = context.Pipe()
+            process = context.Process(target=_work, args=(there, _start), daemon=True)
+            process.start()
+            there.close()
+            self._processes[here] = process
+            self._starting.add(here)
+        return here
 
     def _send(self, connection: Connection, what: object) -> None:
-        try:
+        with suppress(OSError):  # it is gone, as its answer will tell
             connection.send(what)
-        except OSError:
-            raise self._died(connection) from None
 
     def _receive(self, connection: Connection) -> Any:
-        try:
-            return connection.recv()
-        except (EOFError, OSError):
-            raise self._died(connection) from None
+        self._read_from = connection
+        found = connection.recv()
+        self._read_from = None
+        return found
+
+    def _buried(self, connection: Connection) -> WorkerDied:
+        """Forget a process that has gone, and its item; return how it ended."""
+        died = self._died(connection)
+        process = self._processes.pop(connection)
+        process.kill()  # where it only closed its connection
+        process.join()
+        self._tasks.pop(connection, None)
+        self._read_from = None
+        connection.close()
+        return died
 
     def _died(self, connection: Connection) -> WorkerDied:
         process = self._processes[connection]
@@ -206,7 +322,7 @@ def _ready(running: Iterable[Connection]) -> list[Connection]:
 def _work(connection: Connection, start: Callable[[object], None]) -> None:
     """Loop of a worker until it is stopped."""
     with suppress(EOFError, OSError):  # the process that asked has closed its end
-        start(connection.recv())
+        connection.send(_attempt(start, connection.recv()))  # that it is ready
         while True:
             compute, item = connection.recv()
             connection.send(_attempt(compute, item))

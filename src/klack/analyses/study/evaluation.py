@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from time import perf_counter
 
 from klack.analyses.study.log import KeptPoint, PointLog, point_key
-from klack.analyses.study.strokes import AskedPoints, Builds, PointRow, compute_points
+from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.point_workers import PointWorkers
+from klack.analyses.study.strokes import AskedPoints
 from klack.progress import Progress
 
 __all__ = ["Evaluation"]
@@ -16,11 +18,11 @@ class Evaluation:
     Parameters
     ----------
     log : PointLog
-    threads : int, optional
+    workers : PointWorkers
     """
 
-    def __init__(self, log: PointLog, threads: int | None) -> None:
-        self._log, self._threads, self._builds = log, threads, Builds()
+    def __init__(self, log: PointLog, workers: PointWorkers) -> None:
+        self._log, self._workers = log, workers
         self.computed, self.seconds = 0, 0.0
 
     def rows(self, asked: AskedPoints, progress: Progress) -> list[PointRow]:
@@ -42,7 +44,8 @@ class Evaluation:
                 before = self._log.done.get(key, KeptPoint(values={}, failure="", notes=()))
                 self._log.add(key, before.with_row(measures, row))
 
-        compute_points(asked, first.values(), keep, self._threads, progress, self._builds)
+        if first:
+            self._workers.compute(asked, tuple(first.values()), keep, progress)
         self.seconds += perf_counter() - begin
         return [
             row or self._as(rows, first, key, measures) for key, row in zip(keys, rows, strict=True)

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from klack.analyses.study.strokes import PointRow
+from klack.analyses.study.point_row import PointRow
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.bodies import CaseBody
 from klack.case.case_tree import CaseTree
@@ -104,7 +104,8 @@ class _Deciding:
 
 def _own_code(case: ValveCase) -> Iterator[bytes]:
     for name, digest in case.own_components.items():
-        yield f"{name} {digest}".encode()
+        # a worker process knows the script that started it by another name
+        yield f"{name.replace('__mp_main__:', '__main__:')} {digest}".encode()
     for name, part in case.network.components.items():
         file = getattr(part, "file", None)  # of an FMU
         if isinstance(file, Path):

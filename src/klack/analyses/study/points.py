@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import StringIO
 from itertools import product
 from math import prod
@@ -37,7 +37,7 @@ __all__ = [
     "StudyPoints",
     "Values",
     "linked_of",
-    "points_of_study",
+    "points_in",
     "require_varied",
     "space_of",
 ]
@@ -95,10 +95,13 @@ class Space:
         All of the study.
     linked : tuple of Linked
         In the order in which they can be computed.
+    constants : mapping of str to float [SI]
+        What expressions need beside the parameters; no part of a point.
     """
 
     parameters: tuple[Parameter, ...]
     linked: tuple[Linked, ...]
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def varied(self) -> tuple[Parameter, ...]:
@@ -120,9 +123,20 @@ class Space:
         """
         point = dict(zip((item.name for item in self.varied), row, strict=True))
         point |= {item.name: item.spread.at(0.5) for item in self.parameters if item.is_fixed}
+        return self.completed(point)
+
+    def completed(self, point: Values) -> Values:
+        """Values [SI] of the parameters with those that follow from them.
+
+        Raises
+        ------
+        InputError
+            For an expression without a value there.
+        """
+        found = {**self.constants, **point}
         for item in self.linked:
-            point[item.name] = item.value(point)
-        return point
+            found[item.name] = item.value(found)
+        return found
 
     def written(self, values: Values) -> dict[str, PointValue]:
         """What the case file has at a point, by the path of the key."""
@@ -135,18 +149,24 @@ class Space:
 
         A word of the study stands for the key that it is linked with, if it is by itself.
         """
+        known = self.known()
+        found = [
+            item.spread.share(known[item.name]) if item.name in known else 0.5  # type: ignore[arg-type]
+            for item in self.varied
+        ]
+        return np.array(found, dtype=float)
+
+    def known(self) -> Values:
+        """Values [SI] of parameters and linked keys in the case as it is, as far as it has them."""
         own = {
             name: item.today
             for item in self.linked
             for word, name in item.words.items()
             if item.expression.text == word
         }
-        found = [
-            item.spread.share(value) if value is not None else 0.5  # type: ignore[arg-type]
-            for item in self.varied
-            for value in [own.get(item.name) if item.today is None else item.today]
-        ]
-        return np.array(found, dtype=float)
+        fixed = {item.name: item.spread.at(0.5) for item in self.parameters if item.is_fixed}
+        keys = {item.name: item.today for item in self.parameters if item.today is not None}
+        return {**fixed, **own, **keys, **{item.name: item.today for item in self.linked}}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -184,15 +204,14 @@ def space_of(case: ValveCase, source: StudySource) -> Space:
     return Space(parameters=parameters, linked=linked_of(case, source, parameters))
 
 
-def points_of_study(case: ValveCase, source: StudySource) -> StudyPoints:
-    """Points of the design of a study.
+def points_in(source: StudySource, space: Space) -> StudyPoints:
+    """Points of the design of a study in its space.
 
     Raises
     ------
     InputError
         With file, line and key.
     """
-    space = space_of(case, source)
     kind = source.study.design.kind
     if kind != "file":
         require_varied(source, space.varied)
@@ -281,7 +300,7 @@ def _drawn(source: StudySource, space: Space) -> StudyPoints:
     """Points that are drawn in the unit cube."""
     design = source.study.design
     cube, name = _cube(source, space.varied)
-    even = design.kind not in ("sobol", "saltelli") or balanced(design.points)
+    even = design.kind not in ("sobol", "saltelli", "made") or balanced(design.points)
     return StudyPoints(
         space=space,
         values=tuple(map(space.at, cube)),
@@ -302,7 +321,8 @@ def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.
         return cube, "trajectories of Morris"
     if design.kind == "latin-hypercube":
         return latin_hypercube(design.points, count, design.seed), "Latin hypercube"
-    return sobol_sequence(design.points, count, design.seed), "Sobol points"
+    name = "valves made after the case, Sobol points" if design.kind == "made" else "Sobol points"
+    return sobol_sequence(design.points, count, design.seed), name
 
 
 def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:

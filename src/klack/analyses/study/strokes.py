@@ -9,12 +9,13 @@ number of threads nor on the other points.
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
-from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
+from klack.analyses.point_table import NOT_COMPUTED, PointTable, column_of
 from klack.analyses.record import run_fields
 from klack.analyses.stroke.record import StopSummary
 from klack.analyses.stroke.rest import rest_note
@@ -27,7 +28,14 @@ from klack.analyses.stroke.run import (
     variant_network,
 )
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointRun, chosen_measures
-from klack.analyses.threads import Stopped, on_threads, warnings_of_threads
+from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.tally import Tally
+from klack.analyses.threads import (
+    Stopped,
+    on_threads,
+    one_thread_of_blas,
+    warnings_of_threads,
+)
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
@@ -48,49 +56,28 @@ from klack.errors import AccuracyWarning, InputError, KlackError
 from klack.input.problem import Key
 from klack.memory import require_memory
 from klack.progress import Progress, silent
+from klack.signals import TimeSeries
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
-from klack.stages import FAILURES, StageClock, collected_warnings, show
+from klack.stages import FAILURES, StageClock, collected_warnings
 
-__all__ = ["AskedPoints", "Builds", "PointRow", "compute_points", "row_table", "run_strokes"]
+__all__ = [
+    "AskedPoints",
+    "Builds",
+    "PointGroup",
+    "compute_alone",
+    "compute_points",
+    "groups_of",
+    "makes_bodies",
+    "row_table",
+    "sounds_of",
+]
 
 _AROUND = 50e6  # [byte] of a run beside its records
 _FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
-_STAGE = "points"
 _MOST_BUILDS = 8
 _ASIDE = ("run", "lumped", "measurement", "calibration", "title", "description")
 """Sections that bodies, contact laws and their stops do not depend on."""
-
-
-@dataclass(frozen=True, slots=True)
-class PointRow:
-    """What one point leaves behind.
-
-    Parameters
-    ----------
-    values : tuple of float or None
-        Of the measures, in their order.
-    failure : str
-        Why there are none; empty if it was computed.
-    notes : tuple of str
-        Doubts about the numbers.
-    others : tuple of WarningMessage
-        Warnings that are no doubt about a number.
-    by_chance : bool
-        True if the same point may be computed another time: the memory was full, or a component
-        of the user's own has failed.
-    """
-
-    values: tuple[float | None, ...]
-    failure: str = ""
-    notes: tuple[str, ...] = ()
-    others: tuple[warnings.WarningMessage, ...] = ()
-    by_chance: bool = False
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Values with nan where there is none."""
-        return tuple(float("nan") if value is None else value for value in self.values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +126,7 @@ class AskedPoints:
                     expected="one variant for all points",
                     hint='write variant="dry", and compute two tables.',
                 )
-        name = case.require_variants((variant,) if variant is not None else case.run.variants)[0]
+        name = case.one_variant(variant)
         return cls(case=case, tree=tree, points=asked, chosen=chosen, variant=name)
 
     def failed(self, error: BaseException) -> PointRow:
@@ -150,7 +137,7 @@ class AskedPoints:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Group:
+class PointGroup:
     """Points with the same bodies and contact laws.
 
     Parameters
@@ -203,11 +190,11 @@ class Builds:
     def __init__(self) -> None:
         self._found: OrderedDict[tuple[object, ...], _Built] = OrderedDict()
 
-    def find(self, asked: AskedPoints, group: _Group) -> _Built | None:
+    def find(self, asked: AskedPoints, group: PointGroup) -> _Built | None:
         """What a group needs, if it is there."""
         return self._found.get(self._key(asked, group))
 
-    def keep(self, asked: AskedPoints, group: _Group, built: _Built) -> None:
+    def keep(self, asked: AskedPoints, group: PointGroup, built: _Built) -> None:
         """Keep it, and let go of the oldest."""
         key = self._key(asked, group)
         self._found[key] = built
@@ -215,59 +202,9 @@ class Builds:
         while len(self._found) > _MOST_BUILDS:
             self._found.popitem(last=False)
 
-    def _key(self, asked: AskedPoints, group: _Group) -> tuple[object, ...]:
+    def _key(self, asked: AskedPoints, group: PointGroup) -> tuple[object, ...]:
         touched = tuple(key.place for key in asked.points.keys)
         return (id(asked.tree), touched, tuple(group.made.items()))
-
-
-def run_strokes(
-    case: ValveCase,
-    tree: CaseTree,
-    points: GivenPoints,
-    measures: Iterable[str],
-    *,
-    variant: str | None = None,
-    threads: int | None = None,
-    progress: Progress = silent,
-) -> PointTable:
-    """Compute one variant of a stroke at many points.
-
-    Parameters
-    ----------
-    case : ValveCase
-    tree : CaseTree
-        The same as it was written.
-    points : sequence of mappings, or mapping of sequences
-        Key of the case to a value with its unit, for every point; or a list of values by key.
-    measures : iterable of str
-        See :class:`~klack.analyses.study.chosen_measures.ChosenMeasure`.
-    variant : str, optional
-        The first one of the case by default.
-    threads : int, optional
-        The available cores by default; 1 for a case whose components call Python or an FMU, which
-        need not bear several calls at a time.
-    progress : callable
-        Called with a stage and the share of the points that are done.
-
-    Raises
-    ------
-    InputError
-        Before the first run: for a key, a unit or a measure that does not exist, and where so many
-        strokes at a time do not fit into the memory.
-    RunsInterrupted
-        On Ctrl-C, with the table of what was computed until then.
-    """
-    asked = AskedPoints.of(case, tree, points, measures, variant)
-    if threads is not None and (isinstance(threads, bool) or threads < 1):
-        raise InputError(
-            "threads", got=str(threads), expected="1 or more", hint="leave it out: all cores."
-        )
-    rows: list[PointRow | None] = [None] * len(asked.points)
-    try:
-        compute_points(asked, range(len(rows)), rows.__setitem__, threads, progress)
-    except KeyboardInterrupt:
-        raise RunsInterrupted(row_table(asked, rows)) from None
-    return row_table(asked, rows)
 
 
 def compute_points(
@@ -300,24 +237,12 @@ def compute_points(
         Ctrl-C, after the rows that were finished have been kept.
     """
     wanted = list(places)
-    others: dict[str, warnings.WarningMessage] = {}
-    begin, done = len(asked.points) - len(wanted), 0
-
-    def kept(place: int, row: PointRow) -> None:
-        nonlocal done
-        keep(place, row)
-        done += 1
-        others.update({str(item.message): item for item in row.others})
-
-    def tell() -> None:
-        progress(_STAGE, (begin + done) / len(asked.points))
-
-    try:
-        for group in _groups(asked, wanted):
-            tell()
-            _run_group(asked, group, kept, tell, threads, progress, builds or Builds())
-    finally:
-        show(others.values())
+    kept = builds or Builds()
+    tally = Tally(len(asked.points), len(wanted), keep, progress)
+    with tally, one_thread_of_blas():
+        for group in groups_of(asked, wanted):
+            tally.tell()
+            _run_group(asked, group, tally, threads, progress, kept)
 
 
 def row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTable:
@@ -347,17 +272,17 @@ def row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTabl
     )
 
 
-def _groups(asked: AskedPoints, places: Iterable[int]) -> tuple[_Group, ...]:
+def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ...]:
     """Points that share their bodies, in the order of the first one of each group."""
     found: dict[tuple[tuple[Key, PointValue], ...], list[int]] = {}
     for i in places:
         changes = asked.points.changes(i).items()
-        made = tuple(item for item in changes if _makes_bodies(asked.case, item[0]))
+        made = tuple(item for item in changes if makes_bodies(asked.case, item[0]))
         found.setdefault(made, []).append(i)
-    return tuple(_Group(made=dict(made), places=tuple(at)) for made, at in found.items())
+    return tuple(PointGroup(made=dict(made), places=tuple(at)) for made, at in found.items())
 
 
-def _makes_bodies(case: ValveCase, place: Key) -> bool:
+def makes_bodies(case: ValveCase, place: Key) -> bool:
     """Whether meshes, modes or contact laws may follow from what stands there.
 
     They do from the damping of a body: the port pattern of a stop is that of an impact.
@@ -376,27 +301,79 @@ def _makes_bodies(case: ValveCase, place: Key) -> bool:
 
 def _run_group(
     asked: AskedPoints,
-    group: _Group,
-    keep: Callable[[int, PointRow], None],
-    tell: Callable[[], None],
+    group: PointGroup,
+    tally: Tally,
     threads: int | None,
     progress: Progress,
     builds: Builds,
 ) -> None:
     built, left = builds.find(asked, group), group.places
     if built is None:
-        built, left = _build(asked, group, keep, progress)
+        built, left = _build(asked, group, tally, progress)
     if built is None:
         return
     builds.keep(asked, group, built)
     with warnings_of_threads() as taken:
         crew = _crew(asked, built, left, threads)
         taken()
-        on_threads(left, lambda i, check: _row(asked, built, i, check, taken), crew, keep, tell)
+        on_threads(
+            left, lambda i, check: _row(asked, built, i, check, taken), crew, tally, tally.tell
+        )
+
+
+def compute_alone(asked: AskedPoints, builds: Builds) -> list[PointRow]:
+    """Compute all points in this thread, one after another.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    builds : Builds
+        Bodies and laws that were made before.
+
+    Returns
+    -------
+    list of PointRow
+        In the order of the points; warnings of the bodies go with the last one.
+    """
+    found: dict[int, PointRow] = {}
+    with warnings.catch_warnings(record=True) as caught, one_thread_of_blas():
+        warnings.simplefilter("always")
+        for group in groups_of(asked, range(len(asked.points))):
+            _run_alone(asked, group, found, builds)
+    rows = [found[i] for i in range(len(found))]
+    if caught and rows:
+        rows[-1] = replace(rows[-1], others=(*rows[-1].others, *caught))
+    return rows
+
+
+def _run_alone(
+    asked: AskedPoints, group: PointGroup, found: dict[int, PointRow], builds: Builds
+) -> None:
+    built, left = builds.find(asked, group), group.places
+    is_new = built is None
+    if built is None:
+        built, left = _build(asked, group, found.__setitem__, silent)
+    if built is None:
+        return
+    with warnings_of_threads() as taken:
+        if is_new:
+            try:
+                _crew(asked, built, left, 1)
+            except InputError as error:  # the memory is full at this moment
+                found.update(dict.fromkeys(left, replace(asked.failed(error), by_chance=True)))
+                return
+            taken()
+            builds.keep(asked, group, built)
+        for i in left:
+            found[i] = _row(asked, built, i, _never, taken)
+
+
+def _never() -> None:
+    """Nothing asks this work to stop."""
 
 
 def _build(
-    asked: AskedPoints, group: _Group, keep: Callable[[int, PointRow], None], progress: Progress
+    asked: AskedPoints, group: PointGroup, keep: Callable[[int, PointRow], None], progress: Progress
 ) -> tuple[_Built | None, tuple[int, ...]]:
     """Bodies and laws for the first point that the case allows, and the points that are left.
 
@@ -412,7 +389,7 @@ def _build(
         left = group.places[k:]
         try:
             with collected_warnings() as notes:
-                valve = build_valve(case, progress)
+                valve = build_valve(case, progress, threads=1)
         except FAILURES as error:
             for place in left:
                 keep(place, asked.failed(error))
@@ -458,21 +435,14 @@ def _row(
 ) -> PointRow:
     """Compute one point, in whichever thread."""
     try:
-        valve = _valve_at(asked, built, i)
-        roles = find_roles(valve.case, valve.network)
-        run = one_variant(valve, roles, asked.variant, None, lambda stage, fraction: check())
-        if run.failure is not None:
-            raise run.failure
-        whole = PointRun(
-            run.variant, lambda: _noise_source(asked, built, valve, roles, run), built.transfers
-        )
+        whole, roles = _point_run(asked, built, i, check)
         values = tuple(item.value(whole) for item in asked.chosen)
     except Stopped:
         raise
     except BaseException as error:  # a component of the user's own may raise anything
         return replace(asked.failed(error), others=_others(taken()))
     caught = taken()
-    result = run.variant.result
+    result = whole.variant.result
     doubts = [str(item.message) for item in caught if issubclass(item.category, AccuracyWarning)]
     begun = result.start.notes if result.start is not None else ()
     rest = rest_note(asked.variant, result, roles.seat)
@@ -480,6 +450,45 @@ def _row(
     notes += [note for note in begun if not any(note in other for other in notes)]
     notes += [rest] if rest else []
     return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=_others(caught))
+
+
+def _point_run(
+    asked: AskedPoints, built: _Built, i: int, check: Callable[[], None]
+) -> tuple[PointRun, ValveRoles]:
+    """Stroke of a point."""
+    valve = _valve_at(asked, built, i)
+    roles = find_roles(valve.case, valve.network)
+    run = one_variant(valve, roles, asked.variant, None, lambda stage, fraction: check())
+    if run.failure is not None:
+        raise run.failure
+    whole = PointRun(
+        run.variant, lambda: _noise_source(asked, built, valve, roles, run), built.transfers
+    )
+    return whole, roles
+
+
+def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None, ...]:
+    """Sound of a click of every point, computed once more; None where there is none.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    progress : callable
+    """
+    found: list[TimeSeries | None] = [None] * len(asked.points)
+    done = 0
+    with warnings.catch_warnings(), one_thread_of_blas():
+        warnings.simplefilter("ignore")  # the points have been computed, and their doubts told
+        for group in groups_of(asked, range(len(found))):
+            built, left = _build(asked, group, lambda place, row: None, silent)
+            if built is None:
+                continue
+            for i in left:
+                progress("sounds", done / len(found))
+                with suppress(KlackError):
+                    found[i] = _point_run(asked, built, i, _never)[0].pressure
+                done += 1
+    return tuple(found)
 
 
 def _noise_source(

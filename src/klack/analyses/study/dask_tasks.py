@@ -1,0 +1,157 @@
+"""Points on their way through a cluster of dask, and what comes back."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, TypeVar
+from uuid import uuid4
+
+import klack
+from klack.analyses.study.point_order import Answer, PointOrder, answered
+from klack.analyses.study.process_workers import died_row
+from klack.analyses.study.sent_case import SentCase
+from klack.analyses.study.strokes import AskedPoints
+from klack.analyses.study.tally import Tally
+from klack.analyses.workers import Failure, unwrapped
+from klack.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+__all__ = ["DaskTasks"]
+
+Given = TypeVar("Given")
+
+_ROUNDS = 2
+"""Times that dask gives a point up, each after four workers: over a neighbour, then over itself."""
+
+
+class DaskTasks:
+    """Tasks of a client, each with some points.
+
+    Parameters
+    ----------
+    client : Client
+    sent : SentCase
+    asked : AskedPoints
+    tally : Tally
+        Gets the rows.
+    learn : callable
+        Gets each answer.
+    """
+
+    def __init__(
+        self,
+        client: "Client",
+        sent: SentCase,
+        asked: AskedPoints,
+        tally: Tally,
+        learn: Callable[[Answer], None],
+    ) -> None:
+        self._client, self._sent, self._asked = client, sent, asked
+        self._tally, self._learn = tally, learn
+        self._case = self._send_case()
+        self._ended: SimpleQueue[Future] = SimpleQueue()
+        self._places: dict[Future, tuple[int, ...]] = {}
+        self._given_up: Counter[int] = Counter()
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def submit(self, places: tuple[int, ...]) -> None:
+        """Send points on their way."""
+        order = PointOrder.of(self._asked, places)
+        key = f"klack-points-{uuid4().hex}"
+        future = self._client.submit(_on_worker, self._case, order, key=key)
+        self._places[future] = places
+        future.add_done_callback(self._ended.put)
+
+    def settle(self, patience: float) -> None:
+        """Wait for tasks that end, at most so long [s], and keep their rows.
+
+        Raises
+        ------
+        InputError
+            Where a worker cannot compute any point.
+        """
+        ended = [future for future in self._taken(patience) if future in self._places]
+        finished = [future for future in ended if future.status == "finished"]
+        self._keep(finished)
+        for future in ended:
+            if future not in self._places:
+                continue
+            if future.status in ("error", "cancelled"):
+                self._again(future)
+            else:  # the worker that had the rows is lost: dask has them computed again
+                future.add_done_callback(self._ended.put)
+
+    def give_up(self) -> None:
+        """Keep the rows that have come, and take back the rest."""
+        try:
+            self._keep([future for future in self._places if future.status == "finished"])
+        finally:
+            self._client.cancel([*self._places, self._case])
+            self._places.clear()
+
+    def _taken(self, patience: float) -> list["Future"]:
+        found: list[Future] = []
+        try:
+            found.append(self._ended.get(timeout=patience))
+            while True:
+                found.append(self._ended.get_nowait())
+        except Empty:
+            return found
+
+    def _keep(self, finished: Iterable["Future"]) -> None:
+        futures = list(finished)
+        answers: list[tuple[str, Answer | Failure]] = self._client.gather(futures)
+        refused: list[tuple[str, Failure]] = []
+        for future, (address, found) in zip(futures, answers, strict=True):
+            places = self._places.pop(future)
+            future.release()
+            if isinstance(found, Failure):
+                refused.append((address, found))
+                continue
+            self._learn(found)
+            for place, row in zip(places, found.rows, strict=True):
+                self._tally(place, row)
+        for address, failure in refused:
+            unwrapped(f"worker {address}", failure)
+
+    def _again(self, future: "Future") -> None:
+        """Send points of a task without an answer once more, one by one; or give them up."""
+        from distributed import KilledWorker
+
+        places = self._places.pop(future)
+        error = future.exception() if future.status == "error" else None
+        if isinstance(error, ImportError | AttributeError):
+            raise InputError(
+                "dask",
+                got=f"a worker that cannot load what it is sent ({error})",
+                expected=f"klack {klack.__version__} in the environment of every worker",
+                hint="start the workers in the same environment as this command.",
+            )
+        if error is not None and not isinstance(error, KilledWorker):
+            raise error
+        self._case = self._send_case()
+        for place in places:
+            self._given_up[place] += len(places) == 1
+            if self._given_up[place] < _ROUNDS:
+                self.submit((place,))
+                continue
+            self._tally(place, died_row(self._asked, str(error or "the task was taken back")))
+
+    def _send_case(self) -> "Future":
+        """A task of its own: the scheduler has it done again where its worker is lost."""
+        key = f"klack-case-{uuid4().hex}"
+        return self._client.submit(_same, self._sent, key=key)
+
+
+def _same(given: Given) -> Given:
+    return given
+
+
+def _on_worker(sent: SentCase, order: PointOrder) -> tuple[str, Answer | Failure]:
+    from distributed import get_worker
+
+    return get_worker().address, answered(sent, order)

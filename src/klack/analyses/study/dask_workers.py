@@ -1,0 +1,244 @@
+"""Points on a cluster, by dask.distributed."""
+
+from asyncio import CancelledError
+from collections import deque
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+import klack
+from klack.analyses.study.agenda import Agenda
+from klack.analyses.study.dask_tasks import DaskTasks
+from klack.analyses.study.point_order import Answer
+from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.sent_case import SentCase
+from klack.analyses.study.strokes import AskedPoints, groups_of
+from klack.analyses.study.tally import Tally
+from klack.case.case_tree import CaseTree
+from klack.case.valve import ValveCase
+from klack.closing import Closing
+from klack.errors import ConvergenceError, InputError, MissingExtraError
+from klack.progress import Progress, remark
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+__all__ = ["DaskWorkers", "require_dask"]
+
+_LOOK = 0.2
+"""Between two looks for Ctrl-C [s]."""
+_COUNT = 1.0
+"""Between two counts of the workers [s]."""
+_PATIENCE = 20.0
+"""For the scheduler to answer [s]."""
+_AHEAD = 2
+"""Tasks on their way for each worker."""
+_FEWEST = 16
+"""Tasks on their way, also to a cluster that has still to grow."""
+
+
+def require_dask() -> None:
+    """Refuse a cluster without dask.distributed.
+
+    Raises
+    ------
+    MissingExtraError
+    """
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise MissingExtraError("distributed", "A study on a cluster", "dask") from None
+
+
+class DaskWorkers(Closing):
+    """Workers of a cluster of dask compute, this process keeps the rows.
+
+    Points that a lost worker had at that moment are computed by others.
+
+    Parameters
+    ----------
+    case : ValveCase
+    tree : CaseTree
+        The same as it was written.
+    scheduler : str, Client or Cluster
+        Address, a file with it, a client, which stays open, or a cluster.
+
+    Raises
+    ------
+    MissingExtraError
+        Without dask.distributed.
+    InputError
+        If the scheduler does not answer, or if the case cannot be sent.
+    """
+
+    words = "workers of dask"
+
+    def __init__(self, case: ValveCase, tree: CaseTree, scheduler: "str | Client") -> None:
+        require_dask()
+        self._sent = SentCase.of(case, tree)
+        self._client, self._is_own = _client(scheduler)
+        self._pace = _Pace()
+        self.count, self._now, self._counted = 0, 0, -_COUNT
+        self._checked: set[str] = set()
+        self._told = False
+
+    def close(self) -> None:
+        """Leave the cluster."""
+        if self._is_own:
+            self._client.close()
+
+    def compute(
+        self,
+        asked: AskedPoints,
+        places: Sequence[int],
+        keep: Callable[[int, PointRow], None],
+        progress: Progress,
+    ) -> None:
+        """Compute some of the points, as :class:`PointWorkers` says.
+
+        Raises
+        ------
+        ConvergenceError
+            If the scheduler is lost.
+        """
+        self._require_a_worker(progress)
+        groups = groups_of(asked, places)
+        agenda = Agenda([group.places for group in groups])
+        with Tally(len(asked.points), len(places), keep, progress) as tally:
+            tasks = DaskTasks(self._client, self._sent, asked, tally, self._pace.learn)
+            try:
+                while agenda.left or tasks:
+                    tally.tell()
+                    self._require_scheduler()
+                    self._count_workers(progress)
+                    most = max(_FEWEST, _AHEAD * self._now)
+                    while agenda.left and len(tasks) < most:
+                        points = self._pace.points(agenda.left, most, len(groups) > 1)
+                        tasks.submit(agenda.take(most=points))
+                    tasks.settle(_LOOK)
+                tally.tell()
+            except (OSError, CancelledError) as error:
+                raise self._lost(error) from None
+            finally:
+                if self._client.status == "running":
+                    tasks.give_up()
+
+    def _require_a_worker(self, progress: Progress) -> None:
+        """Wait for the first worker, by a task that makes a cluster grow and needs no klack."""
+        probe = self._client.submit(version, "klack", pure=False)
+        try:
+            while not probe.done():
+                self._require_scheduler()
+                self._count_workers(progress)
+                sleep(_LOOK / 10)
+            self._count_workers(progress)
+        except (OSError, CancelledError) as error:
+            raise self._lost(error) from None
+        finally:
+            probe.release()
+
+    def _count_workers(self, progress: Progress) -> None:
+        """Count the workers once a second, and check those that are new."""
+        if monotonic() < self._counted + _COUNT:
+            return
+        self._counted = monotonic()
+        threads = self._client.nthreads()
+        before, self._now = self._now, len(threads)
+        self.count = max(self.count, self._now)
+        if not threads and (before or not self._checked):
+            remark(progress, "no worker of dask: waiting for one")
+        new = [address for address in threads if address not in self._checked]
+        if not new:
+            return
+        try:
+            told = self._client.run(version, "klack", workers=new, on_error="return")
+        except (OSError, ValueError, KeyError):  # one of them has gone: next time
+            return
+        for address, found in told.items():
+            _require_version(address, found)
+            self._checked.add(address)
+        if max(threads[address] for address in new) > 1 and not self._told:
+            self._told = True
+            remark(
+                progress,
+                "workers of dask with several threads compute one point at a time; start them "
+                "with --nthreads 1",
+            )
+
+    def _require_scheduler(self) -> None:
+        if self._client.status != "running":
+            raise self._lost(self._client.status)
+
+    def _lost(self, why: object) -> ConvergenceError:
+        return ConvergenceError(
+            f"the scheduler of dask is lost ({str(why) or type(why).__name__}).\nTry: start it "
+            "anew; all points that came until now are kept, and the same command resumes."
+        )
+
+
+def _require_version(address: str, found: object) -> None:
+    """Refuse a worker without klack, or with another one, before it gets what it cannot read."""
+    if found == klack.__version__ or not isinstance(found, str | ImportError):  # it has gone again
+        return
+    got = f"klack {found}" if isinstance(found, str) else f"no klack ({found})"
+    raise InputError(
+        f"worker {address}",
+        got=got,
+        expected=f"klack {klack.__version__}, as where the study was started: points are kept by "
+        "its version",
+        hint="start the workers in the same environment as this command.",
+    )
+
+
+class _Pace:
+    """How many points make a task that is worth its way."""
+
+    _short, _long, _most = 0.5, 5.0, 64
+    """Work of a task with the bodies of all others, and with bodies of its own [s]; points."""
+
+    def __init__(self) -> None:
+        self._seconds: deque[float] = deque(maxlen=32)
+
+    def learn(self, answer: Answer) -> None:
+        """Take note of the time that points took."""
+        self._seconds.append(answer.seconds / max(len(answer.rows), 1))
+
+    def points(self, left: int, tasks: int, own_bodies: bool) -> int:
+        """Points for the next task, if so many are left for so many tasks."""
+        if not self._seconds:
+            return 1
+        usual = sorted(self._seconds)[len(self._seconds) // 2]
+        goal = self._long if own_bodies else self._short
+        return int(max(1, min(goal / max(usual, 1e-6), self._most, -(-left // tasks))))
+
+
+def _client(scheduler: "str | Client") -> "tuple[Client, bool]":
+    """A client, and whether it is to be closed.
+
+    Raises
+    ------
+    InputError
+        If the scheduler does not answer.
+    """
+    from distributed import Client
+
+    if isinstance(scheduler, Client):
+        return scheduler, False
+    if hasattr(scheduler, "scheduler_address"):  # a cluster
+        return Client(scheduler, set_as_default=False), True
+    text = str(scheduler)
+    try:
+        if Path(text).is_file():
+            client = Client(scheduler_file=text, timeout=_PATIENCE, set_as_default=False)
+        else:
+            client = Client(text, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError, TimeoutError) as error:
+        raise InputError(
+            f"dask {text}",
+            got=f"no answer ({str(error).strip() or type(error).__name__})",
+            expected="the address of a running scheduler of dask, or a file with it",
+            hint="start one: dask scheduler --scheduler-file scheduler.json.",
+        ) from None
+    return client, True

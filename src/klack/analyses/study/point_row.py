@@ -1,0 +1,37 @@
+"""What one point of a study leaves behind."""
+
+import warnings
+from dataclasses import dataclass
+
+__all__ = ["PointRow"]
+
+
+@dataclass(frozen=True, slots=True)
+class PointRow:
+    """What one point leaves behind.
+
+    Parameters
+    ----------
+    values : tuple of float or None
+        Of the measures, in their order.
+    failure : str
+        Why there are none; empty if it was computed.
+    notes : tuple of str
+        Doubts about the numbers.
+    others : tuple of WarningMessage
+        Warnings that are no doubt about a number.
+    by_chance : bool
+        True if the same point may be computed another time: the memory was full, or a component
+        of the user's own has failed.
+    """
+
+    values: tuple[float | None, ...]
+    failure: str = ""
+    notes: tuple[str, ...] = ()
+    others: tuple[warnings.WarningMessage, ...] = ()
+    by_chance: bool = False
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Values with nan where there is none."""
+        return tuple(float("nan") if value is None else value for value in self.values)

@@ -1,0 +1,142 @@
+"""A case as it travels to another process, and what tells that it is the same there."""
+
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Self
+
+import klack
+from klack.analyses.study.log import point_log_form
+from klack.analyses.unfinished import code_of_klack
+from klack.case.case_tree import CaseTree
+from klack.case.valve import ValveCase
+from klack.elasticity.factorization import chosen_backend
+from klack.errors import InputError
+
+__all__ = ["SentCase", "versions_here"]
+
+_DECIDING = ("numpy", "scipy", "numba", "netgen-mesher", "mosqito")
+"""Packages that decide the bits of a point."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SentCase:
+    """A case as it was written, for a process that may run on another machine.
+
+    Parameters
+    ----------
+    content : bytes
+        The tree of the case: plain data, and components of the user's own by their module and name.
+    folder : str
+        Current folder of the sender: paths of the case are relative to it.
+    mark : str
+        Of the log of its points: content of the case, its files, components and of klack.
+    versions : mapping of str to str
+        See :func:`versions_here`.
+    """
+
+    content: bytes
+    folder: str
+    mark: str
+    versions: Mapping[str, str]
+
+    @classmethod
+    def of(cls, case: ValveCase, tree: CaseTree) -> Self:
+        """Case ready to be sent.
+
+        Raises
+        ------
+        InputError
+            For a component whose class other processes cannot import.
+        """
+        try:
+            content = pickle.dumps(tree)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise InputError(
+                "workers",
+                got=f"a case that cannot be sent to another process ({error})",
+                expected="components whose class stands at the top of a module",
+                hint="put the class into a module of its own, or compute on threads.",
+            ) from None
+        return cls(content, str(Path.cwd()), point_log_form(case, tree)[1], versions_here())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SentCase) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[object, ...]:
+        return self.content, self.folder, self.mark, *sorted(self.versions.items())
+
+    def read(self) -> tuple[ValveCase, CaseTree]:
+        """Check the case where it has arrived.
+
+        Raises
+        ------
+        InputError
+            Where klack, or a package that decides the bits of a point, has another version; where
+            a file or a class of the case is not there or has another content.
+        """
+        self._require_versions()
+        try:
+            tree: CaseTree = pickle.loads(self.content)
+        except (ImportError, AttributeError) as error:
+            raise InputError(
+                "components",
+                got=f"a class that cannot be imported there ({error})",
+                expected="the modules of your components in a folder of PYTHONPATH there",
+                hint="install them there; a class in a script or notebook cannot be found.",
+            ) from None
+        if not tree.path.is_absolute() and Path.cwd() != Path(self.folder):
+            tree = replace(tree, path=Path(self.folder) / tree.path)
+        try:
+            case = tree.case()
+        except InputError as error:
+            raise InputError(
+                error.where,
+                got=error.got,
+                expected=f"{error.expected}, as where the study was started",
+                hint="files that the case names must have the same path on every machine: use a "
+                "shared folder.",
+            ) from None
+        if point_log_form(case, tree)[1] != self.mark:
+            raise InputError(
+                str(tree.path),
+                got="files or components of the case with another content",
+                expected="the same bytes as where the study was started",
+                hint="share the folder of the case, or copy it to every machine once more.",
+            )
+        return case, tree
+
+    def _require_versions(self) -> None:
+        here = versions_here()
+        for name, wanted in self.versions.items():
+            if here.get(name) != wanted:
+                raise InputError(
+                    "version",
+                    got=f"{name} {here.get(name, 'not installed')}",
+                    expected=f"{name} {wanted}, as where the study was started: points are kept "
+                    "by their version",
+                    hint="install the same versions on every machine, and start its workers anew.",
+                )
+
+
+@cache  # of the code that runs, which may not be what stands on the disk later
+def versions_here() -> Mapping[str, str]:
+    """Versions of all that decides the bits of a point: klack, its code, packages, the solver."""
+    code = sha256()
+    for part in code_of_klack():
+        code.update(part)
+    found = {"klack": klack.__version__, "the code of klack": code.hexdigest()[:12]}
+    for name in _DECIDING:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found | {"the solver": chosen_backend("auto")}

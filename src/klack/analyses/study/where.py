@@ -1,0 +1,159 @@
+"""Where the points of a study are computed, as the user wants it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.point_workers import PointWorkers, ThreadWorkers
+from klack.analyses.study.process_workers import PROCESS_SIZE, ProcessWorkers
+from klack.analyses.study.strokes import AskedPoints, groups_of
+from klack.case.case_tree import CaseTree
+from klack.case.valve import ValveCase
+from klack.closing import Closing
+from klack.cores import available_cores
+from klack.errors import InputError
+from klack.memory import available_memory
+from klack.progress import Progress
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+__all__ = ["HERE", "Where"]
+
+_NOISE = 64
+"""Points with noise (0.15 s) that make up for the start of processes (4 s)."""
+_GEOMETRIES = 16
+"""New bodies (0.7 s) that do: threads mesh one after another."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Where:
+    """Threads of this process, processes of this machine, or a cluster.
+
+    Parameters
+    ----------
+    threads : int, optional
+        All cores by default.
+    workers : int, optional
+        Processes, in place of threads.
+    dask : str, Client or Cluster of distributed, optional
+        Address of a scheduler, or a file that has it.
+    is_free : bool
+        Whether klack may take processes in place of threads where that is faster.
+
+    Raises
+    ------
+    InputError
+        For numbers that cannot be, and for two places at once.
+    MissingExtraError
+        For a cluster without dask.distributed.
+    """
+
+    threads: int | None = None
+    workers: int | None = None
+    dask: "str | Client | None" = None
+    is_free: bool = False
+
+    def __post_init__(self) -> None:
+        """Check what was asked for."""
+        for name, value in (("threads", self.threads), ("workers", self.workers)):
+            if value is not None and (isinstance(value, bool) or value < 1):
+                raise InputError(
+                    name, got=str(value), expected="1 or more", hint="leave it out: all cores."
+                )
+        given = {"threads": self.threads, "workers": self.workers, "dask": self.dask}
+        names = [name for name, value in given.items() if value is not None]
+        if len(names) > 1:
+            raise InputError(
+                " and ".join(names),
+                got="several places for the points",
+                expected="one of: threads, workers (processes of this machine), dask (a cluster)",
+                hint="leave out all but one.",
+            )
+        if self.dask is not None:
+            from klack.analyses.study.dask_workers import require_dask
+
+            require_dask()
+
+    @contextmanager
+    def open(self, case: ValveCase, tree: CaseTree) -> Iterator[PointWorkers]:
+        """Workers for the points of a case, which end with this block.
+
+        Raises
+        ------
+        InputError
+            If they do not fit into the memory; if the scheduler of a cluster does not answer.
+        """
+        workers = self._of(case, tree)
+        try:
+            yield workers
+        finally:
+            workers.close()
+
+    def _of(self, case: ValveCase, tree: CaseTree) -> PointWorkers:
+        if self.dask is not None:
+            from klack.analyses.study.dask_workers import DaskWorkers
+
+            return DaskWorkers(case, tree, self.dask)
+        if self.workers is not None:
+            return ProcessWorkers(case, tree, self.workers)
+        if self.is_free and self.threads is None:
+            return _Fitting(case, tree)
+        return ThreadWorkers(self.threads)
+
+
+HERE = Where()
+"""All cores of this process."""
+
+
+class _Fitting(Closing):
+    """Threads, until there are many points that processes compute faster."""
+
+    def __init__(self, case: ValveCase, tree: CaseTree) -> None:
+        self._case, self._tree = case, tree
+        self._chosen: PointWorkers = ThreadWorkers()
+        self._points = 0
+        self._bodies: set[tuple[object, ...]] = set()
+
+    @property
+    def count(self) -> int:
+        return self._chosen.count
+
+    @property
+    def words(self) -> str:
+        return self._chosen.words
+
+    def compute(
+        self,
+        asked: AskedPoints,
+        places: Sequence[int],
+        keep: Callable[[int, PointRow], None],
+        progress: Progress,
+    ) -> None:
+        if isinstance(self._chosen, ThreadWorkers) and self._pays(asked, places):
+            self._chosen.close()
+            self._chosen = ProcessWorkers(self._case, self._tree, self._processes())
+        self._chosen.compute(asked, places, keep, progress)
+
+    def close(self) -> None:
+        self._chosen.close()
+
+    def _pays(self, asked: AskedPoints, places: Sequence[int]) -> bool:
+        """Whether these points hold the interpreter for long."""
+        self._points += len(places)
+        self._bodies |= {tuple(group.made.items()) for group in groups_of(asked, places)}
+        if self._processes() < 2 or _has_python(self._case):
+            return False
+        noise = any(item.of in ("click", "design") for item in asked.chosen)
+        return (noise and self._points >= _NOISE) or len(self._bodies) >= _GEOMETRIES
+
+    def _processes(self) -> int:
+        return min(available_cores(), int(0.8 * available_memory().size / PROCESS_SIZE))
+
+
+def _has_python(case: ValveCase) -> bool:
+    """Components of the user's own and FMUs, which need not bear several calls at a time."""
+    parts: Sequence[Any] = list(case.network.components.values())
+    return bool(case.own_components) or any(hasattr(part, "file") for part in parts)
