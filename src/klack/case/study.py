@@ -17,6 +17,7 @@ __all__ = [
     "StudyFile",
     "StudyLimit",
     "StudyParameter",
+    "StudyRobust",
     "StudySearch",
     "Written",
 ]
@@ -89,20 +90,21 @@ class StudyDesign(Section):
     """Where the points of a study lie."""
 
     kind: Literal[
-        "sobol", "latin-hypercube", "saltelli", "morris", "grid", "one-at-a-time", "file"
+        "sobol", "latin-hypercube", "saltelli", "morris", "grid", "one-at-a-time", "made", "file"
     ] = Field(
         default="sobol",
         description="sobol: even cover, more points can be added; latin-hypercube: each parameter "
         "evenly; saltelli: for Sobol's indices, 'points' times (2 + number of parameters) points; "
         "morris: elementary effects, 'points' times (1 + number of parameters); grid: all "
         "combinations of 'levels'; one-at-a-time: each parameter by itself, about the case; "
+        "made: valves made after the case, with the scatter of 'robust'; "
         "file: the rows of a CSV file.",
     )
     points: Count = Field(
         default=64,
         le=1_000_000,
-        description="Of sobol and latin-hypercube; base points of saltelli, better a power of two; "
-        "trajectories of morris, ten or more.",
+        description="Of sobol, latin-hypercube and made; base points of saltelli, better a power "
+        "of two; trajectories of morris, ten or more.",
     )
     levels: Count = Field(
         default=5, le=1000, description="Values of each range in a grid and one-at-a-time."
@@ -160,6 +162,28 @@ class StudySearch(Section):
     seed: Count = Field(default=1, description="Of the random numbers.")
 
 
+class StudyRobust(Section):
+    """Scatter of made valves about a design, and what a search makes of it."""
+
+    scatter: Mapping[Text, Written] = Field(
+        min_length=1,
+        description="Parameter, or path of a key of the case: standard deviation of made valves "
+        "about the value of the design, with its unit.",
+    )
+    valves: Count = Field(
+        default=16,
+        ge=4,
+        le=10_000,
+        description="Made after every design of klack optimise, all designs with the same draws.",
+    )
+    value: Text = Field(
+        default="mean + 2 sd",
+        description="Of a measure over these valves, for objectives and bounds: 'mean + 2 sd' or "
+        "'quantile 95 %'; towards the worse side.",
+    )
+    seed: Count = Field(default=1, description="Of the random numbers.")
+
+
 class CaseStudy(Section):
     """Parameters that vary, what follows from them, and what is computed at every point."""
 
@@ -186,6 +210,11 @@ class CaseStudy(Section):
         default_factory=dict, description="Measures and the bounds that a design has to keep."
     )
     search: StudySearch = Field(default=StudySearch(), description="Of klack optimise.")
+    robust: StudyRobust | None = Field(
+        default=None,
+        description="Scatter of made valves; with it klack optimise compares designs by what these "
+        "do.",
+    )
     variant: Variant | None = Field(
         default=None, description="Of the stroke; the first one of the case by default."
     )

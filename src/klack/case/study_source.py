@@ -1,7 +1,7 @@
 """The study of a case, from the case itself or from a file of its own, with lines for messages."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from klack.case.case_tree import CaseTree
@@ -12,6 +12,9 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text
 
 __all__ = ["StudySource", "study_of"]
+
+
+_MOST_VALVES = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,6 +36,26 @@ class StudySource:
         """File, line and key below ``study``, as messages name them."""
         whole = ("study", *key)
         return f"{self.path}:{self.lines.find(whole, on_key=on_key)}: {key_text(whole)}"
+
+    def made(self, valves: int) -> "StudySource":
+        """The same study of so many valves made after the case.
+
+        Raises
+        ------
+        InputError
+            For less than one, and more than a million.
+        """
+        if isinstance(valves, bool) or not 1 <= valves <= _MOST_VALVES:
+            raise InputError(
+                "--made",
+                got=f"{valves} valves",
+                expected=f"1 to {_MOST_VALVES}",
+                hint="with 1024 a probability of 1 % is known to about half of it.",
+            )
+        design = self.study.design.model_copy(
+            update={"kind": "made", "points": valves, "file": None}
+        )
+        return replace(self, study=self.study.model_copy(update={"design": design}))
 
     def refuse(self, key: Key, error: InputError) -> InputError:
         """The same error, at the place where the study says so."""

@@ -53,3 +53,7 @@ class ValveCase(ValveSections):
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
         return tuple(v for v in VARIANTS if v in variants)
+
+    def one_variant(self, name: str | None = None) -> Variant:
+        """Check that this case can run a variant; the first one of the case by default."""
+        return self.require_variants((name,) if name is not None else self.run.variants[:1])[0]

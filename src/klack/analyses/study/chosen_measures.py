@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, TypeVar
 
-from klack.acoustics.signal_statistics import SoundStatistics
+from klack.acoustics.signal_statistics import SoundStatistics, sound_statistics
 from klack.analyses.measures import Measure
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
-from klack.analyses.noise.run import click_statistics, noise_design
+from klack.analyses.noise.run import click_sound, noise_design
 from klack.analyses.noise.source import NoiseSource
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeVariant
@@ -19,6 +19,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
+from klack.signals import TimeSeries
 
 __all__ = ["ChosenMeasure", "PointRun", "chosen_measures"]
 
@@ -56,9 +57,14 @@ class PointRun:
         return self._make()
 
     @cached_property
+    def pressure(self) -> TimeSeries | None:
+        """Sound of a click; None, with a note, where it cannot be had."""
+        return self._noted(lambda: click_sound(self._source, self._transfers))
+
+    @cached_property
     def click(self) -> SoundStatistics | None:
-        """Levels of a click; None, with a note, where they cannot be had."""
-        return self._noted(lambda: click_statistics(self._source, self._transfers))
+        """Levels of a click; None where there is no sound."""
+        return None if self.pressure is None else sound_statistics(self.pressure)
 
     @cached_property
     def design(self) -> NoiseDesign | None:

@@ -1,13 +1,15 @@
 """Columns of a study from the rows of its points, and what speaks against them."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
+from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
-from klack.analyses.study.strokes import AskedPoints, PointRow
+from klack.analyses.study.strokes import AskedPoints
 from klack.case.study_source import StudySource
 from klack.errors import InputError
 
@@ -18,8 +20,9 @@ __all__ = [
     "row_warnings",
 ]
 
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _TOLD = 5
-"""Different notes that are told."""
+"""Kinds of notes that are told; those of a kind differ in numbers only."""
 
 
 def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
@@ -44,8 +47,10 @@ def parameter_columns(
     space: Space, values: Sequence[Values]
 ) -> tuple[tuple[StudyColumn, ...], tuple[StudyColumn, ...]]:
     """Columns of the parameters, and of what follows from them."""
+    known = space.known()
     own = tuple(
-        _column(values, item.name, item.unit, item.text(), item.today) for item in space.parameters
+        _column(values, item.name, item.unit, item.text(), known.get(item.name))
+        for item in space.parameters
     )
     linked = tuple(
         _column(values, item.name, item.unit, f"= {item.expression.text}", item.today)
@@ -106,11 +111,17 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
         found.append(
             f"{failures.total()} of {len(rows)} points have no measures; {times} times: {reason}"
         )
-    notes = Counter(note for row in rows for note in dict.fromkeys(row.notes))
-    for note, times in notes.most_common(_TOLD):
-        found.append(f"{times} of {len(rows)} points: {note}")
-    if len(notes) > _TOLD:
-        found.append(f"{len(notes) - _TOLD} other notes; the table of points has them all.")
+    alike: dict[str, Counter[str]] = {}
+    for row in rows:
+        for kind, note in {_NUMBER.sub("#", note): note for note in row.notes}.items():
+            alike.setdefault(kind, Counter())[note] += 1
+    kinds = sorted(alike.values(), key=lambda notes: -notes.total())
+    for notes in kinds[:_TOLD]:
+        note = notes.most_common(1)[0][0]
+        other = ", with other numbers" if len(notes) > 1 else ""
+        found.append(f"{notes.total()} of {len(rows)} points{other}: {note}")
+    if len(kinds) > _TOLD:
+        found.append(f"{len(kinds) - _TOLD} other notes; the table of points has them all.")
     return tuple(found)
 
 

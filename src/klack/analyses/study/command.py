@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.errors import require_positive
 from klack.terminal.options import CaseArgument, Components, imported, require_files
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
@@ -25,18 +26,46 @@ _File = Annotated[
 ]
 
 
+_Made = Annotated[
+    int | None,
+    Parameter(
+        help="Instead of the design of the study: so many valves made after the case, with the "
+        "scatter of its section 'robust'.",
+    ),
+]
+_Workers = Annotated[
+    int | None,
+    Parameter(
+        name="--workers",
+        help="Number of processes; it does not affect the results. [default: threads; all cores "
+        "where measures of the noise, or several geometries, are asked for]",
+    ),
+]
+_Dask = Annotated[
+    str | None,
+    Parameter(
+        name="--dask",
+        help="Compute on a cluster: address of a scheduler of dask (tcp://host:8786), or a file "
+        "with it.",
+    ),
+]
+
+
 def study(
     case: CaseArgument,
     /,
     *,
     study: _File = None,
+    made: _Made = None,
+    workers: _Workers = None,
+    dask: _Dask = None,
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute measures of a stroke at many points: ranges, designs, distributions of parameters."""
     from klack.analyses.study.run import run_study
 
-    return _run(run_study, "study", case, study, component, wanted)
+    return _run(run_study, "study", case, study, component, wanted, workers, dask, made)
 
 
 def optimise(
@@ -44,13 +73,15 @@ def optimise(
     /,
     *,
     study: _File = None,
+    workers: _Workers = None,
+    dask: _Dask = None,
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Search the ranges of a study for the best points: one to four objectives, within bounds."""
     from klack.analyses.study.optimise import run_optimisation
 
-    return _run(run_optimisation, "optimum", case, study, component, wanted)
+    return _run(run_optimisation, "optimum", case, study, component, wanted, workers, dask)
 
 
 def _run(
@@ -60,22 +91,29 @@ def _run(
     file: Path | None,
     component: Components,
     wanted: WantedResult,
+    workers: int | None,
+    dask: str | None,
+    made: int | None = None,
 ) -> int:
+    if workers is not None:
+        require_positive("--workers", workers, "processes")
     if file is not None:
         require_files("--study", [file])
 
     from klack.analyses.study.analysis import STUDY
     from klack.analyses.study.log import point_log_form
+    from klack.analyses.study.where import Where
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
     from klack.case.study_source import study_of
 
+    where = Where(threads=wanted.threads, workers=workers, dask=dask, is_free=True)
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
     source = study_of(checked, tree, file)
+    if made is not None:
+        source, name = source.made(made), "made"
     ending = Ending.of(wanted, f"{checked.name}-{name}")
     with ending.resumable(point_log_form(checked, tree)[0]) as progress:
-        record = run(
-            checked, tree, source, folder=ending.folder, threads=wanted.threads, progress=progress
-        )
+        record = run(checked, tree, source, folder=ending.folder, where=where, progress=progress)
     return ending.end(STUDY, record)

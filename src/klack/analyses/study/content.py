@@ -1,7 +1,9 @@
 """Content of a study's report before its layout."""
 
 import numpy as np
+from numpy.typing import NDArray
 
+from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
 from klack.analyses.page import page_of
 from klack.analyses.sample import rank_correlation
 from klack.analyses.study.figures import (
@@ -11,7 +13,7 @@ from klack.analyses.study.figures import (
     scatter_chart,
     sensitivity_bars,
 )
-from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord
 from klack.analyses.study.wording import (
     EFFECT_COLUMNS,
     MISSED_COLUMNS,
@@ -24,13 +26,15 @@ from klack.analyses.study.wording import (
     rate_text,
     short_labels,
 )
-from klack.report.page import Content, Section, Table
+from klack.report.page import Content, Section, Sound, Table
 from klack.report.wording import count, signed
 
 __all__ = ["study_content"]
 
 _LISTED = 100
 """Points in the table; the result holds all of them."""
+_OF_FRONT = 24
+"""Points of a front in its table."""
 _MANY_ROWS = 1024
 _FEWEST = 8
 """Points from which a rank correlation means something."""
@@ -134,22 +138,74 @@ def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Sect
     best = found.best
     rows = [
         (item.name, on_page(item, item.today), on_page(item, value), change(item, value))
-        for item in record.columns
+        for item in record.designed
         for value in [float(item.values[best])]
     ]
     told = [f"Bounds: {'; '.join(found.bounds)}." if found.bounds else "No bounds."]
+    listed = _spread(found.front)
     front = Table(
         columns=("point", *(labels[name] for name in found.objectives), "parameters"),
-        rows=tuple(_front_row(record, int(i), labels) for i in found.front[:_LISTED]),
+        rows=tuple(_front_row(record, int(i), labels) for i in listed),
     )
+    left: tuple[str, ...] = ()
+    if listed.size < found.front.size:
+        left = (
+            f"{count(listed.size)} of the {count(found.front.size)} points of the front, evenly "
+            "spread over their order by the first objective; the chart and the exported table have "
+            "all of them.",
+        )
     return (
         Section(
             title="The recommended point and that of today",
             paragraphs=tuple(told),
             tables=(Table(columns=("", "today", f"point {best}", "change"), rows=tuple(rows)),),
         ),
-        Section(title="Front", charts=front_charts(record, found, labels), tables=(front,)),
+        Section(
+            title="Front",
+            charts=front_charts(record, found, labels),
+            paragraphs=left,
+            tables=(front,),
+        ),
+        _listen(record, found, labels),
     )
+
+
+def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Section:
+    """Sounds of the case as it is and of points of the front, at one scale."""
+    if not record.sounds:
+        return Section(title="Listen")
+    scale = full_scale_of(*(item.pressure for item in record.sounds))
+    own = {item.name: item for item in record.measures}
+    players = []
+    for item in record.sounds:
+        title = "today" if item.point < 0 else f"point {item.point}"
+        title += ", recommended" if item.point == found.best else ""
+        values = []
+        for name in found.objectives:
+            of = own[name]
+            value = of.today if item.point < 0 else float(of.values[item.point])
+            values.append(f"{labels[name]} {on_page(of, value)}")
+        players.append(
+            Sound(
+                title=title,
+                wav=wav_bytes(item.pressure, full_scale=scale),
+                note=f"{', '.join(values)}.",
+            )
+        )
+    return Section(
+        title="Listen",
+        paragraphs=(
+            f"One click of each, all at one scale: {level_statement(scale)}. Points of the front "
+            "stand in the order of its first objective.",
+        ),
+        sounds=tuple(players),
+    )
+
+
+def _spread(front: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Some points of a front, evenly over its order."""
+    places = np.linspace(0, front.size - 1, min(front.size, _OF_FRONT)).round().astype(int)
+    return front[np.unique(places)]
 
 
 def _front_row(record: StudyRecord, place: int, labels: dict[str, str]) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """The figures of a study, each built from its record by one function."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +32,16 @@ __all__ = ["effect_bars", "front_charts", "parallel_chart", "scatter_chart", "se
 
 _MOST_LINES = 4000
 """More lines hide each other and cost bytes."""
+_MARGIN = 0.05
+"""Of the range of an axis, free at its ends."""
 
 
 def parallel_chart(record: StudyRecord, labels: Mapping[str, str]) -> ParallelChart:
     """Every point as a line over its parameters and measures."""
     shown = [item for item in (*record.parameters, *record.measures) if item.varies]
+    wanted = record.optimum.objectives if record.optimum else ()
     measures = [k for k, item in enumerate(shown) if item in record.measures]
+    measures = [k for k in measures if shown[k].name in wanted[:1]] or measures
     some = slice(None, _MOST_LINES)
     note = (
         "Every line is a point. On screen: drag along an axis to keep the lines that pass there; a "
@@ -113,8 +118,10 @@ def front_charts(
 def _front_chart(
     first: StudyColumn, other: StudyColumn, found: Optimum, labels: Mapping[str, str]
 ) -> Chart:
-    x, x_factor = _axis(first, labels)
-    y, y_factor = _axis(other, labels)
+    shown = found.kept.copy()
+    shown[found.front] = True
+    x, x_factor = _framed(first, shown, labels)
+    y, y_factor = _framed(other, shown, labels)
     every = np.arange(first.values.size)
     on_front = np.isin(every, found.front)
     groups: list[tuple[str, NDArray[np.bool_], Colour, float]] = [
@@ -143,8 +150,22 @@ def _front_chart(
         title=f"{labels[other.name]} over {labels[first.name]}",
         x=x,
         panels=(Panel(y=y, curves=tuple(curves)),),
-        note="Every dot is a computed point.",
+        note="Every dot is a computed point; those that miss a bound may lie beyond the axes.",
     )
+
+
+def _framed(
+    item: StudyColumn, shown: NDArray[np.bool_], labels: Mapping[str, str]
+) -> tuple[AxisSpec, float]:
+    """Axis over the points shown and that of today, with a margin."""
+    spec, factor = _axis(item, labels)
+    values = factor * np.append(item.values[shown], item.today)
+    values = values[np.isfinite(values)]
+    if not np.ptp(values) > 0.0:
+        return spec, factor
+    margin = _MARGIN * float(np.ptp(values))
+    frame = (float(values.min()) - margin, float(values.max()) + margin)
+    return replace(spec, range=frame), factor
 
 
 def _today(x: float, y: float) -> Curve:

@@ -13,7 +13,10 @@ from klack.case.study_source import StudySource
 from klack.errors import InputError
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 
-__all__ = ["Bound", "Goals", "bound_text", "bounds_of", "goals_of"]
+__all__ = ["Bound", "Goals", "Side", "bound_text", "bounds_of", "goals_of", "is_by_today"]
+
+Side = tuple[str, bool]
+"""A measure, and whether its high side is the worse one."""
 
 _LEVELS = ("dB", "dBA", "phon", "sone", "acum")
 _TODAY = re.compile(r"today(?:\s*(?P<sign>[+-])\s*(?P<change>\S.*))?")
@@ -58,15 +61,21 @@ class Goals:
     signs: tuple[float, ...]
     bounds: tuple[Bound, ...]
 
-    def objective_values(self, of: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """Measures that are looked at, each with whether it is worse when it is higher."""
+        own = zip(self.objectives, (sign > 0.0 for sign in self.signs), strict=True)
+        return tuple(dict.fromkeys([*own, *((b.measure, b.is_most) for b in self.bounds)]))
+
+    def objective_values(self, of: Mapping[Side, NDArray[np.float64]]) -> NDArray[np.float64]:
         """Numbers to minimise, shape (points, objectives), from columns of measures."""
         pairs = zip(self.signs, self.objectives, strict=True)
-        return np.column_stack([sign * of[name] for sign, name in pairs])
+        return np.column_stack([sign * of[name, sign > 0.0] for sign, name in pairs])
 
-    def violations(self, of: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    def violations(self, of: Mapping[Side, NDArray[np.float64]]) -> NDArray[np.float64]:
         """Shape (points, bounds), zero or less where kept."""
-        count = len(of[self.objectives[0]])
-        found = [bound.violation(of[bound.measure]) for bound in self.bounds]
+        count = len(next(iter(of.values())))
+        found = [bound.violation(of[bound.measure, bound.is_most]) for bound in self.bounds]
         return np.column_stack(found) if found else np.zeros((count, 0))
 
 
@@ -116,6 +125,11 @@ def bounds_of(
                 value = _bound(where, written, measures[name].unit, today[name])
                 bounds.append(Bound(measure=name, value=value, is_most=key == "most"))
     return tuple(bounds)
+
+
+def is_by_today(written: Written | None) -> bool:
+    """Whether a bound counts from the case as it is: ``today + 2 %``."""
+    return written is not None and _TODAY.fullmatch(str(written).strip()) is not None
 
 
 def _bound(where: str, written: Written, unit: str, today: float) -> float:

@@ -1,6 +1,7 @@
 """``klack optimise``: search the points of a study for those that no other one beats."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -15,18 +16,22 @@ from klack.analyses.study.columns import (
     row_warnings,
 )
 from klack.analyses.study.evaluation import Evaluation
-from klack.analyses.study.goals import Goals, bound_text, goals_of
+from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
 from klack.analyses.study.log import point_log_form
+from klack.analyses.study.made_valves import MadeValves, made_valves_of
+from klack.analyses.study.pace import Pace
+from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values, require_varied, space_of
-from klack.analyses.study.record import Optimum, StudyRecord
-from klack.analyses.study.strokes import AskedPoints, PointRow
+from klack.analyses.study.record import Optimum, PointSound, StudyColumn, StudyRecord
+from klack.analyses.study.strokes import AskedPoints, sounds_of
+from klack.analyses.study.where import HERE, Where
+from klack.analyses.study.wording import number_text
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.cores import available_cores
 from klack.errors import InputError
-from klack.progress import Progress, remark, silent
+from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
 from klack.studies.fronts import compromise, find_front
@@ -40,6 +45,9 @@ _EDGE = 1e-3
 """Share that points keep from the ends of a distribution without ends."""
 _REFINED = 8
 """Most points of the front that are refined."""
+_HEARD = ("click", "design")
+_PLAYED = 8
+"""Points of the front whose sound is kept, beside the recommended one and that of today."""
 _POLLS = 4
 """Rounds about each of them that have to fit into the points allowed."""
 
@@ -50,7 +58,7 @@ def run_optimisation(
     source: StudySource,
     *,
     folder: Path | None = None,
-    threads: int | None = None,
+    where: Where = HERE,
     progress: Progress = silent,
 ) -> StudyRecord:
     """Search for the best points of a study, and refine those of the front.
@@ -67,7 +75,8 @@ def run_optimisation(
         With objectives.
     folder : Path, optional
         Where computed points are kept.
-    threads : int, optional
+    where : Where
+        Points are computed.
     progress : callable
 
     Raises
@@ -82,12 +91,18 @@ def run_optimisation(
     require_varied(source, space.varied)
     clock = StageClock(progress)
     form, mark = point_log_form(case, tree)
-    with form.open(folder, mark) as log, collected_warnings() as notes:
-        work = _Work(case, tree, source, space, Evaluation(log, threads), clock)
-        today = work.rows([{}])[0]
-        asked = work.asked([{}])
+    with (
+        form.open(folder, mark) as log,
+        where.open(case, tree) as workers,
+        collected_warnings() as notes,
+    ):
+        made = made_valves_of(case, source, space)
+        work = _Work(case, tree, source, space, made, Evaluation(log, workers), clock)
+        today = work.rows([{}], work.names)[0]
+        asked = work.asked([{}], work.names)
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
+        sides = front.goals.sides
         search = _search(source, space, front.goals)
         for cube in search:
             search.tell(*work.told(cube, front))
@@ -97,19 +112,23 @@ def run_optimisation(
             if refinement is not None:
                 for cube in refinement:
                     refinement.tell(*work.told(cube, front))
-    columns = measure_columns(asked, work.found, today)
+        columns = measure_columns(asked, work.found, today)
+        if made is not None:
+            robust_today = made.row_of_today(sides, work.rows)
+            columns += made.columns(columns, sides, work.made_rows, robust_today)
+        sounds = _sounds(work, front, clock)
     parameters, linked = parameter_columns(space, work.values)
-    units = {item.name: item.unit for item in columns}
-    optimum = _optimum(front, search.settings.algorithm, source, units)
+    optimum = _optimum(front, search.settings.algorithm, source, columns, made)
     return StudyRecord(
         **case_fields(case),
         **run_fields(begin, clock, "pymoo"),
         study_text="" if source.path == tree.path else source.path.read_text(encoding="utf-8"),
         variant=asked.variant,
         design=optimum.algorithm,
-        threads=available_cores() if threads is None else threads,
+        threads=workers.count,
+        workers=workers.words,
         computed=work.evaluation.computed,
-        kept=len(work.found) + 1 - work.evaluation.computed,
+        kept=work.done - work.evaluation.computed,
         point_time=work.evaluation.seconds,
         parameters=parameters,
         linked=linked,
@@ -117,6 +136,7 @@ def run_optimisation(
         failures=tuple(row.failure for row in work.found),
         notes=tuple("\n".join(row.notes) for row in work.found),
         optimum=optimum,
+        sounds=sounds,
         warnings=(*_doubts(optimum), *notes, *row_warnings(work.found, today, columns)),
     )
 
@@ -130,23 +150,32 @@ class _Work:
         tree: CaseTree,
         source: StudySource,
         space: Space,
+        made: MadeValves | None,
         evaluation: Evaluation,
         progress: Progress,
     ) -> None:
         self._case, self._tree, self._source = case, tree, source
-        self.space, self._progress = space, progress
+        self.space, self._made, self._progress = space, made, progress
         self.evaluation = evaluation
         self.values: list[Values] = []
         self.found: list[PointRow] = []
+        self.made_rows: list[PointRow] = []
         self.cubes: list[NDArray[np.float64]] = []
         study = source.study
         wanted = (*study.measures, *study.objectives, *study.constraints)
-        self._names = tuple(dict.fromkeys(wanted))
-        self._most = study.search.population * study.search.generations + study.search.refinements
-        self._best = ""
+        self.names = tuple(dict.fromkeys(wanted))
+        designs = study.search.population * study.search.generations + study.search.refinements
+        self._most = designs * (1 if made is None else 1 + len(made.scatter.cube))
+        self._pace = Pace(progress, self._most)
+        self._shown = tuple(study.objectives)
+        chosen = self.asked([{}], self.names).chosen
+        self._units = {item.name: item.measure.unit for item in chosen}
+        self.done = 0
 
-    def asked(self, written: Sequence[Mapping[str, PointValue]]) -> AskedPoints:
-        """Points to compute.
+    def asked(
+        self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
+    ) -> AskedPoints:
+        """Points to compute, with the measures of these names.
 
         Raises
         ------
@@ -155,47 +184,56 @@ class _Work:
         """
         study = self._source.study
         try:
-            return AskedPoints.of(self._case, self._tree, written, self._names, study.variant)
+            return AskedPoints.of(self._case, self._tree, written, names, study.variant)
         except InputError as error:
             if error.where == "measures":
                 raise self._source.refuse(("measures",), error) from None
             raise
 
-    def rows(self, written: Sequence[Mapping[str, PointValue]]) -> list[PointRow]:
+    def rows(
+        self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
+    ) -> list[PointRow]:
         """Rows of these points."""
 
         def told(stage: str, fraction: float) -> None:
-            done = len(self.found) + fraction * len(written)
-            self._progress(stage, min(done / self._most, 1.0))
+            self._progress(stage, min((self.done + fraction * len(written)) / self._most, 1.0))
 
-        return self.evaluation.rows(self.asked(written), told)
+        rows = self.evaluation.rows(self.asked(written, names), told)
+        self.done += len(written)
+        return rows
 
     def told(
         self, cube: NDArray[np.float64], front: "_Front"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Objectives and violations of points of the unit cube, which join the front."""
         values = [self.space.at(point) for point in cube]
-        rows = self.rows([self.space.written(point) for point in values])
+        rows = self.rows([self.space.written(point) for point in values], self.names)
+        sides, table = front.goals.sides, np.array([row.numbers for row in rows])
+        columns = {side: table[:, self.names.index(side[0])] for side in sides}
+        if self._made is not None:
+            made = self._made.rows(values, sides, self.rows)
+            columns = dict(zip(sides, np.array([row.numbers for row in made]).T, strict=True))
+            rows = [
+                replace(row, notes=(*row.notes, *of_made.notes))
+                for row, of_made in zip(rows, made, strict=True)
+            ]
+            self.made_rows += made
         self.values += values
         self.found += rows
         self.cubes += list(cube)
-        table = np.array([row.numbers for row in rows])
-        columns = dict(zip(self._names, table.T, strict=True))
         objectives, violations = front.add(columns)
-        self._tell_best(front)
+        self._pace.tell(self.done, self.evaluation.computed, self._best_words(front))
         return objectives, violations
 
-    def _tell_best(self, front: "_Front") -> None:
-        """A line when a single objective, or the compromise of several, has become better."""
+    def _best_words(self, front: "_Front") -> str:
+        """The best point so far; empty without one that keeps all bounds."""
         if not front.feasible:
-            return
-        best = front.best
-        own = dict(zip(self._names, self.found[best].numbers, strict=True))
-        numbers = ", ".join(f"{name} {own[name]:.5g}" for name in front.goals.objectives)
-        text = f"point {best}: {numbers}; {front.points.size} on the front"
-        if text != self._best:
-            self._best = text
-            remark(self._progress, f"{len(self.found)} points, best so far {text}")
+            return ""
+        own = dict(zip(self.names, self.found[front.best].numbers, strict=True))
+        parts = [f"{name} {number_text(own[name], self._units[name])}" for name in self._shown]
+        text = f"best so far point {front.best}: {', '.join(parts)}"
+        several = len(self._shown) > 1
+        return f"{text}; {front.points.size} on the front" if several else text
 
 
 class _Front:
@@ -212,7 +250,7 @@ class _Front:
         self.feasible = False
 
     def add(
-        self, columns: Mapping[str, NDArray[np.float64]]
+        self, columns: Mapping[Side, NDArray[np.float64]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Take the measures of the next points; return their objectives and violations."""
         objectives = self.goals.objective_values(columns)
@@ -280,17 +318,31 @@ def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | No
 
 
 def _optimum(
-    front: _Front, algorithm: str, source: StudySource, units: Mapping[str, str]
+    front: _Front,
+    algorithm: str,
+    source: StudySource,
+    columns: Sequence[StudyColumn],
+    made: MadeValves | None,
 ) -> Optimum:
     given, goals = source.study.search, front.goals
     words = f"{algorithm}, {given.generations} generations of {given.population}"
     if given.refinements:
         words += f", {given.refinements} refinements"
-    bounds = [f"{b.measure} {bound_text(b, units[b.measure])}" for b in goals.bounds]
+    if made is not None:
+        words += f", {len(made.scatter.cube)} valves made after each design"
+    units = {item.name: item.unit for item in columns}
+
+    def name(measure: str, high: bool) -> str:
+        return measure if made is None else made.name((measure, high))
+
+    signs = zip(goals.objectives, goals.signs, strict=True)
+    bounds = [
+        f"{name(b.measure, b.is_most)} {bound_text(b, units[b.measure])}" for b in goals.bounds
+    ]
     kept = np.all(front.violations <= 0.0, axis=1) & np.isfinite(front.objectives).all(axis=1)
     return Optimum(
         algorithm=f"{words}, seed {given.seed}",
-        objectives=goals.objectives,
+        objectives=tuple(name(measure, sign > 0.0) for measure, sign in signs),
         ways=tuple(source.study.objectives.values()),
         bounds=tuple(bounds),
         kept=kept,
@@ -298,6 +350,20 @@ def _optimum(
         best=front.best,
         feasible=front.feasible,
     )
+
+
+def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound, ...]:
+    """Of the case as it is and of points spread over the front, if the noise was asked for."""
+    asked = work.asked([{}], work.names)
+    if front.best < 0 or not any(item.of in _HEARD for item in asked.chosen):
+        return ()
+    order = front.ordered
+    chosen = order[np.linspace(0, order.size - 1, min(order.size, _PLAYED)).round().astype(int)]
+    points = list(dict.fromkeys([-1, front.best, *map(int, chosen)]))
+    written = [work.space.written(work.values[i]) if i >= 0 else {} for i in points]
+    found = sounds_of(work.asked(written, work.names), progress)
+    pairs = zip(points, found, strict=True)
+    return tuple(PointSound(point=i, pressure=sound) for i, sound in pairs if sound is not None)
 
 
 def _doubts(optimum: Optimum) -> tuple[str, ...]:

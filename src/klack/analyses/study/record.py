@@ -6,8 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
+from klack.signals import TimeSeries
 
-__all__ = ["MissedBound", "Optimum", "Screening", "Sensitivity", "StudyColumn", "StudyRecord"]
+__all__ = [
+    "MissedBound",
+    "Optimum",
+    "PointSound",
+    "Screening",
+    "Sensitivity",
+    "StudyColumn",
+    "StudyRecord",
+]
 
 Column = NDArray[np.float64]
 
@@ -148,6 +157,21 @@ class Optimum:
     feasible: bool
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PointSound:
+    """What a click sounds like.
+
+    Parameters
+    ----------
+    point : int
+        -1 for the case as it is.
+    pressure : TimeSeries [Pa]
+    """
+
+    point: int
+    pressure: TimeSeries
+
+
 @dataclass(frozen=True, kw_only=True)
 class MissedBound:
     """How often drawn points miss a bound.
@@ -191,7 +215,7 @@ class StudyRecord(CaseRecord):
     design : str
         Where the points lie, in words.
     threads : int
-        That computed them.
+        Points that were computed at a time.
     computed, kept : int
         Points that were computed now, and that an earlier run had left.
     point_time : float [s]
@@ -209,6 +233,8 @@ class StudyRecord(CaseRecord):
         Of ``klack optimise``.
     missed : tuple of MissedBound
         Of drawn points: the probability of missing each bound.
+    workers : str
+        What computed them: threads, processes, or workers of dask.
     """
 
     study_text: str
@@ -227,6 +253,8 @@ class StudyRecord(CaseRecord):
     screenings: tuple[Screening, ...] = ()
     optimum: Optimum | None = None
     missed: tuple[MissedBound, ...] = ()
+    sounds: tuple[PointSound, ...] = ()
+    workers: str = "threads"
 
     @property
     def count(self) -> int:
@@ -237,6 +265,11 @@ class StudyRecord(CaseRecord):
     def columns(self) -> tuple[StudyColumn, ...]:
         """Parameters, what follows from them, measures."""
         return (*self.parameters, *self.linked, *self.measures)
+
+    @property
+    def designed(self) -> tuple[StudyColumn, ...]:
+        """Parameters with several values, and measures."""
+        return (*(item for item in self.parameters if item.varies), *self.measures)
 
     @property
     def failed(self) -> NDArray[np.bool_]:

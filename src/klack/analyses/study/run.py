@@ -11,24 +11,26 @@ from klack.analyses.study.columns import (
     row_warnings,
 )
 from klack.analyses.study.evaluation import Evaluation
-from klack.analyses.study.goals import bounds_of
+from klack.analyses.study.goals import bounds_of, is_by_today
 from klack.analyses.study.log import point_log_form
-from klack.analyses.study.points import StudyPoints, points_of_study
+from klack.analyses.study.pace import Pace
+from klack.analyses.study.points import StudyPoints, points_in, space_of
 from klack.analyses.study.record import StudyRecord
 from klack.analyses.study.robustness import missed_bounds
+from klack.analyses.study.scatter import made_space
 from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
 from klack.analyses.study.strokes import AskedPoints
+from klack.analyses.study.where import HERE, Where
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.cores import available_cores
 from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 
 __all__ = ["asked_points", "run_study"]
 
-_DRAWN = ("sobol", "latin-hypercube")
+_DRAWN = ("sobol", "latin-hypercube", "made")
 """Designs whose points are spread as the parameters are."""
 
 
@@ -44,12 +46,16 @@ def asked_points(
     InputError
         With file, line and key: for parameters, expressions, measures and designs that cannot be.
     """
-    points = points_of_study(case, source)
+    study, space = source.study, space_of(case, source)
+    names = (*study.measures, *study.constraints)
+    if study.design.kind == "made":
+        space = made_space(case, source, space)
+        names = (*names, *study.objectives)
+    points = points_in(source, space)
     # the last one is the case as it is, to compare with
     written = [*map(points.space.written, points.values), {}]
     try:
-        names = (*source.study.measures, *source.study.constraints)
-        asked = AskedPoints.of(case, tree, written, names, source.study.variant)
+        asked = AskedPoints.of(case, tree, written, names, study.variant)
     except InputError as error:
         if error.where == "measures":
             raise source.refuse(("measures",), error) from None
@@ -63,7 +69,7 @@ def run_study(
     source: StudySource,
     *,
     folder: Path | None = None,
-    threads: int | None = None,
+    where: Where = HERE,
     progress: Progress = silent,
 ) -> StudyRecord:
     """Compute the points of a study that are not known yet.
@@ -77,7 +83,8 @@ def run_study(
     folder : Path, optional
         Where computed points are kept: an interrupted study resumes, and another study of the same
         case finds what both have.
-    threads : int, optional
+    where : Where
+        Points are computed.
     progress : callable
 
     Raises
@@ -91,10 +98,20 @@ def run_study(
     points, asked = asked_points(case, tree, source)
     clock = StageClock(progress)
     form, mark = point_log_form(case, tree)
-    with form.open(folder, mark) as log, collected_warnings() as notes:
-        evaluation = Evaluation(log, threads)
+    with (
+        form.open(folder, mark) as log,
+        where.open(case, tree) as workers,
+        collected_warnings() as notes,
+    ):
+        evaluation = Evaluation(log, workers)
         clock("points", 0.0)
-        *found, today = evaluation.rows(asked, clock)
+        pace = Pace(progress, len(asked.points))
+
+        def told(stage: str, fraction: float) -> None:
+            clock(stage, fraction)
+            pace.tell(round(fraction * len(asked.points)), evaluation.computed)
+
+        *found, today = evaluation.rows(asked, told)
     require_some(source, found)
     known = {item.name: item.measure for item in asked.chosen}
     bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
@@ -107,7 +124,8 @@ def run_study(
         study_text="" if source.path == tree.path else source.path.read_text(encoding="utf-8"),
         variant=asked.variant,
         design=points.design,
-        threads=available_cores() if threads is None else threads,
+        threads=workers.count,
+        workers=workers.words,
         computed=evaluation.computed,
         kept=len(asked.points) - evaluation.computed,
         point_time=evaluation.seconds,
@@ -135,7 +153,24 @@ def run_study(
         notes=tuple("\n".join(row.notes) for row in found),
         warnings=(
             *points.notes,
+            *_bounds_by_today(source),
             *notes,
             *row_warnings(found, today, columns),
         ),
+    )
+
+
+def _bounds_by_today(source: StudySource) -> tuple[str, ...]:
+    """A bound by the case as it is moves with the case that valves are made after."""
+    found = [
+        f"{name} {key} {bound}"
+        for name, limit in source.study.constraints.items()
+        for key, bound in (("most", limit.most), ("least", limit.least))
+        if is_by_today(bound)
+    ]
+    if source.study.design.kind != "made" or not found:
+        return ()
+    return (
+        f"'Today' of a bound is the case that the valves are made after ({'; '.join(found)}). "
+        "Try: a bound with its unit.",
     )

@@ -119,7 +119,8 @@ class StudyJson(TypedDict):
     point_time_s: Real
     computed: Annotated[int, Field(description="Points computed now.")]
     kept: Annotated[int, Field(description="Points that an earlier run had left.")]
-    threads: int
+    threads: Annotated[int, Field(description="Points that were computed at a time.")]
+    workers: Annotated[str, Field(description="What computed them: threads, processes, ...")]
 
 
 def study_to_json(record: StudyRecord) -> StudyJson:
@@ -152,6 +153,7 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "computed": record.computed,
         "kept": record.kept,
         "threads": record.threads,
+        "workers": record.workers,
     }
 
 
@@ -258,13 +260,12 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
 
 
 def _optimum_told(record: StudyRecord, found: Optimum) -> Iterator[TextTable | str]:
-    shown = (*record.parameters, *record.linked, *record.measures)
     yield TextTable(
         title=f"Point {found.best} of the front ({found.front.size} points)",
         columns=("", "today", f"point {found.best}", "change"),
         rows=[
             [item.name, in_words(item, item.today), in_words(item, value), change(item, value)]
-            for item in shown
+            for item in record.designed
             for value in [float(item.values[found.best])]
         ],
     )

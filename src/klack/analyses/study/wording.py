@@ -24,6 +24,7 @@ __all__ = [
     "index_cells",
     "largest_first",
     "missed_cells",
+    "number_text",
     "on_page",
     "rate_text",
     "short_labels",
@@ -44,10 +45,15 @@ def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
         return "–"
     if item.words:
         return item.words[int(value)]
-    if item.unit.startswith("dB"):
-        return f"{value:.1f} {item.unit}"
-    unit, factor = shown_unit(item.unit)
-    return format_si(factor * value, unit, digits)
+    return number_text(value, item.unit, digits)
+
+
+def number_text(value: float, unit: str, digits: int = 4) -> str:
+    """A number [SI] with its unit; levels to a tenth."""
+    if unit.startswith("dB"):
+        return f"{value:.1f} {unit}"
+    shown, factor = shown_unit(unit)
+    return format_si(factor * value, shown, digits)
 
 
 def change(item: StudyColumn, value: float) -> str:
@@ -123,7 +129,9 @@ def rate_text(record: StudyRecord) -> str:
     parts = [f"{record.computed} points computed now"]
     if record.computed and record.point_time > 0.0:
         rate = 3600.0 * record.computed / record.point_time
-        parts[0] += f" in {format_si(record.point_time, 's', 3)} on {record.threads} threads"
+        parts[0] += (
+            f" in {format_si(record.point_time, 's', 3)} on {record.threads} {record.workers}"
+        )
         parts.append(f"{rate:.3g} in an hour")
     if record.kept:
         parts.append(f"{record.kept} were there")
