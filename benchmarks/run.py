@@ -40,6 +40,7 @@ PARTS = {
     "growth": "every stage over degrees of freedom",
     "stroke": "a whole valve in time; CVODE beside a small one",
     "many_strokes": "strokes per hour at many points, on threads",
+    "study_workers": "points of a study on threads, processes and dask; new geometries per hour",
     "accuracy": "reduced against full order on the shipped cases",
     "reduction": "from a case to two reduced bodies",
     "big_body": "the same for a housing with ribs of up to a million degrees of freedom",

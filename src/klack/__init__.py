@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         run_shots,
         run_stroke,
         run_study,
+        sensitivities,
     )
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "run_shots",
     "run_stroke",
     "run_study",
+    "sensitivities",
 ]
 
 __version__ = "0.1.0"

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
 from klack.analyses.point_table import PointTable, RunsInterrupted
+from klack.analyses.sensitivities.record import SensitivityRecord
 from klack.case.case_tree import CaseTree, read_case_tree, tree_of
 from klack.case.inserting import with_values
 from klack.case.key_path import kind_at, node_at, quantity_at, split_path
@@ -29,6 +30,11 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from klack.analyses.study.where import Where
 
 __all__ = [
     "CaseOnHand",
@@ -47,6 +53,7 @@ __all__ = [
     "run_shots",
     "run_stroke",
     "run_study",
+    "sensitivities",
 ]
 
 Checked = TypeVar("Checked", Case, ValveCase)
@@ -366,6 +373,8 @@ def run_many(
     *,
     variant: str | None = None,
     threads: int | None = None,
+    workers: int | None = None,
+    dask: "str | Client | None" = None,
     progress: Progress = silent,
 ) -> PointTable:
     """Compute measures of a stroke at many points of the parameter space of a case.
@@ -387,6 +396,11 @@ def run_many(
         The first one of the case by default.
     threads : int, optional
         All available cores by default; always 1 with components in Python and FMUs.
+    workers : int, optional
+        Processes in place of threads; in a script, the call stands under
+        ``if __name__ == "__main__":``.
+    dask : str, Client or Cluster of distributed, optional
+        Cluster in place of threads, also the address of its scheduler, or a file with that.
     progress : callable
         Called with a stage and the share of the points that are done.
 
@@ -403,12 +417,14 @@ def run_many(
     demo-stroke, wet: 0 points
     opening_time [s]
     """
-    from klack.analyses.study.strokes import run_strokes
+    from klack.analyses.study.run_strokes import run_strokes
+    from klack.analyses.study.where import Where
 
+    where = Where(threads=threads, workers=workers, dask=dask)
     given = case if isinstance(case, CaseOnHand) else load_case(case)
     checked = _of_kind(given, ValveCase, "a whole valve")
     return run_strokes(
-        checked, given.tree, points, measures, variant=variant, threads=threads, progress=progress
+        checked, given.tree, points, measures, variant=variant, where=where, progress=progress
     )
 
 
@@ -416,8 +432,11 @@ def run_study(
     case: Given,
     study: str | Path | None = None,
     *,
+    made: int | None = None,
     folder: str | Path | None = None,
     threads: int | None = None,
+    workers: int | None = None,
+    dask: "str | Client | None" = None,
     progress: Progress = silent,
 ) -> Result:
     """Compute measures of a stroke at the points of a study, as ``klack study`` does.
@@ -428,9 +447,18 @@ def run_study(
         Of a whole valve.
     study : path, optional
         File with a section ``study``; that of the case by default.
+    made : int, optional
+        Instead of the design of the study: so many valves made after the case, with the scatter of
+        its section ``robust``.
     folder : path, optional
         Where computed points are kept, so that an interrupted study resumes.
     threads : int, optional
+        All available cores by default.
+    workers : int, optional
+        Processes in place of threads: faster where measures of the noise, or several geometries,
+        are asked for.  In a script, the call stands under ``if __name__ == "__main__":``.
+    dask : str, Client or Cluster of distributed, optional
+        Cluster in place of threads, also the address of its scheduler, or a file with that.
     progress : callable
 
     Raises
@@ -439,8 +467,10 @@ def run_study(
         Before the first run, with file, line and key.
     """
     from klack.analyses.study.run import run_study as run
+    from klack.analyses.study.where import Where
 
-    return _studied(run, case, study, folder, threads, progress)
+    where = Where(threads=threads, workers=workers, dask=dask)
+    return _studied(run, case, study, folder, where, progress, made)
 
 
 def optimise(
@@ -449,6 +479,8 @@ def optimise(
     *,
     folder: str | Path | None = None,
     threads: int | None = None,
+    workers: int | None = None,
+    dask: "str | Client | None" = None,
     progress: Progress = silent,
 ) -> Result:
     """Search the ranges of a study for the best points, as ``klack optimise`` does.
@@ -456,8 +488,67 @@ def optimise(
     Arguments and errors are those of :func:`run_study`; the study has objectives.
     """
     from klack.analyses.study.optimise import run_optimisation
+    from klack.analyses.study.where import Where
 
-    return _studied(run_optimisation, case, study, folder, threads, progress)
+    where = Where(threads=threads, workers=workers, dask=dask)
+    return _studied(run_optimisation, case, study, folder, where, progress)
+
+
+def sensitivities(
+    case: Given,
+    study: str | Path | None = None,
+    *,
+    parameters: Sequence[str] = (),
+    measures: Sequence[str] = (),
+    variant: str | None = None,
+    check: bool = True,
+    progress: Progress = silent,
+) -> SensitivityRecord:
+    """Differentiate times and impacts of a stroke with its parameters.
+
+    As ``klack sensitivities`` does, by exact tangents of one run.
+
+    Parameters
+    ----------
+    case : str, Path or CaseOnHand
+        Of a whole valve.
+    study : path, optional
+        File with a section ``study``, whose parameters and measures are meant; that of the case by
+        default.
+    parameters : sequence of str, optional
+        Keys of the case, or some of the parameters of the study.
+    measures : sequence of str, optional
+        ``"closing_time"``, ``"seat.peak_force"``.
+    variant : str, optional
+        Of the stroke.
+    check : bool
+        Whether further strokes, two of them with all parameters changed by 1 %, are compared.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        For a parameter or a measure that has no derivative.
+    """
+    from klack.analyses.sensitivities.run import run_sensitivities
+    from klack.case.study_source import study_of
+
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    checked = _of_kind(given, ValveCase, "a whole valve")
+    file = None if study is None else Path(study)
+    source = None
+    if file is not None or checked.study is not None:
+        source = study_of(checked, given.tree, file)
+    return run_sensitivities(
+        checked,
+        given.tree,
+        source,
+        parameters=parameters,
+        measures=measures,
+        variant=variant,
+        check=check,
+        progress=progress,
+    )
 
 
 def _studied(
@@ -465,8 +556,9 @@ def _studied(
     case: Given,
     study: str | Path | None,
     folder: str | Path | None,
-    threads: int | None,
+    where: "Where",
     progress: Progress,
+    made: int | None = None,
 ) -> Result:
     from klack.analyses.study.analysis import STUDY
     from klack.case.study_source import study_of
@@ -474,8 +566,10 @@ def _studied(
     given = case if isinstance(case, CaseOnHand) else load_case(case)
     checked = _of_kind(given, ValveCase, "a whole valve")
     source = study_of(checked, given.tree, None if study is None else Path(study))
+    if made is not None:
+        source = source.made(made)
     place = None if folder is None else Path(folder)
-    record = run(checked, given.tree, source, folder=place, threads=threads, progress=progress)
+    record = run(checked, given.tree, source, folder=place, where=where, progress=progress)
     return Result(record, STUDY)
 
 

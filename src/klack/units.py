@@ -56,6 +56,7 @@ __all__ = [
     "base_powers",
     "format_si",
     "parse_quantity",
+    "takes_prefix",
 ]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -418,6 +419,19 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
+def takes_prefix(unit: str) -> bool:
+    """Whether a decimal prefix before an SI unit multiplies it as it stands.
+
+    Not before a power, where it is raised too (1 mm^2 is 1e-6 m^2), before kg, rates and
+    temperatures.
+
+    >>> [takes_prefix(unit) for unit in ("N/m", "m^2", "kg/m^3", "1/s", "N/m^2")]
+    [True, False, False, False, True]
+    """
+    plain = unit in ("", "-", "K", "degC", "deg", "%") or unit.startswith(("kg", "1/"))
+    return not plain and "^" not in unit.split("/")[0]
+
+
 def format_si(value: float, unit: str, digits: int = 4) -> str:
     """Write a number with a decimal prefix, as people read it; :func:`parse_quantity` reads it.
 
@@ -443,8 +457,7 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     if value == 0 or not isfinite(value):
         return f"{value:g} {unit}"
     rounded = abs(float(f"{value:.{digits}g}"))
-    plain = unit in ("K", "deg", "%") or unit.startswith(("kg", "1/"))
-    if plain or "^" in unit.split("/")[0]:
+    if not takes_prefix(unit):
         return f"{value:.{digits}g} {unit}"
     power = next((p for p in sorted(_PREFIXES, reverse=True) if rounded >= 10.0**p), -15)
     scaled = float(f"{value / 10.0**power:.{digits}g}")

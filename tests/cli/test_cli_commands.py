@@ -419,3 +419,13 @@ def test_reader_of_a_pipe_may_leave_early():
 
     assert done.stdout == "{\n"
     assert done.stderr == "code 0\n"
+
+
+@pytest.mark.parametrize("name", ["valve.yaml", "table.CSV"])
+def test_a_file_as_the_folder_of_results_is_one_error(tmp_path, capsys, name):
+    out = tmp_path / name
+    assert main(["export", "two-rods", "--to", "mat", "--out", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert "the name of a file" in told
+    assert str(out.with_suffix("")) in told.replace("\n", "")
+    assert not out.exists()

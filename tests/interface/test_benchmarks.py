@@ -20,6 +20,7 @@ LONG = ("accuracy", "big_body", "calculix", "demo", "full_order", "growth", "ngs
 PARTS = (
     *("start_up", "kernel", "modes", "limit", "reduced_peers", "stroke", "many_strokes"),
     "reduction",
+    "study_workers",
     *(pytest.param(name, marks=pytest.mark.slow) for name in LONG),
 )
 

@@ -193,6 +193,10 @@ class TestQuieterDesign(Tutorial):
     name = "quieter-design"
 
 
+class TestBetterValve(Tutorial):
+    name = "better-valve"
+
+
 def test_every_page_is_followed() -> None:
     pages = {path.stem for path in FOLDER.glob("*.md")} - {"index"}
     assert pages == {tutorial.name for tutorial in Tutorial.__subclasses__()}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from energy_ledger import allowed
 
+import klack
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.analyses.shots.run import run_shots
@@ -43,6 +44,7 @@ def test_all_shipped_cases_are_tested():
         "from-other-tools",
         "measured",  # in test_measured_strokes.py
         "needle-from-inp",
+        "quieter",
         "sphere-on-rod",
         "two-rods",
         "witness",  # in test_calculix_impact.py
@@ -217,3 +219,15 @@ def test_shots_of_the_guided_valve():
     assert np.all(np.abs(shots.energy_residual) < 1e-3)
     assert np.all(shots.rocking > centric["rocking"])
     assert set(study.pressures) == {"centric", "highest", "lowest"}
+
+
+def test_quieter_starts_from_the_demo_stroke():
+    """Truth: the same valve; a current that is followed instead of peak and hold."""
+    names = ["opening_time", "closing_time", "noise.sound_exposure_level_weighted"]
+    here, there = (
+        [item.values[0] for item in klack.run_many(name, [{}], names, variant="wet").measures]
+        for name in ("quieter", "demo-stroke")
+    )
+    assert abs(here[0] - there[0]) < 1e-6
+    assert abs(here[1] - there[1]) < 1e-6
+    assert abs(here[2] - there[2]) < 0.1

@@ -11,6 +11,10 @@ transient that starts and ends at zero needs no window; one that is cut off gets
 whose length is the caller's decision.
 """
 
+from collections.abc import Callable
+from functools import lru_cache
+from typing import cast
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
@@ -38,7 +42,10 @@ _FINE = 160.0  # values per period of the highest frequency that finer series ar
 _COARSE = 2.0  # values per period at least
 _OVERSAMPLED = 8.0  # frequencies per inverse length of the record
 _FINEST, _WIDEST = 0.1, 2.0  # [Hz] resolution chosen without one
+_KEPT = 100_000  # values and frequencies of transforms whose preparation is kept, 16 bytes each
 _ENDS_AT_ZERO = 1e-3  # of the peak: accepted at the ends of an unwindowed transient
+
+_Zoom = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
 def force_series(history: ImpactHistory) -> TimeSeries:
@@ -152,8 +159,6 @@ def change_spectrum(
     InputError
         Series too coarse for ``high``.
     """
-    from scipy.signal import zoom_fft  # takes a second to load, which other commands save
-
     require_positive("change_spectrum: high", high, "Hz")
     if series.step * high * _COARSE > 1.0 + 1e-9:
         raise InputError(
@@ -171,11 +176,27 @@ def change_spectrum(
         return np.zeros(count, dtype=complex)
     f = np.linspace(0.0, high, count)
     first = series.start - 0.5 * series.step - origin  # time of the first change
-    spectrum = zoom_fft(changes, (0.0, high), m=count, fs=1.0 / step, endpoint=True)
+    spectrum = _zoom(changes.size, high, count, 1.0 / step)(changes)
     whole: NDArray[np.complex128] = (
         spectrum * np.exp(-2j * np.pi * f * first) / np.sinc(f * step) ** 2
     )
     return whole
+
+
+def _zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
+    """Fourier sums of ``size`` values at ``count`` frequencies from 0 to ``high``.
+
+    What a transform prepares is kept for the next record of the same length, unless it is large.
+    """
+    made = _kept_zoom if size + count <= _KEPT else _kept_zoom.__wrapped__
+    return made(size, high, count, rate)
+
+
+@lru_cache(maxsize=16)
+def _kept_zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
+    from scipy.signal import ZoomFFT  # takes a second to load, which other commands save
+
+    return cast(_Zoom, ZoomFFT(size, (0.0, high), count, fs=rate, endpoint=True))
 
 
 def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None = None) -> Spectrum:

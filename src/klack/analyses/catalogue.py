@@ -62,6 +62,10 @@ ANALYSES: tuple[Entry, ...] = (
         "klack study demo-stroke",
         others=("klack optimise demo-stroke",),
     ),
+    Entry(
+        "sensitivities.analysis:SENSITIVITIES",
+        example="klack sensitivities demo-stroke --parameter network.components.spring.preload",
+    ),
     Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
     Entry(
         "reduction.analysis:REDUCTION",

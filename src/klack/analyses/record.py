@@ -7,6 +7,7 @@ A record is what an analysis leaves behind.  Its fields are stored under their o
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from time import perf_counter
 from typing import Protocol, TypedDict
@@ -135,11 +136,15 @@ class _Case(Protocol):
     def own_components(self) -> Mapping[str, str]: ...
 
 
+_version = cache(version)
+"""Installed version of a library; reading its description takes milliseconds."""
+
+
 def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
     """Versions and times of a run that began at ``begin`` of ``time.perf_counter`` [s]."""
     return {
         "version": __version__,
-        "versions": {name: version(name) for name in (*_LIBRARIES, *libraries)},
+        "versions": {name: _version(name) for name in (*_LIBRARIES, *libraries)},
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "wall_time": perf_counter() - begin,
         "stage_times": clock.times(),

@@ -20,6 +20,8 @@ __all__ = ["CacheContent", "ResultCache"]
 _NAME = re.compile(r"[0-9a-f]{64}\.entry")
 _UNFINISHED = re.compile(r"new-[^.]*\.entry\.part")
 _FORGOTTEN = 3600.0  # s after which an unfinished file is deleted
+_SPARE = 1.0 / 32.0  # of the limit: left free by who deletes, so that not every entry makes it look
+_WRITERS = 8.0  # processes that may write at once without a look, and stay below the limit
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to delete.\n"
 
 
@@ -56,6 +58,7 @@ class ResultCache:
         self._lock = Lock()
         self._own: set[str] = set()
         self._writable = True
+        self._room = 0.0  # [byte] that may be written before the next look at the folder
 
     def load(self, key: str, kind: str) -> Entry | None:
         """Entry of a key, None if there is none that is whole."""
@@ -79,11 +82,13 @@ class ResultCache:
             return
         try:
             try:
-                self._write(key, entry)
+                size = self._write(key, entry)
             except FileNotFoundError:  # the folder was deleted just now
-                self._write(key, entry)
+                size = self._write(key, entry)
             self._own.add(key)
-            self._keep_within_limit()
+            self._room -= size
+            if self._room <= 0.0:
+                self._keep_within_limit()
         except OSError as error:
             self._give_up(error)
 
@@ -110,7 +115,8 @@ class ResultCache:
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}.entry"
 
-    def _write(self, key: str, entry: Entry) -> None:
+    def _write(self, key: str, entry: Entry) -> int:
+        """Write an entry; return its size [byte]."""
         self._prepare()
         part = None
         try:
@@ -119,7 +125,9 @@ class ResultCache:
             ) as file:
                 part = Path(file.name)
                 write_entry(file, key, entry)
+                size = file.tell()
             os.replace(part, self._path(key))
+            return size
         except BaseException:
             if part is not None:
                 with suppress(OSError):
@@ -149,15 +157,18 @@ class ResultCache:
                     yield Path(place.path), state.st_size, state.st_mtime
 
     def _keep_within_limit(self) -> None:
+        """Look at all files, which takes 10 us each, and delete what was not used for longest."""
         files = sorted(self._files(), key=lambda file: file[2])
         old = time.time() - _FORGOTTEN
         total = sum(size for _, size, _ in files)
+        most = self.limit if total <= self.limit else (1.0 - _SPARE) * self.limit
         for path, size, used in files:
             forgotten = _UNFINISHED.fullmatch(path.name) and used < old
-            if total > self.limit or forgotten:
+            if total > most or forgotten:
                 with suppress(OSError):
                     path.unlink()
                     total -= size
+        self._room = max(self.limit - total, 0.0) / _WRITERS
 
     def _give_up(self, error: OSError) -> None:
         with self._lock:

@@ -8,9 +8,13 @@ function viridis(share) {
   return `rgb(${one.map((value, k) => Math.round(value + (at - low) * (other[k] - value))).join(",")})`;
 }
 function drawParallel(place, chart) {
-  const top = 100, bottom = 26, left = 46, right = 124, height = 460, pixels = window.devicePixelRatio || 1;
+  const bottom = 26, left = 46, height = 460, pixels = window.devicePixelRatio || 1;
   const axes = chart.axes, count = axes[0].values.length, marked = new Map();
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
+  pen.font = "bold 12px system-ui, sans-serif";
+  const widths = axes.map(axis => pen.measureText(axis.label).width);  // names rise to the right
+  const right = Math.min(Math.max(124, 24 + 0.93 * widths[axes.length - 1]), 290);
+  const top = Math.min(Math.max(100, 32 + 0.39 * Math.max(...widths)), 160);
   place.style.position = "relative";
   place.append(canvas);
   const told = document.createElement("p");

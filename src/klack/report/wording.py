@@ -1,10 +1,13 @@
 """Numbers as engineers write them."""
 
+import re
 from collections.abc import Mapping
 from math import floor, isfinite, log10
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from klack.units import takes_prefix
 
 __all__ = [
     "count",
@@ -23,6 +26,8 @@ __all__ = [
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _WITHOUT_PREFIX = ("", "dB", "dBA", "sone", "phon", "acum")
+_PURE_POWER = re.compile(r"m\^(?P<power>[23])")
+_SMALL = 0.1  # [m] areas and volumes of less than its power are in mm^2, mm^3
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
 _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
@@ -30,10 +35,13 @@ _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """Value with a prefix that keeps the number between 1 and 1000; no line breaks within.
 
-    Pure numbers, levels and measures of sound have no prefixes.
+    Pure numbers, levels and measures of sound have no prefixes, nor do units that no prefix
+    multiplies (:func:`klack.units.takes_prefix`); masses are in grams, areas in mm^2 or m^2.
 
     >>> quantity(1.4823e-5, "s").split(), quantity(0.99996e3, "N").split()
     (['14.82', 'µs'], ['1.000', 'kN'])
+    >>> quantity(7e-5, "m^2").split(), quantity(3e-3, "kg").split(), quantity(2e4, "1/s").split()
+    (['70', 'mm^2'], ['3.000', 'g'], ['2e+04', '1/s'])
     >>> quantity(0.0123, "sone", 2).split(), quantity(-0.0123, "", 2)
     (['0.012', 'sone'], '−0.012')
     """
@@ -41,7 +49,12 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         return _NONE if value != value else "∞"
     if value == 0.0:
         return f"0{_space(unit)}"
-    if unit in _WITHOUT_PREFIX:
+    if unit == "kg":
+        return quantity(1e3 * value, "g", digits)
+    pure = _PURE_POWER.fullmatch(unit)
+    if pure is not None and abs(value) < _SMALL ** int(pure["power"]):
+        value, unit = value * 1e3 ** int(pure["power"]), f"m{unit}"
+    if unit in _WITHOUT_PREFIX or not takes_prefix(unit):
         return f"{value:.{digits}g}".replace("-", _MINUS) + _space(unit)
     rounded = float(f"{value:.{digits - 1}e}")
     power = min(max(3 * floor(log10(abs(rounded)) / 3 + 1e-12), -15), 9)
@@ -59,7 +72,7 @@ def printed_unit(values: ArrayLike, unit: str) -> tuple[str, float]:
     if unit in _WITHOUT_PREFIX:
         return unit, 1.0
     largest = float(np.nanmax(np.abs(values), initial=0.0))
-    if not largest > 0.0 or unit.startswith("kg") or "^" in unit.split("/")[0]:
+    if not largest > 0.0 or not takes_prefix(unit):
         return unit, 1.0
     power = min(max(3 * floor(log10(largest) / 3 + 1e-12), -12), 9)
     return _PREFIXES[power] + unit, float(f"1e{-power}")

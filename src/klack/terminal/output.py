@@ -101,11 +101,25 @@ def _write_to_stream(path: Path, text: str) -> None:
         file.write(text)
 
 
+_FILES = frozenset(
+    f".{ending}"
+    for ending in "csv fmu html inp json mat mf4 mo nc pdf svg vtk vtu wav yaml yml".split()
+)
+"""Endings of files that klack writes: a folder of such a name was meant to be a file."""
+
+
 def require_folder(folder: Path) -> None:
     """Refuse a target of ``--out`` that cannot be written, before the long work begins."""
     if (found := planted(folder)) is not None:
         raise _refuse("--out", folder, found, "a folder, or a path for one")
     existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if folder.suffix.lower() in _FILES and not folder.exists():
+        raise InputError(
+            "--out",
+            got=f"'{folder}', the name of a file",
+            expected="a folder; klack names the files in it",
+            hint=f"--out {folder.with_suffix('')}",
+        )
     if not existing.is_dir():
         raise _refuse("--out", folder, f"a path through the file {existing}", "a folder")
     if not os.access(existing, os.W_OK):

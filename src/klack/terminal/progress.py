@@ -74,7 +74,7 @@ class _Lines:
 def _bar() -> Iterator[Progress]:
     """Bar that shows itself, since imports, compiling and meshing report nothing for a while."""
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as RichProgress
 
     bar = RichProgress(
@@ -82,6 +82,8 @@ def _bar() -> Iterator[Progress]:
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=True,
     )

@@ -13,7 +13,6 @@ from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Plate
 from klack.acoustics.signal_statistics import (
-    SoundStatistics,
     pressure_third_octaves,
     sound_statistics,
 )
@@ -46,7 +45,7 @@ from klack.signals import TimeSeries
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["click_statistics", "noise_design", "run_noise"]
+__all__ = ["click_sound", "noise_design", "run_noise"]
 
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
 _HEARING = 20e3  # [Hz]
@@ -98,8 +97,8 @@ def run_noise(
     )
 
 
-def click_statistics(source: NoiseSource, transfers: Transfers) -> SoundStatistics | None:
-    """Levels of one click: a part of :func:`noise_design`, in a fifth of its time.
+def click_sound(source: NoiseSource, transfers: Transfers) -> TimeSeries | None:
+    """Sound pressure of one click: a part of :func:`noise_design`, in a fifth of its time.
 
     None if nothing radiates.
 
@@ -111,8 +110,7 @@ def click_statistics(source: NoiseSource, transfers: Transfers) -> SoundStatisti
     """
     bands = [force_bands(stop.force) for stop in source.stops]
     around = _surroundings(source, net_share(source.net, bands), bands[0])
-    pressure = _pressure(source, around, transfers)
-    return None if pressure is None else sound_statistics(pressure)
+    return _pressure(source, around, transfers)
 
 
 def noise_design(source: NoiseSource) -> NoiseDesign:

@@ -49,6 +49,7 @@ __all__ = [
     "stop_summaries",
     "stroke_study",
     "variant_network",
+    "variant_of",
 ]
 
 
@@ -276,9 +277,23 @@ def one_variant(
         )
     except IncompleteRunError as error:
         result, failure = error.result, error
+    setup_time = perf_counter() - begin - result.wall_time
+    variant = variant_of(valve, roles, name, rows, result, setup_time)
+    return VariantRun(variant=variant, rows=rows, failure=failure)
+
+
+def variant_of(
+    valve: Valve,
+    roles: ValveRoles,
+    name: Variant,
+    rows: Rows,
+    result: NetworkResult,
+    setup_time: float = 0.0,
+) -> StrokeVariant:
+    """Record of one variant from its run, with the times of its needle."""
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
-    variant = StrokeVariant(
+    return StrokeVariant(
         name=name,
         label=_label(valve, rows, wet=wet, flexible=flexible),
         wet=wet,
@@ -288,9 +303,8 @@ def one_variant(
         closing_time=times[0].closing.touch if times else None,
         times=times,
         result=result,
-        setup_time=perf_counter() - begin - result.wall_time,
+        setup_time=setup_time,
     )
-    return VariantRun(variant=variant, rows=rows, failure=failure)
 
 
 def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
