@@ -65,19 +65,24 @@ def with_coil(folder):
 
 
 class TestNumbers:
-    def test_coils_and_their_controllers_do_not_let_derivatives_grow(self, tmp_path):
+    @pytest.mark.parametrize(("variant", "by_mass"), [("dry", 0.5), ("wet", 0.74)])
+    def test_coils_and_their_controllers_do_not_let_derivatives_grow(
+        self, variant, by_mass, tmp_path
+    ):
+        """Truth: strokes with changed parameters; dry, a mass that is given its work: sqrt(M)."""
         keys = [PRELOAD, "network.components.coil.resistance", MASS]
         record = klack.sensitivities(
             with_coil(tmp_path),
             parameters=keys,
             measures=["opening_time", "opening.impulse", "seat.peak_force"],
+            variant=variant,
         )
         time, impulse, force = record.measures
         assert abs(time.predicted - time.secant) < 1.5 * 20e-9  # steps of the two strokes
         assert impulse.deviation < 0.02
         assert force.deviation < 0.15
         assert max(impact.growth for impact in record.impacts) < 1e-3
-        assert record.elasticity("opening.impulse", MASS) == pytest.approx(0.74, abs=0.02)
+        assert record.elasticity("opening.impulse", MASS) == pytest.approx(by_mass, abs=0.02)
 
     @pytest.mark.parametrize("coarse", [4, 16, 64])
     def test_derivatives_stay_at_rest(self, coarse):
@@ -97,6 +102,15 @@ class TestNumbers:
         assert values["opening.peak_force"] == pytest.approx(
             stroke.impacts("opening")[0].peak_force, rel=1e-4
         )
+
+    @pytest.mark.parametrize("variants", ["dry, wet", "wet, dry"])
+    def test_the_first_variant_of_the_case_is_the_default(self, variants, tmp_path):
+        file = tmp_path / "case.yaml"
+        file.write_text(SMALL.read_text().replace("[dry, wet]", f"[{variants}]"))
+        found = klack.sensitivities(
+            file, parameters=[PRELOAD], measures=["opening_time"], check=False
+        )
+        assert found.variant == variants[:3]
 
     def test_derivatives_predict_other_strokes(self, dry):
         assert [item.name for item in dry.parameters] == [PRELOAD, MASS, "lift"]

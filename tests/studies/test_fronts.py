@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from klack.errors import InputError
-from klack.studies.fronts import compromise, find_front, hypervolume
+from klack.studies.fronts import compromise, find_front, hypervolume, spread_over
 
 
 def front_by_pairs(points):
@@ -91,6 +91,17 @@ def test_failed_points_are_never_on_the_front():
 
 def test_negative_zero_is_zero():
     assert find_front([[0.0, 1.0], [-0.0, 1.0]]).points.tolist() == [0]
+
+
+def test_points_spread_over_a_front():
+    """Both ends, evenly between, none twice; all of a short one, none of none."""
+    front = np.array([9, 4, 7, 1, 3, 8, 2])
+    assert spread_over(front, 3).tolist() == [9, 1, 2]
+    assert spread_over(front, 1).tolist() == [9]
+    assert spread_over(front, 7).tolist() == spread_over(front, 50).tolist() == front.tolist()
+    assert spread_over(front[:0], 3).size == 0
+    for most in range(1, 8):
+        assert len(set(spread_over(front, most).tolist())) == most
 
 
 def test_compromise_does_not_depend_on_units():

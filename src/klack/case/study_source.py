@@ -26,11 +26,14 @@ class StudySource:
     study : CaseStudy
     path : Path
     lines : Lines
+    text : str
+        Of a file of its own; empty if the study stands in the case.
     """
 
     study: CaseStudy
     path: Path
     lines: Lines
+    text: str = ""
 
     def where(self, key: Key, *, on_key: bool = False) -> str:
         """File, line and key below ``study``, as messages name them."""
@@ -83,7 +86,10 @@ def study_of(case: ValveCase, tree: CaseTree, file: Path | None = None) -> Study
         text = text_of(file)
         data, lines = parse(text, file)
         return StudySource(
-            study=validated(StudyFile, text, file, data, lines).study, path=file, lines=lines
+            study=validated(StudyFile, text, file, data, lines).study,
+            path=file,
+            lines=lines,
+            text="" if file == tree.path else text,
         )
     if case.study is None:
         raise InputError(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError
 from klack.studies.values import values_of_points
 
-__all__ = ["Front", "compromise", "find_front", "hypervolume"]
+__all__ = ["Front", "compromise", "find_front", "hypervolume", "spread_over"]
 
 _PAIRS = 40_000
 """Largest number of pairs of points that are compared directly, without another division."""
@@ -114,6 +114,21 @@ def compromise(objectives: ArrayLike) -> int:
     span = high / scale - low / scale
     span[span == 0.0] = 1.0
     return int(np.argmin((((values / scale - low / scale) / span) ** 2).sum(axis=1)))
+
+
+def spread_over(points: NDArray[np.integer], most: int) -> NDArray[np.integer]:
+    """Some points of a front, evenly over its order, with both ends.
+
+    Parameters
+    ----------
+    points : array of int, shape (n,)
+        In the order of the front.
+    most : int
+        Points at most; the first alone for one.
+    """
+    if points.size <= most:
+        return points
+    return points[np.linspace(0, points.size - 1, most).round().astype(int)]
 
 
 def hypervolume(objectives: ArrayLike, reference: ArrayLike) -> float:

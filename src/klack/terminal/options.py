@@ -19,6 +19,7 @@ __all__ = [
     "Out",
     "Quiet",
     "Report",
+    "StudyPath",
     "Threads",
     "imported",
     "require_files",
@@ -46,6 +47,10 @@ Quiet = Annotated[
 ]
 Threads = Annotated[
     int | None, Parameter(name="--threads", help="Processor cores to use. [default: all]")
+]
+StudyPath = Annotated[
+    Path | None,
+    Parameter(name="--study", help="File with a section 'study'. [default: that of the case]"),
 ]
 Components = Annotated[
     list[str] | None,

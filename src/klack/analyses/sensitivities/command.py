@@ -1,20 +1,15 @@
 """``klack sensitivities``: derivatives of the measures of a stroke with its parameters."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.terminal.options import CaseArgument, Components, imported, require_files
+from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["sensitivities"]
 
-_File = Annotated[
-    Path | None,
-    Parameter(name="--study", help="File with a section 'study'. [default: that of the case]"),
-]
 _Names = Annotated[
     list[str] | None,
     Parameter(
@@ -46,7 +41,7 @@ def sensitivities(
     case: CaseArgument,
     /,
     *,
-    study: _File = None,
+    study: StudyPath = None,
     parameter: _Names = None,
     measure: _Measures = None,
     variant: _Variant = None,

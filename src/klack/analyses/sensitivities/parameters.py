@@ -55,7 +55,8 @@ class SlopeSpace:
         Parameters of the study that stay as they are.
     kinds : mapping of str to Kind or None
         Of all keys of the case that are set.
-    linked : tuple of Linked
+    space : Space
+        Of the study: what follows from its parameters.
     skipped : tuple of str
         Parameters of the study that have no derivative here.
     """
@@ -63,7 +64,7 @@ class SlopeSpace:
     varied: tuple[VariedKey, ...]
     others: Mapping[str, float | str]
     kinds: Mapping[str, Kind | None]
-    linked: tuple[Linked, ...]
+    space: Space
     skipped: tuple[str, ...] = ()
 
     def written(self, shifts: Mapping[str, float]) -> dict[str, PointValue]:
@@ -76,8 +77,7 @@ class SlopeSpace:
         """
         values = dict(self.others)
         values |= {item.name: item.value + shifts.get(item.name, 0.0) for item in self.varied}
-        for item in self.linked:
-            values[item.name] = item.value(values)
+        values = dict(self.space.completed(values))
         return {name: written(values[name], kind) for name, kind in self.kinds.items()}
 
 
@@ -102,17 +102,11 @@ def slope_space(
     """
     space = space_of(case, source) if source is not None else Space(parameters=(), linked=())
     found: dict[str, VariedKey] = {}
-    own = {
-        name: item.today
-        for item in space.linked
-        for word, name in item.words.items()
-        if item.expression.text == word
-    }
+    known = space.known()
     others: dict[str, float | str] = {}
     for item in space.parameters:
-        today = own.get(item.name) if item.today is None else item.today
-        value = item.spread.at(0.5) if today is None or item.is_fixed else today
-        others[item.name] = value
+        middle = item.spread.at(0.5)
+        others[item.name] = value = middle if item.is_fixed else known.get(item.name, middle)
         if item.kind is not None and not isinstance(value, str) and not item.is_fixed:
             size = abs(value) or _width(item.spread)
             found[item.name] = VariedKey(name=item.name, kind=item.kind, value=value, size=size)
@@ -143,7 +137,7 @@ def slope_space(
         varied=varied,
         others=others,
         kinds=kinds,
-        linked=space.linked,
+        space=space,
         skipped=tuple(name for name in skipped if not _is_fixed(space, name)),
     )
 

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from klack.case.study_source import StudySource
 from klack.errors import InputError
 
 __all__ = [
+    "PointFields",
     "measure_columns",
-    "parameter_columns",
+    "point_fields",
     "require_some",
     "row_warnings",
 ]
@@ -43,20 +45,34 @@ def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
         )
 
 
-def parameter_columns(
-    space: Space, values: Sequence[Values]
-) -> tuple[tuple[StudyColumn, ...], tuple[StudyColumn, ...]]:
-    """Columns of the parameters, and of what follows from them."""
+class PointFields(TypedDict):
+    """Fields of a record that its points give, beside their measures."""
+
+    variant: str
+    parameters: tuple[StudyColumn, ...]
+    linked: tuple[StudyColumn, ...]
+    failures: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def point_fields(
+    asked: AskedPoints, space: Space, values: Sequence[Values], rows: Sequence[PointRow]
+) -> PointFields:
+    """Values of the parameters and of what follows from them, and how each point ended."""
     known = space.known()
-    own = tuple(
-        _column(values, item.name, item.unit, item.text(), known.get(item.name))
-        for item in space.parameters
+    return PointFields(
+        variant=asked.variant,
+        parameters=tuple(
+            _column(values, item.name, item.unit, item.text(), known.get(item.name))
+            for item in space.parameters
+        ),
+        linked=tuple(
+            _column(values, item.name, item.unit, f"= {item.expression.text}", item.today)
+            for item in space.linked
+        ),
+        failures=tuple(row.failure for row in rows),
+        notes=tuple("\n".join(row.notes) for row in rows),
     )
-    linked = tuple(
-        _column(values, item.name, item.unit, f"= {item.expression.text}", item.today)
-        for item in space.linked
-    )
-    return own, linked
 
 
 def _column(

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.errors import require_positive
-from klack.terminal.options import CaseArgument, Components, imported, require_files
+from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
@@ -16,15 +16,6 @@ if TYPE_CHECKING:
     from klack.analyses.study.record import StudyRecord
 
 __all__ = ["optimise", "study"]
-
-_File = Annotated[
-    Path | None,
-    Parameter(
-        name="--study",
-        help="File with a section 'study'. [default: that of the case]",
-    ),
-]
-
 
 _Made = Annotated[
     int | None,
@@ -55,7 +46,7 @@ def study(
     case: CaseArgument,
     /,
     *,
-    study: _File = None,
+    study: StudyPath = None,
     made: _Made = None,
     workers: _Workers = None,
     dask: _Dask = None,
@@ -72,7 +63,7 @@ def optimise(
     case: CaseArgument,
     /,
     *,
-    study: _File = None,
+    study: StudyPath = None,
     workers: _Workers = None,
     dask: _Dask = None,
     component: Components = None,

@@ -1,7 +1,6 @@
 """Content of a study's report before its layout."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
 from klack.analyses.page import page_of
@@ -28,6 +27,7 @@ from klack.analyses.study.wording import (
 )
 from klack.report.page import Content, Section, Sound, Table
 from klack.report.wording import count, signed
+from klack.studies.fronts import spread_over
 
 __all__ = ["study_content"]
 
@@ -142,7 +142,7 @@ def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Sect
         for value in [float(item.values[best])]
     ]
     told = [f"Bounds: {'; '.join(found.bounds)}." if found.bounds else "No bounds."]
-    listed = _spread(found.front)
+    listed = spread_over(found.front, _OF_FRONT)
     front = Table(
         columns=("point", *(labels[name] for name in found.objectives), "parameters"),
         rows=tuple(_front_row(record, int(i), labels) for i in listed),
@@ -200,12 +200,6 @@ def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Sect
         ),
         sounds=tuple(players),
     )
-
-
-def _spread(front: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Some points of a front, evenly over its order."""
-    places = np.linspace(0, front.size - 1, min(front.size, _OF_FRONT)).round().astype(int)
-    return front[np.unique(places)]
 
 
 def _front_row(record: StudyRecord, place: int, labels: dict[str, str]) -> tuple[str, ...]:

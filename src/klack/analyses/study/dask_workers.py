@@ -79,7 +79,7 @@ class DaskWorkers(Closing):
         require_dask()
         self._sent = SentCase.of(case, tree)
         self._client, self._is_own = _client(scheduler)
-        self._pace = _Pace()
+        self._size = _TaskSize()
         self.count, self._now, self._counted = 0, 0, -_COUNT
         self._checked: set[str] = set()
         self._told = False
@@ -107,7 +107,7 @@ class DaskWorkers(Closing):
         groups = groups_of(asked, places)
         agenda = Agenda([group.places for group in groups])
         with Tally(len(asked.points), len(places), keep, progress) as tally:
-            tasks = DaskTasks(self._client, self._sent, asked, tally, self._pace.learn)
+            tasks = DaskTasks(self._client, self._sent, asked, tally, self._size.learn)
             try:
                 while agenda.left or tasks:
                     tally.tell()
@@ -115,7 +115,7 @@ class DaskWorkers(Closing):
                     self._count_workers(progress)
                     most = max(_FEWEST, _AHEAD * self._now)
                     while agenda.left and len(tasks) < most:
-                        points = self._pace.points(agenda.left, most, len(groups) > 1)
+                        points = self._size.points(agenda.left, most, len(groups) > 1)
                         tasks.submit(agenda.take(most=points))
                     tasks.settle(_LOOK)
                 tally.tell()
@@ -192,7 +192,7 @@ def _require_version(address: str, found: object) -> None:
     )
 
 
-class _Pace:
+class _TaskSize:
     """How many points make a task that is worth its way."""
 
     _short, _long, _most = 0.5, 5.0, 64

@@ -1,15 +1,54 @@
 """Rows of points: those that are known, and the others computed and kept."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from time import perf_counter
+from typing import TypedDict
 
 from klack.analyses.study.log import KeptPoint, PointLog, point_key
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.point_workers import PointWorkers
 from klack.analyses.study.strokes import AskedPoints
+from klack.case.case_tree import CaseTree
+from klack.case.points import GivenPoints
+from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
+from klack.errors import InputError
 from klack.progress import Progress
 
-__all__ = ["Evaluation"]
+__all__ = ["EffortFields", "Evaluation", "asked_of"]
+
+
+class EffortFields(TypedDict):
+    """Fields of a record that tell who computed its points, and how many were known."""
+
+    threads: int
+    workers: str
+    computed: int
+    kept: int
+    point_time: float
+
+
+def asked_of(
+    case: ValveCase,
+    tree: CaseTree,
+    source: StudySource,
+    written: GivenPoints,
+    names: Iterable[str],
+) -> AskedPoints:
+    """Points of a study, with the measures of these names.
+
+    Raises
+    ------
+    InputError
+        With file, line and key: for a measure that does not exist; and those of
+        :meth:`AskedPoints.of`.
+    """
+    try:
+        return AskedPoints.of(case, tree, written, names, source.study.variant)
+    except InputError as error:
+        if error.where == "measures":
+            raise source.refuse(("measures",), error) from None
+        raise
 
 
 class Evaluation:
@@ -50,6 +89,16 @@ class Evaluation:
         return [
             row or self._as(rows, first, key, measures) for key, row in zip(keys, rows, strict=True)
         ]
+
+    def effort(self, points: int) -> EffortFields:
+        """What a record of so many points tells."""
+        return EffortFields(
+            threads=self._workers.count,
+            workers=self._workers.words,
+            computed=self.computed,
+            kept=points - self.computed,
+            point_time=self.seconds,
+        )
 
     def _known(self, key: str, measures: tuple[str, ...]) -> PointRow | None:
         kept = self._log.done.get(key)

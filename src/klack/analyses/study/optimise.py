@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.study.columns import (
     measure_columns,
-    parameter_columns,
+    point_fields,
     require_some,
     row_warnings,
 )
-from klack.analyses.study.evaluation import Evaluation
+from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.made_valves import MadeValves, made_valves_of
@@ -30,11 +30,10 @@ from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
-from klack.studies.fronts import compromise, find_front
+from klack.studies.fronts import compromise, find_front, spread_over
 from klack.studies.refinement import Refinement, RefinementSettings
 from klack.studies.search import Search, SearchSettings
 from klack.studies.spread import Range
@@ -98,8 +97,8 @@ def run_optimisation(
     ):
         made = made_valves_of(case, source, space)
         work = _Work(case, tree, source, space, made, Evaluation(log, workers), clock)
+        asked = work.asked_today
         today = work.rows([{}], work.names)[0]
-        asked = work.asked([{}], work.names)
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
         sides = front.goals.sides
@@ -117,24 +116,15 @@ def run_optimisation(
             robust_today = made.row_of_today(sides, work.rows)
             columns += made.columns(columns, sides, work.made_rows, robust_today)
         sounds = _sounds(work, front, clock)
-    parameters, linked = parameter_columns(space, work.values)
     optimum = _optimum(front, search.settings.algorithm, source, columns, made)
     return StudyRecord(
         **case_fields(case),
         **run_fields(begin, clock, "pymoo"),
-        study_text="" if source.path == tree.path else source.path.read_text(encoding="utf-8"),
-        variant=asked.variant,
+        **work.evaluation.effort(work.done),
+        **point_fields(asked, space, work.values, work.found),
+        study_text=source.text,
         design=optimum.algorithm,
-        threads=workers.count,
-        workers=workers.words,
-        computed=work.evaluation.computed,
-        kept=work.done - work.evaluation.computed,
-        point_time=work.evaluation.seconds,
-        parameters=parameters,
-        linked=linked,
         measures=columns,
-        failures=tuple(row.failure for row in work.found),
-        notes=tuple("\n".join(row.notes) for row in work.found),
         optimum=optimum,
         sounds=sounds,
         warnings=(*_doubts(optimum), *notes, *row_warnings(work.found, today, columns)),
@@ -168,8 +158,8 @@ class _Work:
         self._most = designs * (1 if made is None else 1 + len(made.scatter.cube))
         self._pace = Pace(progress, self._most)
         self._shown = tuple(study.objectives)
-        chosen = self.asked([{}], self.names).chosen
-        self._units = {item.name: item.measure.unit for item in chosen}
+        self.asked_today = self.asked([{}], self.names)
+        self._units = {item.name: item.measure.unit for item in self.asked_today.chosen}
         self.done = 0
 
     def asked(
@@ -182,13 +172,7 @@ class _Work:
         InputError
             For a measure that does not exist.
         """
-        study = self._source.study
-        try:
-            return AskedPoints.of(self._case, self._tree, written, names, study.variant)
-        except InputError as error:
-            if error.where == "measures":
-                raise self._source.refuse(("measures",), error) from None
-            raise
+        return asked_of(self._case, self._tree, self._source, written, names)
 
     def rows(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
@@ -302,7 +286,7 @@ def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | No
     order, given = front.ordered, source.study.search
     polls = 2 * len(work.cubes[0]) * _POLLS
     count = min(max(given.refinements // polls, 1), _REFINED)
-    chosen = order[np.unique(np.linspace(0, order.size - 1, count).round().astype(int))]
+    chosen = spread_over(order, count)
     spans = np.ptp(front.objectives[order], axis=0)
     sizes = np.abs(front.objectives[order]).max(axis=0)
     settings = RefinementSettings(
@@ -354,11 +338,9 @@ def _optimum(
 
 def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound, ...]:
     """Of the case as it is and of points spread over the front, if the noise was asked for."""
-    asked = work.asked([{}], work.names)
-    if front.best < 0 or not any(item.of in _HEARD for item in asked.chosen):
+    if front.best < 0 or not any(item.of in _HEARD for item in work.asked_today.chosen):
         return ()
-    order = front.ordered
-    chosen = order[np.linspace(0, order.size - 1, min(order.size, _PLAYED)).round().astype(int)]
+    chosen = spread_over(front.ordered, _PLAYED)
     points = list(dict.fromkeys([-1, front.best, *map(int, chosen)]))
     written = [work.space.written(work.values[i]) if i >= 0 else {} for i in points]
     found = sounds_of(work.asked(written, work.names), progress)

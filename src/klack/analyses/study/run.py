@@ -6,11 +6,11 @@ from time import perf_counter
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.study.columns import (
     measure_columns,
-    parameter_columns,
+    point_fields,
     require_some,
     row_warnings,
 )
-from klack.analyses.study.evaluation import Evaluation
+from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import bounds_of, is_by_today
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.pace import Pace
@@ -24,7 +24,6 @@ from klack.analyses.study.where import HERE, Where
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 
@@ -54,13 +53,7 @@ def asked_points(
     points = points_in(source, space)
     # the last one is the case as it is, to compare with
     written = [*map(points.space.written, points.values), {}]
-    try:
-        asked = AskedPoints.of(case, tree, written, names, study.variant)
-    except InputError as error:
-        if error.where == "measures":
-            raise source.refuse(("measures",), error) from None
-        raise
-    return points, asked
+    return points, asked_of(case, tree, source, written, names)
 
 
 def run_study(
@@ -117,20 +110,13 @@ def run_study(
     bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
     columns = measure_columns(asked, found, today)
     varied = [item.name for item in points.space.varied]
-    parameters, linked = parameter_columns(points.space, points.values)
     return StudyRecord(
         **case_fields(case),
         **run_fields(begin, clock),
-        study_text="" if source.path == tree.path else source.path.read_text(encoding="utf-8"),
-        variant=asked.variant,
+        **evaluation.effort(len(asked.points)),
+        **point_fields(asked, points.space, points.values, found),
+        study_text=source.text,
         design=points.design,
-        threads=workers.count,
-        workers=workers.words,
-        computed=evaluation.computed,
-        kept=len(asked.points) - evaluation.computed,
-        point_time=evaluation.seconds,
-        parameters=parameters,
-        linked=linked,
         measures=columns,
         sensitivities=(
             sensitivities_of(columns, varied) if source.study.design.kind == "saltelli" else ()
@@ -149,8 +135,6 @@ def run_study(
             if source.study.design.kind in _DRAWN
             else ()
         ),
-        failures=tuple(row.failure for row in found),
-        notes=tuple("\n".join(row.notes) for row in found),
         warnings=(
             *points.notes,
             *_bounds_by_today(source),
