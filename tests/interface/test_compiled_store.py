@@ -113,6 +113,20 @@ def test_an_inner_function_from_the_store_is_linked_into_a_new_caller(program):
     assert end(start(program)) == [8.0, 1, []]
 
 
+@pytest.mark.parametrize("kinds", ["float, float", "float, int"])
+def test_fields_that_change_places_are_other_code(program, kinds):
+    """Truth: the field that the function names; uniform named tuples are a type of their own."""
+    first, second = kinds.split(", ")
+    for fields in (f"a: {first}; b: {second}", f"b: {first}; a: {second}"):
+        (program / "calls.py").write_text(
+            "from typing import NamedTuple\nfrom klack.compiling.jit import njit\n"
+            f"class Pair(NamedTuple): {fields}\n"
+            "@njit\ndef given(pair):\n    return 1.0 * pair.a\n"
+            f"def whole(x):\n    return given(Pair(x, {second}(5)))\n"
+        )
+        assert end(start(program)) == [2.0 if fields[0] == "a" else 5.0, 1, []]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the machine code of Linux")
 def test_only_entries_have_machine_code(program):
     end(start(program))

@@ -76,7 +76,7 @@ def _surroundings() -> str:
 
 def _type_words(kind: Any) -> str:
     """Name of a numba type; of a named tuple also its class and fields, which numba leaves out."""
-    if isinstance(kind, types.NamedTuple):
+    if isinstance(kind, types.BaseNamedTuple):
         cls = kind.instance_class
         inner = ", ".join(map(_type_words, kind.types))
         return f"{cls.__module__}.{cls.__qualname__}{cls._fields}({inner})"
