@@ -1,7 +1,7 @@
 """Points on their way through a cluster of dask, and what comes back."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, TypeVar
 from uuid import uuid4
@@ -22,6 +22,8 @@ __all__ = ["DaskTasks"]
 
 Given = TypeVar("Given")
 
+_FETCH = 5.0
+"""For the rows of a task to come from its worker [s]."""
 _ROUNDS = 2
 """Times that dask gives a point up, each after four workers: over a neighbour, then over itself."""
 
@@ -53,6 +55,7 @@ class DaskTasks:
         self._case = self._send_case()
         self._ended: SimpleQueue[Future] = SimpleQueue()
         self._places: dict[Future, tuple[int, ...]] = {}
+        self._lost: set[Future] = set()
         self._given_up: Counter[int] = Counter()
 
     def __len__(self) -> int:
@@ -74,21 +77,24 @@ class DaskTasks:
         InputError
             Where a worker cannot compute any point.
         """
-        ended = [future for future in self._taken(patience) if future in self._places]
-        finished = [future for future in ended if future.status == "finished"]
-        self._keep(finished)
-        for future in ended:
-            if future not in self._places:
-                continue
-            if future.status in ("error", "cancelled"):
+        ended = {*self._taken(patience), *self._lost}
+        self._lost.clear()
+        refused: list[tuple[str, Failure]] = []
+        for future in ended & self._places.keys():
+            if future.status == "finished":
+                refused += self._keep(future)
+            elif future.status in ("error", "cancelled"):
                 self._again(future)
-            else:  # the worker that had the rows is lost: dask has them computed again
-                future.add_done_callback(self._ended.put)
+            else:
+                self._lost.add(future)
+        for address, failure in refused:
+            unwrapped(f"worker {address}", failure)
 
     def give_up(self) -> None:
         """Keep the rows that have come, and take back the rest."""
         try:
-            self._keep([future for future in self._places if future.status == "finished"])
+            for future in [one for one in self._places if one.status == "finished"]:
+                self._keep(future)
         finally:
             self._client.cancel([*self._places, self._case])
             self._places.clear()
@@ -102,21 +108,25 @@ class DaskTasks:
         except Empty:
             return found
 
-    def _keep(self, finished: Iterable["Future"]) -> None:
-        futures = list(finished)
-        answers: list[tuple[str, Answer | Failure]] = self._client.gather(futures)
-        refused: list[tuple[str, Failure]] = []
-        for future, (address, found) in zip(futures, answers, strict=True):
-            places = self._places.pop(future)
-            future.release()
-            if isinstance(found, Failure):
-                refused.append((address, found))
-                continue
-            self._learn(found)
-            for place, row in zip(places, found.rows, strict=True):
-                self._tally(place, row)
-        for address, failure in refused:
-            unwrapped(f"worker {address}", failure)
+    def _keep(self, future: "Future") -> list[tuple[str, Failure]]:
+        """Fetch the rows of a task; return why its worker refused, if it did.
+
+        The worker that has them may be lost at this moment.  Dask has them computed again then; a
+        fetch of all tasks at once would wait for that, and lose the rows of others meanwhile.
+        """
+        try:
+            address, found = future.result(timeout=_FETCH)
+        except Exception:  # of whatever kind: the state of the task tells what to do
+            self._lost.add(future)
+            return []
+        places = self._places.pop(future)
+        future.release()
+        if isinstance(found, Failure):
+            return [(address, found)]
+        self._learn(found)
+        for place, row in zip(places, found.rows, strict=True):
+            self._tally(place, row)
+        return []
 
     def _again(self, future: "Future") -> None:
         """Send points of a task without an answer once more, one by one; or give them up."""
