@@ -381,6 +381,19 @@ class TestTable:
         assert frame["opening_time"].tolist()[0] == table["opening_time"][0]
         assert frame.attrs["units"]["opening_time"] == "s"
         assert table.arrays()["failure"].tolist() == list(table.failures)
+        assert rows[0][-2:] == ["failure", "doubts"]
+
+    def test_it_goes_to_parquet_with_units(self, table: klack.PointTable, tmp_path: Path):
+        """Truth: the same numbers, bit for bit; equal tables make equal files."""
+        parquet = pytest.importorskip("pyarrow.parquet")
+        found = parquet.read_table(table.to_parquet(tmp_path / "t.parquet"))
+        assert found["opening_time"].to_numpy()[0] == table["opening_time"][0]
+        assert np.isnan(found["opening_time"].to_numpy()[1])
+        assert found["failure"].to_pylist() == list(table.failures)
+        assert found.schema.field(PRELOAD).metadata == {b"unit": b"N"}
+        assert found.schema.metadata[b"variant"] == b"dry"
+        again = table.to_parquet(tmp_path / "again.parquet").read_bytes()
+        assert again == (tmp_path / "t.parquet").read_bytes()
 
     def test_it_can_be_read(self, table: klack.PointTable):
         text = repr(table)

@@ -315,6 +315,16 @@ def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
     rows = list(csv.reader(file.read_text().splitlines()))
     assert len(rows) == 9
     assert f"{PRELOAD} [N]" in rows[0]
+    assert main(["export", str(out), "--to", "parquet", "--out", str(tmp_path / "table")]) == 0
+    assert (tmp_path / "table" / "points.parquet").read_bytes()[:4] == b"PAR1"
+    capsys.readouterr()
+    for source, words in (
+        ((str(out), "netcdf"), "--to csv or parquet"),
+        ((str(SMALL), "parquet"), "the folder of klack study"),
+    ):
+        assert main(["export", source[0], "--to", source[1], "--out", str(tmp_path / "no")]) == 2
+        assert words in capsys.readouterr().err
+        assert not (tmp_path / "no").exists()
 
 
 def test_short_names_are_ends_that_no_other_has():

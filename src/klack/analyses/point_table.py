@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack import __version__
 from klack.analyses.measures import Measure
 from klack.errors import InputError, MissingExtraError
 from klack.input.problem import nearest, one_of
@@ -108,9 +109,14 @@ class PointTable:
         return np.array([bool(text) for text in self.failures], dtype=bool)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Columns by name, then ``"failure"``, the text of each point."""
+        """Columns by name, then ``"failure"`` and ``"doubts"``, texts of each point."""
         found = {column.name: column.values for column in self.columns}
-        return found | {"failure": np.array(self.failures, dtype=object)}
+        return found | {name: np.array(texts, dtype=object) for name, texts in self._texts}
+
+    @property
+    def _texts(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """What is said about each point, by the name of a column."""
+        return (("failure", self.failures), ("doubts", tuple(map("\n".join, self.warnings))))
 
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame``; units are in its ``attrs["units"]``.
@@ -129,15 +135,45 @@ class PointTable:
         return frame
 
     def to_csv(self, file: str | Path) -> Path:
-        """Write a CSV file: a head with units, all digits, empty where there is no number."""
+        """Write a CSV file: a head with units, all digits, empty where there is no number.
+
+        The last two columns say why a point has no measures, and what speaks against its numbers.
+        """
         text = StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([*(column.head for column in self.columns), "failure"])
-        for i, failure in enumerate(self.failures):
-            writer.writerow([*(_written(column.values[i]) for column in self.columns), failure])
+        names, texts = zip(*self._texts, strict=True)
+        writer.writerow([*(column.head for column in self.columns), *names])
+        for i, said in enumerate(zip(*texts, strict=True)):
+            writer.writerow([*(_written(column.values[i]) for column in self.columns), *said])
         path = Path(file)
         with whole_file(path) as part:
             part.write_text(text.getvalue(), encoding="utf-8", newline="")
+        return path
+
+    def to_parquet(self, file: str | Path) -> Path:
+        """Write a Parquet file: columns by name, the unit of each in the metadata of its field.
+
+        Raises
+        ------
+        MissingExtraError
+            Without the package pyarrow.
+        """
+        try:
+            import pyarrow
+            from pyarrow import parquet
+        except ImportError:
+            raise MissingExtraError("pyarrow", "A table of points as Parquet", "parquet") from None
+        units = {column.name: column.unit for column in self.columns}
+        arrays = {name: pyarrow.array(_plain(x)) for name, x in self.arrays().items()}
+        fields = [
+            pyarrow.field(name, array.type, metadata={"unit": units[name]} if name in units else {})
+            for name, array in arrays.items()
+        ]
+        about = {"case": self.case, "variant": self.variant, "klack": __version__}
+        schema = pyarrow.schema(fields, metadata=about)
+        path = Path(file)
+        with whole_file(path) as part:
+            parquet.write_table(pyarrow.table(list(arrays.values()), schema=schema), part)
         return path
 
     def __repr__(self) -> str:
@@ -202,6 +238,14 @@ def column_of(
         return PointColumn(name, unit, kept, measure)
     numbers = [float("nan") if value is None else float(value) for value in values]
     return PointColumn(name, unit, np.array(numbers, dtype=float), measure)
+
+
+def _plain(values: NDArray[Any]) -> list[Any]:
+    """Numbers, or texts: what stands in the case where a key has no unit."""
+    found = values.tolist()
+    if values.dtype == object and not all(x is None or isinstance(x, str) for x in found):
+        return [None if x is None else str(x) for x in found]
+    return found
 
 
 def _written(value: Any) -> str:

@@ -25,12 +25,12 @@ _Source = Annotated[
     ),
 ]
 _Target = Annotated[
-    Literal["mat", "csv", "fmu", "modelica", "calculix", "netcdf", "mdf", "vtk", "case"],
+    Literal["mat", "csv", "fmu", "modelica", "calculix", "netcdf", "mdf", "parquet", "vtk", "case"],
     Parameter(
         name="--to",
         help="mat, csv: models of a case, or a result; fmu, modelica: models; netcdf, mdf: results "
-        "(a case is run first); vtk: fields over time; calculix: a deck of the impact; case: of a "
-        "point of a study.",
+        "(a case is run first); csv, parquet: points of a study; case: of one of them; vtk: fields "
+        "over time; calculix: a deck of the impact.",
     ),
 ]
 _Part = Annotated[
@@ -91,7 +91,7 @@ _Point = Annotated[
 ]
 
 _MODELS = ("mat", "csv", "fmu", "modelica")
-_RESULTS = ("mat", "csv", "netcdf", "mdf")
+_RESULTS = ("mat", "csv", "netcdf", "mdf", "parquet")
 _USED_BY: Mapping[str, tuple[str, ...]] = {
     "--part": _MODELS,
     "--body": _MODELS,
@@ -158,6 +158,11 @@ def export(
         name, made = _export_stored(source, to, out, wanted)
         _tell(name, to, made, wanted)
         return 0
+
+    if to == "parquet":
+        from klack.cli.export_results import parquet_is_for_studies
+
+        raise parquet_is_for_studies(f"'{source}', which is no stored result")
 
     from klack.case.shipped import find_case
     from klack.case.valve_reader import load_any_case

@@ -1,4 +1,4 @@
-"""``klack export --to netcdf|mdf|mat|csv|vtk``: results for programs that show and compare them."""
+"""``klack export --to netcdf|mdf|mat|csv|parquet|vtk``: results for other programs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,7 +12,13 @@ if TYPE_CHECKING:
     from klack.case.schema import Case
     from klack.case.valve import ValveCase
 
-__all__ = ["export_fields", "export_point", "export_result", "run_and_export"]
+__all__ = [
+    "export_fields",
+    "export_point",
+    "export_result",
+    "parquet_is_for_studies",
+    "run_and_export",
+]
 
 
 def export_result(study: Any, to: str, folder: Path) -> Written:
@@ -22,15 +28,17 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
     from klack.analyses.study.record import StudyRecord
     from klack.exchange.results.study_table import result_table
 
-    if isinstance(study, StudyRecord) and to == "csv":
-        return _export_points(study, folder)
+    if isinstance(study, StudyRecord):
+        return _export_points(study, to, folder)
     if not isinstance(study, ImpactStudy | StrokeStudy):
         raise InputError(
             "the stored result",
             got=f"a stored {type(study).__name__}",
-            expected="the result of klack impact or klack stroke",
+            expected="the result of klack impact, stroke, study or optimise",
             hint="its numbers are in --json of the command that wrote it.",
         )
+    if to == "parquet":
+        raise parquet_is_for_studies("a stored result with curves")
     table = result_table(study)
     name = f"{study.case}_result"
     with staged_folder(folder) as stage:
@@ -53,12 +61,33 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
         return Written.of(folder, stage)
 
 
-def _export_points(study: "StudyRecord", folder: Path) -> Written:
+def _export_points(study: "StudyRecord", to: str, folder: Path) -> Written:
     from klack.analyses.study.table import study_table
 
+    if to not in ("csv", "parquet"):
+        raise InputError(
+            f"--to {to}",
+            got="points of a study",
+            expected="--to csv or parquet, or --to case with --point",
+            hint='in Python, klack.load_result("FOLDER").to_xarray().',
+        )
+    table = study_table(study)
     with staged_folder(folder) as stage:
-        study_table(study).to_csv(stage / "points.csv")
+        if to == "parquet":
+            table.to_parquet(stage / "points.parquet")
+        else:
+            table.to_csv(stage / "points.csv")
         return Written.of(folder, stage)
+
+
+def parquet_is_for_studies(got: str) -> InputError:
+    """The error where Parquet cannot be written."""
+    return InputError(
+        "--to parquet",
+        got=got,
+        expected="the folder of klack study or klack optimise: a row for each point",
+        hint="--to csv or netcdf for curves.",
+    )
 
 
 def export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:

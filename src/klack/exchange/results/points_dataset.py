@@ -8,25 +8,27 @@ from klack.exchange.results.variables import Variable
 
 __all__ = ["points_variables"]
 
+_SAID = {"failure": "why there are no measures", "doubts": "what speaks against the numbers"}
+
 
 def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str, Variable]]:
     """Variables and coordinates of all points, in the order of the design.
 
     Parameters and measures are of shape (points,) over ``point``, by their names with underscores
-    for what Python does not take; ``failure`` says why a point has no measures.
+    for what Python does not take; ``failure`` says why a point has no measures, ``doubts`` what
+    speaks against its numbers.
 
     Parameters
     ----------
     study : StudyRecord
     """
-    names = identifiers([item.name for item in study.columns], ("point", "failure"))
+    names = identifiers([item.name for item in study.columns], ("point", *_SAID))
     variables = {
         name: Variable(("point",), _values(item), _about(item))
         for name, item in zip(names, study.columns, strict=True)
     }
-    variables["failure"] = Variable(
-        ("point",), np.array(study.failures, dtype=str), {"long_name": "why there are no measures"}
-    )
+    for (name, long_name), texts in zip(_SAID.items(), (study.failures, study.notes), strict=True):
+        variables[name] = Variable(("point",), np.array(texts, dtype=str), {"long_name": long_name})
     number = np.arange(study.count)
     return variables, {"point": Variable(("point",), number, {"long_name": "number of the point"})}
 
