@@ -17,6 +17,7 @@ import pytest
 
 import klack
 from klack.analyses.study.parameters import short_names
+from klack.case.reader import parse
 from klack.cli.main import main
 from klack.errors import InputError
 
@@ -325,6 +326,18 @@ def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
         assert main(["export", source[0], "--to", source[1], "--out", str(tmp_path / "no")]) == 2
         assert words in capsys.readouterr().err
         assert not (tmp_path / "no").exists()
+
+
+@pytest.mark.parametrize("name", ["small_study.yaml", "small_robust.yaml"])
+def test_editors_check_a_study_by_its_schema(name, capsys):
+    """Truth: what klack itself takes and refuses."""
+    jsonschema = pytest.importorskip("jsonschema")
+    assert main(["schema", "--kind", "study"]) == 0
+    check = jsonschema.Draft202012Validator(json.loads(capsys.readouterr().out))
+    data, _ = parse((SMALL.parent / name).read_text(), SMALL)
+    check.validate(data)
+    data["study"]["design"] = {"kind": "sobool"}
+    assert not check.is_valid(data)
 
 
 def test_short_names_are_ends_that_no_other_has():

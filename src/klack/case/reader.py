@@ -13,13 +13,12 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from klack.case.bodies import CaseFile
 from klack.case.field_example import fitting_example
 from klack.case.schema import Case
 from klack.case.yaml_limits import UnboundedTree, bounded_yaml
@@ -125,8 +124,8 @@ def case_schema() -> dict[str, Any]:
     return schema_of(Case)
 
 
-def schema_of(kind: type[CaseFile]) -> dict[str, Any]:
-    """JSON schema of a kind of case."""
+def schema_of(kind: type[BaseModel]) -> dict[str, Any]:
+    """JSON schema of a kind of file."""
     schema = kind.model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

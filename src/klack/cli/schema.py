@@ -13,12 +13,12 @@ __all__ = ["schema"]
 def schema(
     *,
     kind: Annotated[
-        Literal["impact", "stroke", "result"],
+        Literal["impact", "stroke", "study", "result"],
         Parameter(
             name="--kind",
             help="impact: two bodies that hit each other (klack impact, klack reduce); stroke: a "
-            "whole valve with all components of its network (klack stroke); result: what every "
-            "command writes with --json.",
+            "whole valve with all components of its network (klack stroke); study: a study in a "
+            "file of its own; result: what every command writes with --json.",
         ),
     ] = "impact",
     json: Annotated[
@@ -42,6 +42,12 @@ def _schema_of(kind: str) -> dict[str, Any]:
         from klack.case.valve_reader import valve_case_schema
 
         return valve_case_schema()
+
+    if kind == "study":
+        from klack.case.reader import schema_of
+        from klack.case.study import StudyFile
+
+        return schema_of(StudyFile)
 
     if kind == "result":
         from klack.analyses.json_results import result_schema
