@@ -140,8 +140,9 @@ class TestNumbers:
         assert np.isnan(columns(record)["opening_time"][1])
         assert "1 of 2 points have no measures" in record.warnings[0]
         text = text.replace("2 mm, 1 mm", "1 mm, 1.1 mm")
-        with pytest.raises(InputError, match="none of which can be computed"):
+        with pytest.raises(InputError, match="none of which can be computed") as caught:
             klack.run_study(SMALL, write(tmp_path, text))
+        assert str(caught.value).count("Try:") == 1
 
 
 class TestKept:

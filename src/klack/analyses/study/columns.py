@@ -34,7 +34,7 @@ def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
     ------
     InputError
     """
-    reasons = Counter(row.failure for row in rows)
+    reasons = Counter(row.failure.partition("\n")[0] for row in rows)
     if rows and not reasons[""]:
         reason, times = reasons.most_common(1)[0]
         raise InputError(
