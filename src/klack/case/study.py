@@ -159,6 +159,13 @@ class StudySearch(Section):
     refinements: Annotated[int, Strict()] = Field(
         default=200, ge=0, le=1_000_000, description="Points about the best ones at the end."
     )
+    polish: Annotated[int, Strict()] = Field(
+        default=0,
+        ge=0,
+        le=1000,
+        description="Steps by exact derivatives from the recommended point at the end, where all "
+        "objectives and bounds are times or impacts of a stroke.",
+    )
     seed: Count = Field(default=1, description="Of the random numbers.")
 
 

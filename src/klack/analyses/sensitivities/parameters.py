@@ -1,10 +1,10 @@
 """Parameters whose derivatives are wanted: of a study, or keys of the case."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from klack.analyses.study.parameters import unit_of, written
-from klack.analyses.study.points import Linked, Space, space_of
+from klack.analyses.study.points import Linked, Space, Values, space_of
 from klack.analyses.study.strokes import makes_bodies
 from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
@@ -66,6 +66,14 @@ class SlopeSpace:
     kinds: Mapping[str, Kind | None]
     space: Space
     skipped: tuple[str, ...] = ()
+
+    def at(self, values: Values) -> "SlopeSpace":
+        """The same about another point: values [SI] of all parameters of the study."""
+        return replace(
+            self,
+            varied=tuple(replace(item, value=float(values[item.name])) for item in self.varied),
+            others={name: values[name] for name in self.others},
+        )
 
     def written(self, shifts: Mapping[str, float]) -> dict[str, PointValue]:
         """What the case has where parameters are shifted by so much [SI], by the path of the key.

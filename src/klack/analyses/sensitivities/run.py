@@ -1,14 +1,12 @@
 """``klack sensitivities``: derivatives of the measures of a stroke with its parameters."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from math import inf, isfinite, sqrt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
 from time import perf_counter, process_time
-from typing import Any
 
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.sensitivities.parameters import SlopeSpace, VariedKey, slope_space
+from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
 from klack.analyses.sensitivities.record import (
     HOLDS,
     ImpactSlope,
@@ -16,40 +14,26 @@ from klack.analyses.sensitivities.record import (
     SensitivityRecord,
     SlopeParameter,
 )
+from klack.analyses.sensitivities.slopes import TIMES, SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.stroke.run import run_variant, variant_network, variant_of
-from klack.analyses.study.chosen_measures import ChosenMeasure, PointRun, chosen_measures
-from klack.assembling.valve import Valve, build_valve, filled_network
+from klack.analyses.study.chosen_measures import ChosenMeasure, chosen_measures
 from klack.case.case_tree import CaseTree
-from klack.case.points import case_at, checked_parts, points_of
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.variants import Variant
-from klack.errors import ConvergenceError, InputError, KlackError
+from klack.case.valve_roles import find_roles
+from klack.errors import ConvergenceError, InputError
 from klack.input.problem import one_of
-from klack.network.rows import Rows
 from klack.progress import Progress, silent
-from klack.simulation.network_result import NetworkResult
-from klack.simulation.network_run import has_python_steps
-from klack.simulation.tangent_numbers import Direction
-from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents
+from klack.simulation.tangent_run import TangentRun
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["MEASURES", "run_sensitivities"]
-
-MEASURES = ("opening_time", "closing_time")
-"""Of a case without a study, beside those of the first impact on each stop."""
+__all__ = ["run_sensitivities"]
 
 _OF_IMPACTS = ("approach_speed", "peak_force", "impulse")
-_SHIFT = 3e-5  # of the size of a parameter: what its numbers are differentiated by
-_AHEAD = 1e-6  # of the size: what a measure is differentiated by, along straight lines
 _SHARE = 0.01  # of the size, by which all parameters change in the check
 _GROWN = 5.0  # times all before, and as much as the time itself: what bounces do that are chaotic
 _RESOLVED = 1e-3  # of a measure that is no time: what the steps of a run resolve of it
-_TIMES = ("opening_time", "closing_time")
-_STAGE = "derivatives"
 
 
 def run_sensitivities(
@@ -102,10 +86,10 @@ def run_sensitivities(
     name = case.one_variant(asked)
     clock = StageClock(progress)
     with collected_warnings() as notes:
-        runner = _Runner(case, tree, space, name, clock, threads)
+        runner = SlopeRunner(case, tree, space, name, clock, threads)
         runs = runner.tangents()
-        slopes = [_slopes(runner, runs, item) for item in chosen]
-        others = runner.check() if check else None
+        slopes = [runner.slopes(runs, item) for item in chosen]
+        others, not_checked = _others_of(runner) if check else (None, ())
     step = runs[0].sizes.step
     pairs = zip(chosen, slopes, strict=True)
     found = tuple(_checked(item, slope, space, others, step) for item, slope in pairs)
@@ -122,11 +106,11 @@ def run_sensitivities(
         impacts=impacts,
         share=_SHARE if others is not None else 0.0,
         runs_time=runner.runs_time,
-        run_time=runner.run_time,
+        run_time=others.time if others is not None else 0.0,
         warnings=(
             *_left_out(case, source, space, measures, chosen),
             *notes,
-            *runner.notes,
+            *not_checked,
             *_doubts(found, impacts),
         ),
     )
@@ -141,16 +125,16 @@ def _measures(
     if not wanted:
         roles = find_roles(case)
         stops = [stop for stop in (roles.opening_stop, roles.seat) if stop]
-        wanted = [*MEASURES, *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS)]
+        wanted = [*TIMES, *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS)]
     chosen = chosen_measures(case, wanted)
-    fitting = tuple(item for item in chosen if _has_slope(item))
+    fitting = tuple(item for item in chosen if has_slope(item))
     if (names and len(fitting) < len(chosen)) or not fitting:
-        bad = next(item for item in chosen if not _has_slope(item))
+        bad = next(item for item in chosen if not has_slope(item))
         raise InputError(
             "--measure",
             got=f"'{bad.name}', which has no derivative here",
             expected="times of opening and closing, and measures of impacts: "
-            + one_of([*_TIMES, *(f"seat.{key}" for key in _OF_IMPACTS)]),
+            + one_of([*TIMES, *(f"seat.{key}" for key in _OF_IMPACTS)]),
             hint="klack study computes any measure at other values of a parameter.",
         )
     return fitting
@@ -179,159 +163,46 @@ def _left_out(
     return tuple(found)
 
 
-def _has_slope(item: ChosenMeasure) -> bool:
-    if item.of == "impact":
-        return True
-    return item.of == "variant" and item.name.partition("_at_")[0] in _TIMES
-
-
-class _Runner:
-    """One variant of a case, at points about that of the case."""
-
-    def __init__(
-        self,
-        case: ValveCase,
-        tree: CaseTree,
-        space: SlopeSpace,
-        name: Variant,
-        clock: Progress,
-        threads: int | None,
-    ) -> None:
-        self.space, self.name, self.clock = space, name, clock
-        self.notes: list[str] = []
-        self.runs_time = self.run_time = 0.0
-        written = space.written({})
-        points = points_of(case, tree, [written])
-        self._places = {key.name: key.place for key in points.keys}
-        valve = build_valve(case, clock, threads=threads)
-        self._tree, self._valve = tree, valve
-        self._parts = checked_parts(tree, case, self._places.values())
-        self.valve = self._at({})
-        self.roles: ValveRoles = find_roles(self.valve.case, self.valve.network)
-
-    def _at(self, shifts: Mapping[str, float]) -> Valve:
-        written = self.space.written(shifts)
-        changes = {self._places[name]: value for name, value in written.items()}
-        case = case_at(self._tree, self._parts, changes)
-        network = filled_network(case, self._valve.reduced, self._valve.laws)
-        return replace(self._valve, case=case, network=network)
-
-    def rows(self, shifts: Mapping[str, float]) -> Rows:
-        """Rows of the network with shifted parameters."""
-        return variant_network(self._at(shifts), self.name).rows()
-
-    def tangents(self) -> list[TangentRun]:
-        """Runs with derivatives, each in some of the directions."""
-        run, rows, found = self.valve.case.run, self.rows({}), list[TangentRun]()
-        if not has_python_steps(rows):
-            compile_tangents(rows, step=run.fine_step)
-        begin = process_time()
-        directions = [self._direction(item) for item in self.space.varied]
-        self.runs_time = process_time() - begin
-        for first in range(0, len(directions), DIRECTIONS):
-            part = directions[first : first + DIRECTIONS]
-            done, share = first / len(directions), len(part) / len(directions)
-            found.append(
-                run_tangents(
-                    rows,
-                    part,
-                    duration=run.duration,
-                    accuracy=run.accuracy,
-                    step=run.step,
-                    coarse=run.coarse,
-                    record=run.record,
-                    progress=partial(self._tell, done, share),
-                )
-            )
-        self.runs_time += sum(item.cpu_time for item in found)
-        return found
-
-    def _tell(self, done: float, share: float, fraction: float) -> None:
-        self.clock(_STAGE, done + share * fraction)
-
-    def _direction(self, item: VariedKey) -> Direction:
-        shift = _SHIFT * item.size
-        ends = []
-        for sign in (1.0, -1.0):
-            try:
-                ends.append(self.rows({item.name: sign * shift}))
-            except InputError as error:
-                raise InputError(
-                    f"--parameter {item.name}",
-                    got=f"a value at the end of what is allowed ({error.got})",
-                    expected="one with room on both sides",
-                    hint="klack study varies it to one side.",
-                ) from None
-        return Direction(name=item.name, plus=ends[0], minus=ends[1], distance=2.0 * shift)
-
-    def variant(self, result: NetworkResult) -> StrokeVariant:
-        """Times of the needle in a run."""
-        rows = variant_network(self.valve, self.name).rows()
-        return variant_of(self.valve, self.roles, self.name, rows, result)
-
-    def check(self) -> "_Others | None":
-        """Strokes as they are, and with all parameters changed by a share, to either side."""
-        found = []
-        begin = process_time()
-        signs = _signs(len(self.space.varied))
-        for way in (0.0, 1.0, -1.0):
-            shifts = {
-                item.name: way * sign * _SHARE * item.size
-                for item, sign in zip(self.space.varied, signs, strict=True)
-            }
-            try:
-                valve = self._at(shifts)
-                rows = variant_network(valve, self.name).rows()
-                result = run_variant(valve.case, rows, self._tell_check)
-                found.append(variant_of(valve, self.roles, self.name, rows, result))
-            except (InputError, ConvergenceError) as error:
-                self.notes.append(f"The derivatives were not checked by other strokes: {error}")
-                return None
-        self.run_time = (process_time() - begin) / len(found)
-        return _Others(*found)
-
-    def _tell_check(self, fraction: float) -> None:
-        self.clock("check", fraction)
-
-
 @dataclass(frozen=True, slots=True)
 class _Others:
-    """Strokes without derivatives: as they are, and with all parameters changed."""
+    """Strokes without derivatives: as they are, and with all parameters changed.
 
+    Parameters
+    ----------
+    time : float [s]
+        Processor time of one of them.
+    same, plus, minus : StrokeVariant
+    """
+
+    time: float
     same: StrokeVariant
     plus: StrokeVariant
     minus: StrokeVariant
 
 
+def _others_of(runner: SlopeRunner) -> tuple[_Others | None, tuple[str, ...]]:
+    """Strokes as they are, and with all parameters changed by a share, to either side.
+
+    None where one of them cannot be computed, and why.
+    """
+    found = []
+    begin = process_time()
+    signs = _signs(len(runner.space.varied))
+    for way in (0.0, 1.0, -1.0):
+        shifts = {
+            item.name: way * sign * _SHARE * item.size
+            for item, sign in zip(runner.space.varied, signs, strict=True)
+        }
+        try:
+            found.append(runner.stroke(shifts))
+        except (InputError, ConvergenceError) as error:
+            return None, (f"The derivatives were not checked by other strokes: {error}",)
+    return _Others((process_time() - begin) / len(found), *found), ()
+
+
 def _signs(count: int) -> tuple[float, ...]:
     """Alternating: what two parameters of equal kind do must not only add up."""
     return tuple(1.0 if k % 2 == 0 else -1.0 for k in range(count))
-
-
-def _value(item: ChosenMeasure, variant: StrokeVariant) -> float | None:
-    value = item.value(PointRun(variant, _no_noise, {}))  # type: ignore[arg-type]
-    return value if value is not None and isfinite(value) else None
-
-
-def _no_noise() -> Any:
-    raise KlackError("no noise of a run with derivatives")
-
-
-def _slopes(
-    runner: _Runner, runs: Sequence[TangentRun], item: ChosenMeasure
-) -> tuple[float | None, tuple[float | None, ...]]:
-    """Value of a measure, and its derivatives [per unit of each parameter]."""
-    value = _value(item, runner.variant(runs[0].moved(0, 0.0)))
-    found: list[float | None] = []
-    for k, parameter in enumerate(runner.space.varied):
-        run, place = runs[k // DIRECTIONS], k % DIRECTIONS
-        ahead = _AHEAD * parameter.size
-        ends = [_value(item, runner.variant(run.moved(place, way * ahead))) for way in (1.0, -1.0)]
-        if value is None or ends[0] is None or ends[1] is None:
-            found.append(None)
-        else:
-            found.append((ends[0] - ends[1]) / (2.0 * ahead))
-    return value, tuple(found)
 
 
 def _checked(
@@ -350,9 +221,9 @@ def _checked(
     predicted = sum(parts) if len(parts) == len(found) else None
     secant, again = None, value
     if others is not None:
-        plus, minus = _value(item, others.plus), _value(item, others.minus)
+        plus, minus = measured(item, others.plus), measured(item, others.minus)
         secant = None if plus is None or minus is None else 0.5 * (plus - minus)
-        again = _value(item, others.same)
+        again = measured(item, others.same)
     resolution = _RESOLVED * abs(value or 0.0)
     if item.measure.unit == "s":
         resolution = step

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.sensitivities.parameters import SlopeSpace
 from klack.analyses.study.columns import (
     measure_columns,
     point_fields,
@@ -17,6 +18,7 @@ from klack.analyses.study.columns import (
 )
 from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
+from klack.analyses.study.gradients import Gradients, require_gradients
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.made_valves import MadeValves, made_valves_of
 from klack.analyses.study.pace import Pace
@@ -34,6 +36,7 @@ from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
 from klack.studies.fronts import compromise, find_front, spread_over
+from klack.studies.polish import NoValue, polish
 from klack.studies.refinement import Refinement, RefinementSettings
 from klack.studies.search import Search, SearchSettings
 from klack.studies.spread import Range
@@ -88,6 +91,11 @@ def run_optimisation(
     begin = perf_counter()
     space = space_of(case, source)
     require_varied(source, space.varied)
+    study = source.study
+    names = dict.fromkeys((*study.measures, *study.objectives, *study.constraints))
+    asked = asked_of(case, tree, source, [{}], names)
+    slopes = require_gradients(source, asked, space)
+    made = made_valves_of(case, source, space)
     clock = StageClock(progress)
     form, mark = point_log_form(case, tree)
     with (
@@ -95,9 +103,7 @@ def run_optimisation(
         where.open(case, tree) as workers,
         collected_warnings() as notes,
     ):
-        made = made_valves_of(case, source, space)
-        work = _Work(case, tree, source, space, made, Evaluation(log, workers), clock)
-        asked = work.asked_today
+        work = _Work(asked, source, space, made, Evaluation(log, workers), clock)
         today = work.rows([{}], work.names)[0]
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
@@ -111,6 +117,7 @@ def run_optimisation(
             if refinement is not None:
                 for cube in refinement:
                     refinement.tell(*work.told(cube, front))
+        ended = _polish(source, work, front, slopes, clock) if slopes is not None else []
         columns = measure_columns(asked, work.found, today)
         if made is not None:
             robust_today = made.row_of_today(sides, work.rows)
@@ -127,7 +134,7 @@ def run_optimisation(
         measures=columns,
         optimum=optimum,
         sounds=sounds,
-        warnings=(*_doubts(optimum), *notes, *row_warnings(work.found, today, columns)),
+        warnings=(*_doubts(optimum), *ended, *notes, *row_warnings(work.found, today, columns)),
     )
 
 
@@ -136,29 +143,26 @@ class _Work:
 
     def __init__(
         self,
-        case: ValveCase,
-        tree: CaseTree,
+        asked: AskedPoints,
         source: StudySource,
         space: Space,
         made: MadeValves | None,
         evaluation: Evaluation,
         progress: Progress,
     ) -> None:
-        self._case, self._tree, self._source = case, tree, source
+        self.asked_today, self._source = asked, source
         self.space, self._made, self._progress = space, made, progress
         self.evaluation = evaluation
         self.values: list[Values] = []
         self.found: list[PointRow] = []
         self.made_rows: list[PointRow] = []
         self.cubes: list[NDArray[np.float64]] = []
-        study = source.study
-        wanted = (*study.measures, *study.objectives, *study.constraints)
-        self.names = tuple(dict.fromkeys(wanted))
-        designs = study.search.population * study.search.generations + study.search.refinements
+        self.names = tuple(item.name for item in asked.chosen)
+        search = source.study.search
+        designs = search.population * search.generations + search.refinements + search.polish
         self._most = designs * (1 if made is None else 1 + len(made.scatter.cube))
         self._pace = Pace(progress, self._most)
-        self._shown = tuple(study.objectives)
-        self.asked_today = self.asked([{}], self.names)
+        self._shown = tuple(source.study.objectives)
         self._units = {item.name: item.measure.unit for item in self.asked_today.chosen}
         self.done = 0
 
@@ -172,7 +176,8 @@ class _Work:
         InputError
             For a measure that does not exist.
         """
-        return asked_of(self._case, self._tree, self._source, written, names)
+        today = self.asked_today
+        return asked_of(today.case, today.tree, self._source, written, names)
 
     def rows(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
@@ -247,11 +252,22 @@ class _Front:
         self.points, self.feasible = places[found.points], found.feasible
         return objectives, violations
 
+    def row(self, point: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Objectives and violations of a point."""
+        return self.objectives[point], self.violations[point]
+
     @property
     def ordered(self) -> NDArray[np.int64]:
         """By the first objective."""
         first = self.objectives[self.points, 0]
         return self.points[np.argsort(first, kind="stable")]
+
+    @property
+    def scales(self) -> NDArray[np.float64]:
+        """Ranges of the objectives on the front; their size where a range is zero."""
+        found = self.objectives[self.points]
+        spans, sizes = np.ptp(found, axis=0), np.abs(found).max(axis=0)
+        return np.where(spans > 0.0, spans, np.maximum(sizes, 1e-300))
 
     @property
     def best(self) -> int:
@@ -287,8 +303,6 @@ def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | No
     polls = 2 * len(work.cubes[0]) * _POLLS
     count = min(max(given.refinements // polls, 1), _REFINED)
     chosen = spread_over(order, count)
-    spans = np.ptp(front.objectives[order], axis=0)
-    sizes = np.abs(front.objectives[order]).max(axis=0)
     settings = RefinementSettings(
         evaluations=given.refinements, seed=given.seed, edge=_edge(work.space)
     )
@@ -297,8 +311,36 @@ def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | No
         np.array(work.cubes)[chosen],
         front.objectives[chosen],
         front.violations[chosen],
-        scales=np.where(spans > 0.0, spans, np.maximum(sizes, 1e-300)),
+        scales=front.scales,
     )
+
+
+def _polish(
+    source: StudySource, work: _Work, front: _Front, slopes: SlopeSpace, progress: Progress
+) -> list[str]:
+    """Polish the recommended point, if there is one; return what ended it early."""
+    if front.best < 0:
+        return []
+    start, known = work.cubes[front.best], front.row(front.best)
+    gradients = Gradients.of(work.asked_today, slopes, work.space, front.goals, progress)
+
+    def values(point: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if np.array_equal(point, start):
+            return known
+        objectives, violations = work.told(point[None, :], front)
+        if not (np.isfinite(objectives).all() and np.isfinite(violations).all()):
+            raise NoValue
+        return objectives[0], violations[0]
+
+    polish(
+        start,
+        values,
+        gradients.at,
+        scales=front.scales,
+        steps=source.study.search.polish,
+        edge=_edge(work.space),
+    )
+    return gradients.notes
 
 
 def _optimum(
@@ -312,6 +354,8 @@ def _optimum(
     words = f"{algorithm}, {given.generations} generations of {given.population}"
     if given.refinements:
         words += f", {given.refinements} refinements"
+    if given.polish:
+        words += f", polished in {given.polish} steps at most"
     if made is not None:
         words += f", {len(made.scatter.cube)} valves made after each design"
     units = {item.name: item.unit for item in columns}
