@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
-from klack.assembling.problem import ContactProblem
+from klack.assembling.problem import ContactProblem, PlacedBodies
 from klack.case.bodies import ModeChoice
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
@@ -38,22 +38,20 @@ def selection_of(choice: ModeChoice) -> ModeSelection:
     return ByParticipation(choice.participation or 1, choice.pool or 1)
 
 
-def mode_pools(
-    problem: ContactProblem, *, at_least: int, progress: Progress
-) -> Mapping[str, Modes]:
+def mode_pools(placed: PlacedBodies, *, at_least: int, progress: Progress) -> Mapping[str, Modes]:
     """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``."""
-    bodies = [problem.pair.upper, problem.pair.lower]
-    flexibilities = [problem.flexibility_upper, problem.flexibility_lower]
-    if problem.opposite is not None:
-        bodies.append(problem.opposite.body)
-        flexibilities.append(problem.opposite.flexibility)
+    bodies = [placed.pair.upper, placed.pair.lower]
+    flexibilities = [placed.flexibility_upper, placed.flexibility_lower]
+    if placed.opposite is not None:
+        bodies.append(placed.opposite.body)
+        flexibilities.append(placed.opposite.flexibility)
     progress("modes", 0.0)
     # the triangular solves run outside of the interpreter: two bodies keep two cores busy
     with ThreadPoolExecutor(max_workers=len(bodies)) as workers:
         jobs = [
             workers.submit(
                 mode_pool,
-                selection_of(problem.case.reduction.choice(body.name)),
+                selection_of(placed.case.reduction.choice(body.name)),
                 body,
                 flexibility,
                 at_least=at_least,

@@ -1,4 +1,4 @@
-"""Contact problem of a case, computed once for all levels."""
+"""Bodies of a case in their places, and the contact problem of one impact, for all levels."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,7 @@ from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
+from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
@@ -16,7 +17,7 @@ from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress, remark
 
-__all__ = ["ContactProblem", "build_problem"]
+__all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
 _USUAL_MODES = 50  # of a case that asks for a frequency
 
@@ -24,31 +25,59 @@ _REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ContactProblem:
-    """Bodies, contact points and static contact of one case.
+class PlacedBodies(Closing):
+    """Bodies of a case in their places, with their static solutions.
+
+    The same for every impact of these bodies, whatever its speed and force; an upper stop is not:
+    its contact points are those that the energy of an impact can reach.
 
     Parameters
     ----------
     case : Case
         With its gap, also where that is only drawn.
     pair : BodyPair
-    space : ContactSpace
     flexibility_upper, flexibility_lower : Flexibility
         Static solutions of both bodies; close them with :meth:`close` before a full-order run
         to give their memory back.
-    static : StaticContact
-        Ladder of static contact states beyond the highest force of the impact.
     opposite : OppositeStop or None
         Upper stop.
     """
 
     case: Case
     pair: BodyPair
-    space: ContactSpace
     flexibility_upper: Flexibility
     flexibility_lower: Flexibility
-    static: StaticContact
     opposite: OppositeStop | None = None
+
+    def keep_no_more(self) -> None:
+        """Write no more static solutions to the cache: each of many impacts asks for others."""
+        for flexibility in self._flexibilities:
+            flexibility.cache = None
+
+    def close(self) -> None:
+        """Free the factorisations."""
+        for flexibility in self._flexibilities:
+            flexibility.close()
+
+    @property
+    def _flexibilities(self) -> tuple[Flexibility, ...]:
+        above = () if self.opposite is None else (self.opposite.flexibility,)
+        return (self.flexibility_upper, self.flexibility_lower, *above)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactProblem(PlacedBodies):
+    """Bodies, contact points and static contact of one impact.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    static : StaticContact
+        Ladder of static contact states beyond the highest force of the impact.
+    """
+
+    space: ContactSpace
+    static: StaticContact
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
         """Contact points of the same surfaces with twice the reach.
@@ -72,21 +101,14 @@ class ContactProblem:
             slave=space.slave,
         )
 
-    def close(self) -> None:
-        """Free the factorisations."""
-        self.flexibility_upper.close()
-        self.flexibility_lower.close()
-        if self.opposite is not None:
-            self.opposite.close()
-
 
 def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:
-    """Mesh, place, factorise, and solve the static contact.
+    """Mesh, place, factorise, and solve the static contact; see :func:`contact_problem`."""
+    return contact_problem(case, place_bodies(case, progress, threads=threads), progress)
 
-    The highest force is bounded without knowing the contact: an impact of relative speed v and
-    effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
-    the static curve gives the force and the approach at which that much is stored.  The candidate
-    points reach further than that.
+
+def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) -> PlacedBodies:
+    """Mesh, place and factorise.
 
     A case without ``contact.gap`` gets the one that is drawn, so that every level starts there.
     """
@@ -102,23 +124,49 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
         pair.lower, threads=threads, cache=cache, budget=_budget(case, pair.lower, progress)
     )
     progress("factorise", 1.0)
+    return PlacedBodies(
+        case=case,
+        pair=pair,
+        flexibility_upper=upper,
+        flexibility_lower=lower,
+        opposite=build_opposite(case, pair, upper, progress, threads=threads),
+    )
+
+
+def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> ContactProblem:
+    """Solve the static contact of an impact of bodies that are there.
+
+    The highest force is bounded without knowing the contact: an impact of relative speed v and
+    effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
+    the static curve gives the force and the approach at which that much is stored.  The candidate
+    points reach further than that.
+
+    Parameters
+    ----------
+    case : Case
+        Of these bodies, in these places; its speed, forces and law may be others than theirs, not
+        where there is an upper stop.
+    bodies : PlacedBodies
+    progress : callable
+    """
+    case = _with_drawn_gap(case, bodies.pair)
     static = static_ladder(
-        pair,
-        upper,
-        lower,
-        energy=impact_energy(case, pair),
+        bodies.pair,
+        bodies.flexibility_upper,
+        bodies.flexibility_lower,
+        energy=impact_energy(case, bodies.pair),
         closing=closing_force(case),
         reach=case.contact.reach,
         progress=progress,
     )
     return ContactProblem(
         case=case,
-        pair=pair,
+        pair=bodies.pair,
+        flexibility_upper=bodies.flexibility_upper,
+        flexibility_lower=bodies.flexibility_lower,
+        opposite=bodies.opposite,
         space=static.space,
-        flexibility_upper=upper,
-        flexibility_lower=lower,
         static=static,
-        opposite=build_opposite(case, pair, upper, progress, threads=threads),
     )
 
 

@@ -40,7 +40,12 @@ from klack.assembling.modes import (
     participating,
     selection_of,
 )
-from klack.assembling.problem import ContactProblem, build_problem
+from klack.assembling.problem import (
+    ContactProblem,
+    PlacedBodies,
+    contact_problem,
+    place_bodies,
+)
 from klack.assembling.reduced_pair import (
     ReducedPair,
     classical_stiffness,
@@ -51,8 +56,9 @@ from klack.assembling.reduced_pair import (
 )
 from klack.assembling.structures import impact_structures
 from klack.cache.setting import result_cache
-from klack.case.impact_sections import SubmodelLocalLaw
+from klack.case.impact_sections import Level, SubmodelLocalLaw
 from klack.case.schema import Case
+from klack.closing import Closing
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
@@ -72,7 +78,7 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.result import FullOrderResult
 from klack.units import format_si
 
-__all__ = ["run_impact"]
+__all__ = ["ImpactBodies", "impact_bodies", "impact_of_bodies", "run_impact"]
 
 # What a reduced level needs before it can run, beyond meshes and matrices.
 _SET_UP = ("factorise", "static contact", "modes", "reduced")
@@ -123,20 +129,110 @@ def run_impact(
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
     clock = StageClock(progress, result_cache())
+    bodies = impact_bodies(case, levels=wanted, certify=certify, progress=clock, threads=threads)
+    return _study(case, bodies, wanted, certify, begin, clock, threads, is_last=True)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactBodies(Closing):
+    """Bodies of an impact with their modes: the same for every speed, force, step and law.
+
+    Parameters
+    ----------
+    placed : PlacedBodies
+    pools : mapping of body name to Modes
+        As many as the levels of the impact need.
+    notes : tuple of str
+        Doubts about them.
+    """
+
+    placed: PlacedBodies
+    pools: Mapping[str, Modes]
+    notes: tuple[str, ...]
+
+    def close(self) -> None:
+        """Free the factorisations."""
+        self.placed.close()
+
+
+def impact_bodies(
+    case: Case,
+    *,
+    levels: Sequence[str],
+    certify: bool = True,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> ImpactBodies:
+    """Mesh, place, factorise and find the modes of an impact; see :func:`run_impact`."""
+    with collected_warnings() as notes:
+        placed = place_bodies(case, progress, threads=threads)
+        pools = mode_pools(
+            placed, at_least=_modes_needed(placed.case, levels, certify), progress=progress
+        )
+    return ImpactBodies(placed=placed, pools=pools, notes=tuple(notes))
+
+
+def impact_of_bodies(
+    case: Case,
+    bodies: ImpactBodies,
+    *,
+    levels: Sequence[str],
+    certify: bool = True,
+    progress: Progress = silent,
+) -> ImpactStudy:
+    """Compute one impact of bodies that are there, without what is only compared with.
+
+    Its levels are those of :func:`run_impact`, bit for bit; the classical stiffness of the contact
+    and the transfer functions are left out.
+
+    Parameters
+    ----------
+    case : Case
+        Of these bodies; with an upper stop also of this speed and these forces.
+    bodies : ImpactBodies
+        Made for the same levels; they stay open.
+    levels : sequence of str
+        Without ``full``, which frees the factorisations first.
+    certify : bool
+    progress : callable
+    """
+    begin = perf_counter()
+    wanted = case.require_levels(levels)
+    clock = StageClock(progress, result_cache())
+    return _study(case, bodies, wanted, certify, begin, clock, None, is_last=False)
+
+
+def _modes_needed(case: Case, levels: Sequence[str], certify: bool) -> int:
+    """Elastic modes of each body that these levels and what they are compared with take."""
+    needed = [1]
+    if case.run.transfer is not None:
+        needed.append(TRANSFER_MODES)
+    if "reduced-participation" in levels:
+        needed.append(PARTICIPATION_POOL)
+    if certify and any(level.startswith("reduced") for level in levels):
+        needed.append(certificate_modes(case))
+    return max(needed)
+
+
+def _study(
+    case: Case,
+    bodies: ImpactBodies,
+    wanted: Sequence[Level],
+    certify: bool,
+    begin: float,
+    clock: StageClock,
+    threads: int | None,
+    *,
+    is_last: bool,
+) -> ImpactStudy:
+    """One impact of these bodies; the last one frees them, and compares its model with others."""
+    pools = bodies.pools
     attempts = Attempts()
     with collected_warnings() as notes:
-        problem = build_problem(case, clock, threads=threads)
-        _require_time_to_touch(case, problem.case.contact.gap)
+        problem = contact_problem(case, bodies.placed, clock)
         case = problem.case
-        needed = [1]
-        if case.run.transfer is not None:
-            needed.append(TRANSFER_MODES)
-        if "reduced-participation" in wanted:
-            needed.append(PARTICIPATION_POOL)
+        _require_time_to_touch(case, case.contact.gap)
         reduced = [level for level in wanted if level.startswith("reduced")]
-        if certify and reduced:
-            needed.append(certificate_modes(case))
-        pools = mode_pools(problem, at_least=max(needed), progress=clock)
         clock("reduced", 0.0)
         with warnings_of("modes of the case"):
             preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
@@ -145,7 +241,7 @@ def run_impact(
         if isinstance(case.contact.local_law, SubmodelLocalLaw):
             classical = classical_stiffness(problem, peak)
             own = own_pair(problem, pools, stiffness=classical.stiffness)
-        else:
+        elif is_last:
             what = "the stiffness of the contact zone alone"
             classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
         clock("radiating surfaces", 0.0)
@@ -174,14 +270,15 @@ def run_impact(
             )
         certificate = certificate or _Certificate()
         transfer: tuple[TransferComparison, ...] = ()
-        if case.run.transfer is not None:
+        if is_last and case.run.transfer is not None:
             found = for_comparison(
                 "the comparison of transfer functions",
                 lambda: compare_transfer(problem, pools, own.ports, progress=clock),
             )
             transfer = found or ()
         check = check_contact(case, problem.pair, problem.static, peak, _surfaces(case))
-        problem.close()
+        if is_last:
+            problem.close()
         sections: tuple[SectionPicture, ...] = ()
         if "full" in wanted:
             with attempts.at("full"), warnings_of("level 'full'"):
@@ -212,7 +309,11 @@ def run_impact(
         deviations=compared,
         transfer=transfer,
         sections=sections,
-        warnings=(*missing, *notes, *trust_notes(results, reference, compared)),
+        warnings=(
+            *missing,
+            *dict.fromkeys([*bodies.notes, *notes]),
+            *trust_notes(results, reference, compared),
+        ),
         failures=attempts.texts,
         estimates=certificate.estimates,
         estimate_basis=certificate.basis,
