@@ -439,12 +439,12 @@ def run_study(
     dask: "str | Client | None" = None,
     progress: Progress = silent,
 ) -> Result:
-    """Compute measures of a stroke at the points of a study, as ``klack study`` does.
+    """Compute measures of a stroke or an impact at the points of a study, as ``klack study`` does.
 
     Parameters
     ----------
     case : str, Path or CaseOnHand
-        Of a whole valve.
+        Of a whole valve, or of an impact.
     study : path, optional
         File with a section ``study``; that of the case by default.
     made : int, optional
@@ -455,8 +455,9 @@ def run_study(
     threads : int, optional
         All available cores by default.
     workers : int, optional
-        Processes in place of threads: faster where measures of the noise, or several geometries,
-        are asked for.  In a script, the call stands under ``if __name__ == "__main__":``.
+        Processes in place of threads: faster for impacts, and where measures of the noise, or
+        several geometries, are asked for.  In a script, the call stands under
+        ``if __name__ == "__main__":``.
     dask : str, Client or Cluster of distributed, optional
         Cluster in place of threads, also the address of its scheduler, or a file with that.
     progress : callable
@@ -564,12 +565,11 @@ def _studied(
     from klack.case.study_source import study_of
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
-    checked = _of_kind(given, ValveCase, "a whole valve")
-    source = study_of(checked, given.tree, None if study is None else Path(study))
+    source = study_of(given.checked, given.tree, None if study is None else Path(study))
     if made is not None:
         source = source.made(made)
     place = None if folder is None else Path(folder)
-    record = run(checked, given.tree, source, folder=place, where=where, progress=progress)
+    record = run(given.checked, given.tree, source, folder=place, where=where, progress=progress)
     return Result(record, STUDY)
 
 

@@ -24,9 +24,10 @@ from rod_valve import ROD
 import klack
 from klack.analyses.study import dask_workers, sent_case
 from klack.analyses.study.agenda import Agenda
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_order import PointOrder, answered
 from klack.analyses.study.sent_case import SentCase
-from klack.analyses.study.strokes import AskedPoints
 from klack.analyses.study.where import Where, _Fitting
 from klack.analyses.workers import Failure
 from klack.case.valve import ValveCase
@@ -141,7 +142,7 @@ def valve(case: klack.CaseOnHand) -> ValveCase:
 
 
 def asked(case: klack.CaseOnHand, points: list[Point], *measures: str) -> AskedPoints:
-    return AskedPoints.of(valve(case), case.tree, points, measures or MEASURES, "dry")
+    return ask(valve(case), case.tree, points, measures or MEASURES, "dry")
 
 
 class TestSameRows:

@@ -11,7 +11,7 @@ import pytest
 
 from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
-from klack.case.impact_sections import LEVELS
+from klack.case.levels import LEVELS
 
 PAGE = Path(__file__).parents[2] / "docs" / "theory" / "levels.md"
 

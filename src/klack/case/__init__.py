@@ -1,7 +1,7 @@
 """The case file: what a user writes, checked and in SI."""
 
 from klack.case.bodies import SurfaceName
-from klack.case.impact_sections import LEVELS
+from klack.case.levels import LEVELS
 from klack.case.reader import case_schema, load_case, read_case
 from klack.case.schema import Case
 from klack.case.shipped import find_case, shipped_cases

@@ -310,6 +310,11 @@ class CaseFile(Section):
         return {}
 
     @property
+    def component_files(self) -> Mapping[str, Path]:
+        """Files of components with a model inside: here none."""
+        return {}
+
+    @property
     def name(self) -> str:
         """Short name: of the file, or of its folder if the file is just called ``case.yaml``."""
         if self._path is None:

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from klack.case.any_case import AnyCase, case_kind
 from klack.case.reader import Lines, parse, text_of, validated
-from klack.case.valve import ValveCase
+from klack.case.valve import ValveCase, require_valve
 from klack.input.problem import Key
 from klack.network.component import Component
 from klack.network.own_component import component_word
@@ -16,7 +17,7 @@ __all__ = ["CaseTree", "exchanged", "read_case_tree", "tree_of"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CaseTree:
-    """Text of the case of a whole valve, and the plain data in it.
+    """Text of a case, and the plain data in it.
 
     Parameters
     ----------
@@ -36,17 +37,29 @@ class CaseTree:
     components: Mapping[str, type[Component]] = field(default_factory=dict)
 
     def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
-        """Check the case with other values at some keys that it has.
+        """Check the case of a whole valve with other values at some keys that it has.
+
+        Raises
+        ------
+        InputError
+            With file, line and key, as when the case is read; for a case of an impact.
+        """
+        data = self.data
+        for key, value in (values or {}).items():
+            data = exchanged(data, key, value)
+        require_valve(data, self.path, self.lines)
+        return validated(ValveCase, self.text, self.path, data, self.lines, self.components)
+
+    def any_case(self) -> AnyCase:
+        """Check the case, an impact or a whole valve.
 
         Raises
         ------
         InputError
             With file, line and key, as when the case is read.
         """
-        data = self.data
-        for key, value in (values or {}).items():
-            data = exchanged(data, key, value)
-        return validated(ValveCase, self.text, self.path, data, self.lines, self.components)
+        kind = case_kind(self.data)
+        return validated(kind, self.text, self.path, self.data, self.lines, self.components)
 
 
 def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:

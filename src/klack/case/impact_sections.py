@@ -5,17 +5,19 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
 from klack.case.guide import CaseGuide
+from klack.case.levels import Level
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
+from klack.case.study import CaseStudy
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
@@ -31,12 +33,10 @@ from klack.units import (
 )
 
 __all__ = [
-    "LEVELS",
     "CaseContact",
     "ConsistentLocalLaw",
     "HertzLocalLaw",
     "ImpactSections",
-    "Level",
     "LinearLocalLaw",
     "LocalLaw",
     "Lumped",
@@ -47,16 +47,6 @@ __all__ = [
     "TransferSweep",
 ]
 
-Level = Literal[
-    "lumped",
-    "reduced",
-    "reduced-attachment",
-    "reduced-none",
-    "reduced-participation",
-    "interface",
-    "full",
-]
-LEVELS: tuple[Level, ...] = get_args(Level)
 _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
@@ -254,6 +244,9 @@ class ImpactSections(CaseFile):
         default=None, description="Measurement of drops of this valve."
     )
     noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
+    study: CaseStudy | None = Field(
+        default=None, description="What klack study varies, and what it computes."
+    )
 
     @property
     def moving_body(self) -> CaseBody:

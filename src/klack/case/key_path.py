@@ -41,7 +41,8 @@ class Quantity:
         if isinstance(self.key[-1], int):  # an entry: the limits of the list are those of the case
             return parse_quantity(text, self.kind, str(self))
         info = self._field
-        adapter = TypeAdapter[float](Annotated[info.annotation, *info.metadata])  # type: ignore[arg-type]
+        kind: Any = info.annotation
+        adapter = TypeAdapter[Any](Annotated[kind, *info.metadata] if info.metadata else kind)
         try:
             return float(adapter.validate_python(text, context={}))
         except ValidationError as error:

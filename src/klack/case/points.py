@@ -1,15 +1,17 @@
-"""Points of a parameter space: a case of a whole valve with other values at some of its keys."""
+"""Points of a parameter space: a case with other values at some of its keys."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.inserting import merged
 from klack.case.key_path import kind_at, node_at, split_path
 from klack.case.reader import validated
+from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, one_of
@@ -28,6 +30,7 @@ __all__ = [
 ]
 
 PointValue = str | int | float
+CaseKind = TypeVar("CaseKind", Case, ValveCase)
 GivenPoints = Sequence[Mapping[str, PointValue]] | Mapping[str, Sequence[PointValue]]
 """A mapping of key to value for each point, or a list of values for each key."""
 
@@ -89,14 +92,14 @@ class Points:
         return {key.place: row[key.name] for key in self.keys if key.name in row}
 
 
-def points_of(case: ValveCase, tree: CaseTree, given: GivenPoints) -> Points:
+def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
     """Check the keys of points and the units of their values.
 
     Whether the case allows a value is a matter of the point: see :func:`checked_parts`.
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
         As it is, without any of the points.
     tree : CaseTree
         The same as it was written.
@@ -155,11 +158,15 @@ def checked_parts(tree: CaseTree, case: ValveCase, places: Iterable[Key]) -> Cas
     )
 
 
-def case_at(tree: CaseTree, parts: CaseTree, changes: Mapping[Key, PointValue]) -> ValveCase:
+def case_at(
+    kind: type[CaseKind], tree: CaseTree, parts: CaseTree, changes: Mapping[Key, PointValue]
+) -> CaseKind:
     """Check the case of a point.
 
     Parameters
     ----------
+    kind : type
+        ValveCase, or Case of an impact.
     tree : CaseTree
         As written.
     parts : CaseTree
@@ -173,10 +180,10 @@ def case_at(tree: CaseTree, parts: CaseTree, changes: Mapping[Key, PointValue]) 
     """
     data = with_changes(parts.data, changes)
     try:
-        return validated(ValveCase, tree.text, tree.path, data, tree.lines, tree.components)
+        return validated(kind, tree.text, tree.path, data, tree.lines, tree.components)
     except InputError:  # in the words of the file
         whole = with_changes(tree.data, changes)
-        return validated(ValveCase, tree.text, tree.path, whole, tree.lines, tree.components)
+        return validated(kind, tree.text, tree.path, whole, tree.lines, tree.components)
 
 
 _SECTIONS = frozenset(ValveCase.model_fields)
@@ -250,7 +257,7 @@ def _column(name: str, values: Any) -> list[Any]:
     return list(values)
 
 
-def _key(case: ValveCase, tree: CaseTree, name: object) -> PointKey:
+def _key(case: AnyCase, tree: CaseTree, name: object) -> PointKey:
     try:
         place = split_path(name if isinstance(name, str) else str(name))
         node, field = node_at(case, place)

@@ -9,11 +9,8 @@ from typing import Self
 from pydantic import model_validator
 
 from klack.case.consistency import check_consistency
-from klack.case.impact_sections import (
-    LEVELS,
-    ImpactSections,
-    Level,
-)
+from klack.case.impact_sections import ImpactSections
+from klack.case.levels import LEVELS, Level
 from klack.case.noise_consistency import check_noise
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
+from klack.case.levels import Level
 from klack.case.variants import Variant
 from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, one_of
@@ -205,7 +206,8 @@ class CaseStudy(Section):
     )
     measures: tuple[Text, ...] = Field(
         min_length=1,
-        description="Such as closing_time, seat.peak_force, noise.sound_exposure_level_weighted.",
+        description="Such as closing_time, seat.peak_force, noise.sound_exposure_level_weighted; "
+        "of an impact peak_force, restitution.",
     )
     design: StudyDesign = Field(default=StudyDesign(), description="Where the points lie.")
     objectives: Mapping[Text, Literal["minimise", "maximise"]] = Field(
@@ -225,6 +227,7 @@ class CaseStudy(Section):
     variant: Variant | None = Field(
         default=None, description="Of the stroke; the first one of the case by default."
     )
+    level: Level | None = Field(default=None, description="Of an impact; reduced by default.")
 
 
 class StudyFile(Section):

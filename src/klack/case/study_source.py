@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.study import CaseStudy, StudyFile
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text
 
@@ -74,7 +74,7 @@ class StudySource:
             raise self.refuse(key, error) from None
 
 
-def study_of(case: ValveCase, tree: CaseTree, file: Path | None = None) -> StudySource:
+def study_of(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySource:
     """Study in a file of its own, or in the section ``study`` of the case.
 
     Raises

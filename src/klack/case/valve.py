@@ -1,12 +1,14 @@
 """A case of a whole valve: elastic bodies, end stops, and the network around them."""
 
 from collections.abc import Mapping
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 from pydantic import model_validator
 
 from klack.case.free_parameters import free_parameters
 from klack.case.noise_consistency import check_noise
+from klack.case.reader import Lines
 from klack.case.valve_consistency import check_valve
 from klack.case.valve_sections import ValveSections
 from klack.case.variants import VARIANTS, Variant
@@ -14,7 +16,7 @@ from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.own_component import source_digests
 
-__all__ = ["ValveCase"]
+__all__ = ["ValveCase", "require_valve"]
 
 
 class ValveCase(ValveSections):
@@ -34,6 +36,14 @@ class ValveCase(ValveSections):
         See :func:`klack.network.own_component.source_digests`.
         """
         return source_digests(self.network.components.values())
+
+    @property
+    def component_files(self) -> Mapping[str, Path]:
+        """Files of components with a model inside, such as FMUs, by the name of the component."""
+        files = {
+            name: getattr(part, "file", None) for name, part in self.network.components.items()
+        }
+        return {name: file for name, file in files.items() if isinstance(file, Path)}
 
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:
         """Check that this case can run the variants; return them without repetition."""
@@ -57,3 +67,19 @@ class ValveCase(ValveSections):
     def one_variant(self, name: str | None = None) -> Variant:
         """Check that this case can run a variant; the first one of the case by default."""
         return self.require_variants((name,) if name is not None else self.run.variants[:1])[0]
+
+
+def require_valve(data: Any, path: Path, lines: Lines) -> None:
+    """Refuse the parsed case of an impact where that of a whole valve is needed.
+
+    Raises
+    ------
+    InputError
+    """
+    if "contact" in data and "network" not in data:
+        raise InputError(
+            f"{path}:{lines.find(('contact',), on_key=True)}: contact",
+            got="a case of an impact",
+            expected="a case of a whole valve, with a section 'network'",
+            hint="run it with klack impact.",
+        )

@@ -10,10 +10,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from klack.case.any_case import AnyCase, case_kind
 from klack.case.reader import parse, schema_of, text_of, validated
-from klack.case.schema import Case
-from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.case.valve import ValveCase, require_valve
 from klack.network.component import Component
 from klack.network.own_component import component_word
 
@@ -43,7 +42,7 @@ def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCa
     return read_valve_case(text_of(path), path, components)
 
 
-def load_any_case(path: str | Path, components: OwnComponents = ()) -> Case | ValveCase:
+def load_any_case(path: str | Path, components: OwnComponents = ()) -> AnyCase:
     """Read and check a case file of either kind: with a section ``network`` it is a valve."""
     path = Path(path)
     return read_any_case(text_of(path), path, components)
@@ -52,24 +51,16 @@ def load_any_case(path: str | Path, components: OwnComponents = ()) -> Case | Va
 def read_valve_case(text: str, path: Path, components: OwnComponents = ()) -> ValveCase:
     """Check the text of a case of a whole valve that lies (or will lie) at ``path``."""
     data, lines = parse(text, path)
-    if "contact" in data and "network" not in data:
-        raise InputError(
-            f"{path}:{lines.find(('contact',), on_key=True)}: contact",
-            got="a case of an impact",
-            expected="a case of a whole valve, with a section 'network'",
-            hint="run it with klack impact.",
-        )
+    require_valve(data, path, lines)
     own = {component_word(kind): kind for kind in components}
     return validated(ValveCase, text, path, data, lines, own)
 
 
-def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> Case | ValveCase:
+def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> AnyCase:
     """Check the text of a case of either kind."""
     data, lines = parse(text, path)
-    if "network" in data:
-        own = {component_word(kind): kind for kind in components}
-        return validated(ValveCase, text, path, data, lines, own)
-    return validated(Case, text, path, data, lines)
+    own = {component_word(kind): kind for kind in components}
+    return validated(case_kind(data), text, path, data, lines, own)
 
 
 def valve_case_schema() -> dict[str, Any]:

@@ -56,7 +56,8 @@ from klack.assembling.reduced_pair import (
 )
 from klack.assembling.structures import impact_structures
 from klack.cache.setting import result_cache
-from klack.case.impact_sections import Level, SubmodelLocalLaw
+from klack.case.impact_sections import SubmodelLocalLaw
+from klack.case.levels import Level
 from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.history import ImpactHistory
@@ -105,7 +106,7 @@ def run_impact(
     ----------
     case : Case
     levels : sequence of str
-        Among :data:`klack.case.impact_sections.LEVELS`.
+        Among :data:`klack.case.levels.LEVELS`.
     certify : bool
         Estimate the error of reduced levels by one interface-level run with twice as many modes;
         bodies without surfaces have no such level.

@@ -25,7 +25,7 @@ from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.structures import IMPACT_STOP
 from klack.case.bodies import CaseMaterial
-from klack.case.impact_sections import LEVELS
+from klack.case.levels import LEVELS
 from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
@@ -183,15 +183,18 @@ def run_sources(
 # --------------------------------------------------------------------------- impacts
 
 
-def impact_sources(study: ImpactStudy, levels: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
+def impact_sources(
+    study: ImpactStudy, levels: Sequence[str] = (), case: Case | None = None
+) -> tuple[NoiseSource, ...]:
     """Forces of an impact at some levels; of the best level without.
 
-    The structure is that of the reduced level, whichever level the force comes from.
+    The structure is that of the reduced level, whichever level the force comes from.  The section
+    ``noise`` and the materials are those of the text of the study, or of ``case``.
     """
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
     failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
-    noise, given, materials = _noise_section(study.case_text)
+    noise, given, materials = _noise_of(study.case_text, case)
     found = []
     for name in wanted:
         _require("level", name, study.levels, study.why_missing(name))
@@ -237,10 +240,7 @@ def stroke_sources(
     """
     _require_structures(study)
     wanted = tuple(variants) or (study.reference.name,)
-    if case is None:
-        noise, given, materials = _noise_section(study.case_text)
-    else:
-        noise, given, materials = case.noise or CaseNoise(), case.noise is not None, case.materials
+    noise, given, materials = _noise_of(study.case_text, case)
     found = []
     for name in wanted:
         _require("variant", name, study.variants)
@@ -416,8 +416,15 @@ def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
     return min(tops, default=float("nan"))
 
 
-def _noise_section(text: str) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
-    """Section ``noise`` and materials of the text of a case that was checked when it was run."""
+def _noise_of(
+    text: str, case: Case | ValveCase | None
+) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
+    """Section ``noise``, whether it is given, and materials: of a case, or of its text.
+
+    The text was checked when it was run.
+    """
+    if case is not None:
+        return case.noise or CaseNoise(), case.noise is not None, case.materials
     data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines
     given = data.get("noise") is not None
     noise = CaseNoise.model_validate(data["noise"] if given else {})

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from klack.analyses.study.parameters import unit_of, written
 from klack.analyses.study.points import Linked, Space, Values, space_of
-from klack.analyses.study.strokes import makes_bodies
+from klack.analyses.study.strokes import STROKES
 from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
@@ -189,7 +189,7 @@ def _reason(case: ValveCase, item: VariedKey, linked: Sequence[Linked]) -> tuple
             continue
         if place[0] == "run":
             return "a setting of the run", "klack advise tells what its steps change."
-        if place[0] != "network" or makes_bodies(case, place):
+        if place[0] != "network" or STROKES.makes_bodies(case, place):
             return (
                 "a key that meshes, modes, contact laws or the noise follow from",
                 "klack study with a few values of it computes the valve at each of them.",

@@ -16,7 +16,8 @@ from klack.analyses.sensitivities.record import (
 )
 from klack.analyses.sensitivities.slopes import TIMES, SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.study.chosen_measures import ChosenMeasure, chosen_measures
+from klack.analyses.study.chosen_measures import ChosenMeasure
+from klack.analyses.study.stroke_measures import stroke_measures
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
@@ -61,7 +62,7 @@ def run_sensitivities(
     parameters : sequence of str
         Keys of the case, or parameters of the study.
     measures : sequence of str
-        See :class:`~klack.analyses.study.chosen_measures.ChosenMeasure`; those of the study by
+        See :func:`~klack.analyses.study.stroke_measures.stroke_measures`; those of the study by
         default.
     variant : str, optional
         The first one of the case, or that of the study, by default.
@@ -126,7 +127,7 @@ def _measures(
         roles = find_roles(case)
         stops = [stop for stop in (roles.opening_stop, roles.seat) if stop]
         wanted = [*TIMES, *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS)]
-    chosen = chosen_measures(case, wanted)
+    chosen = stroke_measures(case, wanted)
     fitting = tuple(item for item in chosen if has_slope(item))
     if (names and len(fitting) < len(chosen)) or not fitting:
         bad = next(item for item in chosen if not has_slope(item))

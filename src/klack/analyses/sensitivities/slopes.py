@@ -8,10 +8,12 @@ from math import isfinite
 from time import process_time
 from typing import Any, Self
 
+from klack.analyses.noise.body import Transfers
 from klack.analyses.sensitivities.parameters import SlopeSpace, VariedKey
 from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.stroke.run import run_variant, variant_network, variant_of
-from klack.analyses.study.chosen_measures import ChosenMeasure, PointRun
+from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
+from klack.analyses.study.stroke_measures import StrokeOfPoint
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.points import case_at, checked_parts, points_of
@@ -77,7 +79,7 @@ class SlopeRunner:
         """Valve with shifted parameters."""
         written = self.space.written(shifts)
         changes = {self._places[name]: value for name, value in written.items()}
-        case = case_at(self._tree, self._parts, changes)
+        case = case_at(ValveCase, self._tree, self._parts, changes)
         network = filled_network(case, self._valve.reduced, self._valve.laws)
         return replace(self._valve, case=case, network=network)
 
@@ -162,7 +164,7 @@ class SlopeRunner:
 
 def measured(item: ChosenMeasure, variant: StrokeVariant) -> float | None:
     """Value of a measure in a stroke; None where it has none."""
-    value = item.value(PointRun(variant, _no_noise, {}))  # type: ignore[arg-type]
+    value = item.value(StrokeOfPoint(variant, PointNoise(_no_noise, Transfers())))
     return value if value is not None and isfinite(value) else None
 
 

@@ -1,8 +1,9 @@
-"""Measures of a point by their names: of its stroke, of single impacts, of its noise."""
+"""Measures of a point by their names, and its noise, whatever is computed there."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, Literal, TypeVar
 
 from klack.acoustics.signal_statistics import SoundStatistics, sound_statistics
@@ -12,44 +13,43 @@ from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import click_sound, noise_design
 from klack.analyses.noise.source import NoiseSource
-from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
-from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.stroke.summary import first_impact
-from klack.case.valve import ValveCase
-from klack.case.valve_roles import END_STOP
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 from klack.signals import TimeSeries
 
-__all__ = ["ChosenMeasure", "PointRun", "chosen_measures"]
+__all__ = [
+    "NOISE_NAMES",
+    "NOISE_WORDS",
+    "ChosenMeasure",
+    "PointNoise",
+    "choose_measures",
+    "noise_measure",
+]
 
 Found = TypeVar("Found")
 
-NOISE = "noise"
+_NOISE = "noise"
 """Before the names of measures of noise."""
 
-_OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
-_OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
 _OF_CLICKS = {measure.key: measure for measure in CLICK_MEASURES}
 _OF_DESIGNS = {measure.key: measure for measure in DESIGN_MEASURES}
+NOISE_NAMES = tuple(f"{_NOISE}.{key}" for key in _OF_DESIGNS)
+NOISE_WORDS = f"of the noise {_NOISE}.KEY with a key of: {one_of(_OF_DESIGNS)}"
 
 
-class PointRun:
-    """Stroke of a point, and its noise once a measure asks for it.
+class PointNoise:
+    """Noise of a point, computed once a measure asks for it.
 
     Parameters
     ----------
-    variant : StrokeVariant
     source : callable
         Makes what the noise comes from.
     transfers : Transfers
         Of the bodies, as far as they are known.
     """
 
-    def __init__(
-        self, variant: StrokeVariant, source: Callable[[], NoiseSource], transfers: Transfers
-    ) -> None:
-        self.variant, self._make, self._transfers = variant, source, transfers
+    def __init__(self, source: Callable[[], NoiseSource], transfers: Transfers) -> None:
+        self._make, self._transfers = source, transfers
         self.notes: list[str] = []
 
     @cached_property
@@ -74,109 +74,99 @@ class PointRun:
     def _noted(self, make: Callable[[], Found]) -> Found | None:
         try:
             return make()
-        except KlackError as error:  # the measures of the stroke stand
+        except KlackError as error:  # the other measures stand
             self.notes.append(f"noise: {error}")
             return None
 
 
 @dataclass(frozen=True, slots=True)
 class ChosenMeasure:
-    """A measure of a variant, of one impact on a stop, or of the noise.
+    """A measure of the run of a point.
 
     Parameters
     ----------
     name : str
-        ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat``;
-        ``"seat.2.peak_force"`` of the second one in the list of all impacts;
-        ``"noise.sound_exposure_level_weighted"``.
+        In the study.
     measure : Measure
     of : str
-        What it is of: the ``"variant"``, an ``"impact"``, a ``"click"`` or the noise ``"design"``.
-    stop : str
-        Of an impact.
-    number : int
-        Of the impact on that stop, from 1; 0 for the first one that is no mere tremble, see
-        :func:`~klack.analyses.stroke.summary.first_impact`.
+        What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
+        an impact, a ``"click"`` or the noise ``"design"``.
+    part : callable
+        Of a run, what the measure is read from; None where the run does not have it.
     """
 
     name: str
     measure: Measure[Any]
-    of: Literal["variant", "impact", "click", "design"] = "variant"
-    stop: str = ""
-    number: int = 0
+    of: Literal["variant", "impact", "level", "click", "design"]
+    part: Callable[[Any], Any]
 
-    def value(self, run: PointRun) -> float | None:
+    @property
+    def is_noise(self) -> bool:
+        """Whether it takes the noise."""
+        return self.of in ("click", "design")
+
+    def value(self, run: object) -> float | None:
         """Value in the unit of the measure; None where the run does not have it."""
-        of = self._part(run)
-        value = None if of is None else self.measure.read(of)
+        part = self.part(run)
+        if part is None or not self.measure.given(part):
+            return None
+        value = self.measure.read(part)
         return None if value is None else float(value)
 
-    def _part(self, run: PointRun) -> Any:
-        if self.of == "variant":
-            return run.variant
-        if self.of == "click":
-            return run.click
-        if self.of == "design":
-            return run.design
-        if self.number:
-            return next(iter(run.variant.impacts(self.stop)[self.number - 1 :]), None)
-        return first_impact(run.variant, self.stop)
+
+def noise_measure(name: str) -> ChosenMeasure | None:
+    """Measure of the noise of a run, which has a :class:`PointNoise`; None for another name."""
+    stem, _, key = name.partition(".")
+    if stem == _NOISE and key in _OF_CLICKS:
+        return ChosenMeasure(name, _OF_CLICKS[key], "click", attrgetter("noise.click"))
+    if stem == _NOISE and key in _OF_DESIGNS:
+        return ChosenMeasure(name, _OF_DESIGNS[key], "design", attrgetter("noise.design"))
+    return None
 
 
-def chosen_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
+def choose_measures(
+    names: Iterable[str],
+    find: Callable[[str], ChosenMeasure | None],
+    known: Sequence[str],
+    words: str,
+    example: str,
+) -> tuple[ChosenMeasure, ...]:
     """Find measures by their names, each once.
+
+    Parameters
+    ----------
+    names : iterable of str
+    find : callable
+        Of a name; None where there is no such measure.
+    known : sequence of str
+        All names, for the nearest one.
+    words : str
+        What names are known.
+    example : str
+        One of them.
 
     Raises
     ------
     InputError
-        For a name that a stroke of this case does not have, with the nearest one; for none at all.
+        For a name that does not exist, with the nearest one; for none at all.
     """
     wanted = list(dict.fromkeys([names] if isinstance(names, str) else names))
-    stops = [name for name, part in case.network.components.items() if part.type == END_STOP]
     if not wanted:
         raise InputError(
             "measures",
             got="no measure",
-            expected=_known_words(stops),
-            hint='write e.g. measures=["opening_time"].',
+            expected=words,
+            hint=f'write e.g. measures=["{example}"].',
         )
-    return tuple(_chosen(name, stops) for name in wanted)
-
-
-def _chosen(name: object, stops: list[str]) -> ChosenMeasure:
-    if isinstance(name, str) and name in _OF_VARIANTS:
-        return ChosenMeasure(name, _OF_VARIANTS[name])
-    if isinstance(name, str) and "." in name:
-        stop, *number, key = name.split(".")
-        if stop in stops and key in _OF_IMPACTS and len(number) < 2:
-            if not number:
-                return ChosenMeasure(name, _OF_IMPACTS[key], "impact", stop)
-            if number[0].isascii() and number[0].isdecimal() and int(number[0]) > 0:
-                return ChosenMeasure(name, _OF_IMPACTS[key], "impact", stop, int(number[0]))
-        if stop == NOISE and not number:
-            if key in _OF_CLICKS:
-                return ChosenMeasure(name, _OF_CLICKS[key], "click")
-            if key in _OF_DESIGNS:
-                return ChosenMeasure(name, _OF_DESIGNS[key], "design")
-    names = [
-        *_OF_VARIANTS,
-        *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS),
-        *(f"{NOISE}.{key}" for key in _OF_DESIGNS),
-    ]
-    raise InputError(
-        "measures",
-        got=f"'{name}'",
-        expected=_known_words(stops),
-        hint=nearest(str(name), names, "the reference of the measures describes each."),
-    )
-
-
-def _known_words(stops: list[str]) -> str:
-    words = f"one of: {one_of(_OF_VARIANTS)}; of the noise {NOISE}.KEY with a key of: "
-    words += one_of(_OF_DESIGNS)
-    if not stops:
-        return words
-    return (
-        f"{words}; or of the first impact on a stop, {stops[0]}.KEY (of the second one "
-        f"{stops[0]}.2.KEY), with a stop of: {one_of(stops)}, and a key of: {one_of(_OF_IMPACTS)}"
-    )
+    chosen = []
+    for name in wanted:
+        found = find(name) if isinstance(name, str) else None
+        if found is None:
+            raise InputError(
+                "measures",
+                got=f"'{name}'",
+                expected=words,
+                hint=nearest(str(name), known, "the reference of the measures describes each."),
+            )
+        chosen.append(found)
+    return tuple(chosen)

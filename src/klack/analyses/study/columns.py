@@ -7,10 +7,10 @@ from typing import TypedDict
 
 import numpy as np
 
+from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
-from klack.analyses.study.strokes import AskedPoints
 from klack.case.study_source import StudySource
 from klack.errors import InputError
 
@@ -41,7 +41,7 @@ def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
             source.where(("parameters",)),
             got=f"{len(rows)} points, none of which can be computed; {times} times: {reason}",
             expected="ranges in which the valve works",
-            hint="narrow the ranges, or try single points with klack stroke.",
+            hint="narrow the ranges, or compute the case with one of these values by itself.",
         )
 
 
@@ -53,10 +53,15 @@ class PointFields(TypedDict):
     linked: tuple[StudyColumn, ...]
     failures: tuple[str, ...]
     notes: tuple[str, ...]
+    model: str
 
 
 def point_fields(
-    asked: AskedPoints, space: Space, values: Sequence[Values], rows: Sequence[PointRow]
+    asked: AskedPoints,
+    space: Space,
+    values: Sequence[Values],
+    rows: Sequence[PointRow],
+    today: PointRow,
 ) -> PointFields:
     """Values of the parameters and of what follows from them, and how each point ended."""
     known = space.known()
@@ -72,7 +77,15 @@ def point_fields(
         ),
         failures=tuple(row.failure for row in rows),
         notes=tuple("\n".join(row.notes) for row in rows),
+        model=_model(rows, today),
     )
+
+
+def _model(rows: Sequence[PointRow], today: PointRow) -> str:
+    """Model of the case as it is, and how many points have another one; empty for strokes."""
+    first = next((row.model for row in (today, *rows) if row.model), "")
+    others = sum(1 for row in rows if row.model not in ("", first))
+    return f"{first}; other modes or meshes at {others} points" if others else first
 
 
 def _column(

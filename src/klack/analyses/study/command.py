@@ -1,4 +1,4 @@
-"""``klack study`` and ``klack optimise``: a valve at many points of its parameter space."""
+"""``klack study`` and ``klack optimise``: a case at many points of its parameter space."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,7 +29,7 @@ _Workers = Annotated[
     Parameter(
         name="--workers",
         help="Number of processes; it does not affect the results. [default: threads; all cores "
-        "where measures of the noise, or several geometries, are asked for]",
+        "for many impacts, and where measures of the noise, or several geometries, are asked for]",
     ),
 ]
 _Dask = Annotated[
@@ -53,7 +53,7 @@ def study(
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
-    """Compute measures of a stroke at many points: ranges, designs, distributions of parameters."""
+    """Compute measures of a stroke or an impact at many points: ranges, designs, tolerances."""
     from klack.analyses.study.run import run_study
 
     return _run(run_study, "study", case, study, component, wanted, workers, dask, made)
@@ -100,7 +100,7 @@ def _run(
 
     where = Where(threads=wanted.threads, workers=workers, dask=dask, is_free=True)
     tree = read_case_tree(find_case(case), imported(component))
-    checked = tree.case()
+    checked = tree.any_case()
     source = study_of(checked, tree, file)
     if made is not None:
         source, name = source.made(made), "made"

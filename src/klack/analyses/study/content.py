@@ -24,6 +24,7 @@ from klack.analyses.study.wording import (
     on_page,
     rate_text,
     short_labels,
+    variant_words,
 )
 from klack.report.page import Content, Section, Sound, Table
 from klack.report.wording import count, signed
@@ -75,12 +76,12 @@ def study_content(record: StudyRecord) -> Content:
     return page_of(
         record,
         f"{'Study' if record.optimum is None else 'Optimisation'}, {count(record.count)} points",
-        subtitle=(record.variant, record.design),
+        subtitle=(variant_words(record), record.design),
         answer=_best_answer(record, labels) or _answer(record, varying, related, labels),
         numbers=_number_table(record),
         sections=sections,
         definitions=_DEFINITIONS,
-        limits=_LIMITS,
+        limits=(_OF_STROKES if not record.model else _OF_IMPACTS, *_LIMITS),
     )
 
 
@@ -328,7 +329,7 @@ def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
 
 
 def _left(record: StudyRecord) -> tuple[str, ...]:
-    text = [rate_text(record)]
+    text = [f"Model: {record.model}.", rate_text(record)] if record.model else [rate_text(record)]
     if record.count > _LISTED:
         text.append(
             f"The first {_LISTED} of {count(record.count)}; klack export writes all of them as CSV."
@@ -375,12 +376,17 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
 )
 
+_OF_STROKES = (
+    "Bounces",
+    "After some bounces a stroke is chaotic: measures of late impacts scatter from point to "
+    "point by more than their parameters explain.",
+)
+_OF_IMPACTS = (
+    "One level",
+    "All points are computed at one level, with the mesh that their case gives. A level in doubt, "
+    "a coarse mesh and an error estimated above 2 % are remarks of the points concerned.",
+)
 _LIMITS: tuple[tuple[str, str], ...] = (
-    (
-        "Bounces",
-        "After some bounces a stroke is chaotic: measures of late impacts scatter from point to "
-        "point by more than their parameters explain.",
-    ),
     (
         "Points",
         "Between the points nothing was computed: a minimum of the table is the best of these "

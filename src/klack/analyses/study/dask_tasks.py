@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, TypeVar
 from uuid import uuid4
 
 import klack
+from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.point_order import Answer, PointOrder, answered
 from klack.analyses.study.process_workers import died_row
 from klack.analyses.study.sent_case import SentCase
-from klack.analyses.study.strokes import AskedPoints
 from klack.analyses.study.tally import Tally
 from klack.analyses.workers import Failure, unwrapped
 from klack.errors import InputError

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import klack
 from klack.analyses.study.agenda import Agenda
+from klack.analyses.study.asked_points import AskedPoints, groups_of
 from klack.analyses.study.dask_tasks import DaskTasks
 from klack.analyses.study.point_order import Answer
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.sent_case import SentCase
-from klack.analyses.study.strokes import AskedPoints, groups_of
 from klack.analyses.study.tally import Tally
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
-from klack.case.valve import ValveCase
 from klack.closing import Closing
 from klack.errors import ConvergenceError, InputError, MissingExtraError
 from klack.progress import Progress, remark
@@ -59,7 +59,7 @@ class DaskWorkers(Closing):
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     scheduler : str, Client or Cluster
@@ -75,7 +75,7 @@ class DaskWorkers(Closing):
 
     words = "workers of dask"
 
-    def __init__(self, case: ValveCase, tree: CaseTree, scheduler: "str | Client") -> None:
+    def __init__(self, case: AnyCase, tree: CaseTree, scheduler: "str | Client") -> None:
         require_dask()
         self._sent = SentCase.of(case, tree)
         self._client, self._is_own = _client(scheduler)

@@ -4,18 +4,23 @@ from collections.abc import Iterable, Sequence
 from time import perf_counter
 from typing import TypedDict
 
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.kinds import ask, kind_of
 from klack.analyses.study.log import KeptPoint, PointLog, point_key
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.point_workers import PointWorkers
-from klack.analyses.study.strokes import AskedPoints
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.progress import Progress
 
 __all__ = ["EffortFields", "Evaluation", "asked_of"]
+
+
+_KEYS = ("measures", "variant", "level")
+"""Keys of a study that errors name without their file."""
 
 
 class EffortFields(TypedDict):
@@ -29,7 +34,7 @@ class EffortFields(TypedDict):
 
 
 def asked_of(
-    case: ValveCase,
+    case: AnyCase,
     tree: CaseTree,
     source: StudySource,
     written: GivenPoints,
@@ -40,14 +45,15 @@ def asked_of(
     Raises
     ------
     InputError
-        With file, line and key: for a measure that does not exist; and those of
-        :meth:`AskedPoints.of`.
+        With file, line and key: for a measure, a variant or a level that does not exist; and
+        those of :func:`~klack.analyses.study.kinds.ask`.
     """
     try:
-        return AskedPoints.of(case, tree, written, names, source.study.variant)
+        variant = kind_of(case).asked_variant(source.study)
+        return ask(case, tree, written, names, variant)
     except InputError as error:
-        if error.where == "measures":
-            raise source.refuse(("measures",), error) from None
+        if error.where in _KEYS:
+            raise source.refuse((error.where,), error) from None
         raise
 
 

@@ -12,6 +12,7 @@ from klack.analyses.study.goals import Goals
 from klack.analyses.study.points import Space
 from klack.analyses.study.strokes import AskedPoints
 from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
 from klack.errors import InputError, KlackError
 from klack.input.problem import one_of
 from klack.progress import Progress
@@ -44,6 +45,8 @@ def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> 
             hint=f"{hint} 'refinements' need no derivatives.",
         )
 
+    if not isinstance(asked.case, ValveCase):
+        raise refused("an impact of two bodies, without derivatives")
     wanted = {*source.study.objectives, *source.study.constraints}
     without = [x.name for x in asked.chosen if x.name in wanted and not has_slope(x)]
     if without:
@@ -94,8 +97,9 @@ class Gradients:
     ) -> "Gradients":
         """Bodies and laws are built here."""
         wanted = {name for name, _ in goals.sides}
+        variant = asked.case.one_variant(asked.variant)
         return cls(
-            runner=SlopeRunner(asked.case, asked.tree, slopes, asked.variant, progress, None),
+            runner=SlopeRunner(asked.case, asked.tree, slopes, variant, progress, None),
             slopes=slopes,
             space=space,
             goals=goals,

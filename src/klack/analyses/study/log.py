@@ -13,15 +13,15 @@ from typing import Any
 
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
+from klack.case.any_case import AnyCase
 from klack.case.bodies import CaseBody
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
-from klack.case.valve import ValveCase
 
 __all__ = ["KeptPoint", "PointLog", "point_key", "point_log_form"]
 
 _ASIDE = ("study", "calibration", "measurement", "title", "description")
-"""Sections of a case that no stroke depends on."""
+"""Sections of a case that no point depends on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +33,14 @@ class KeptPoint:
     values : mapping of str to float or None
     failure : str
     notes : tuple of str
+    model : str
+        See :class:`~klack.analyses.study.point_row.PointRow`.
     """
 
     values: Mapping[str, float | None]
     failure: str
     notes: tuple[str, ...]
+    model: str = ""
 
     def row(self, measures: tuple[str, ...]) -> PointRow | None:
         """Row of a table of these measures; None if one of them is not known."""
@@ -45,19 +48,20 @@ class KeptPoint:
             return PointRow((None,) * len(measures), self.failure, self.notes)
         if not all(name in self.values for name in measures):
             return None
-        return PointRow(tuple(self.values[name] for name in measures), "", self.notes)
+        values = tuple(self.values[name] for name in measures)
+        return PointRow(values, "", self.notes, model=self.model)
 
     def with_row(self, measures: tuple[str, ...], row: PointRow) -> "KeptPoint":
         """The same with what was computed now."""
         values = dict(self.values) | dict(zip(measures, row.values, strict=True))
-        return KeptPoint(values=values, failure=row.failure, notes=row.notes)
+        return KeptPoint(values=values, failure=row.failure, notes=row.notes, model=row.model)
 
 
 PointLog = UnfinishedLog[str, KeptPoint]
 """Points by :func:`point_key`."""
 
 
-def point_log_form(case: ValveCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoint], str]:
+def point_log_form(case: AnyCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoint], str]:
     """How the points of a case are kept, and the mark of the case."""
     mark = fingerprint(_Deciding.of(case, tree), _own_code(case))
     return (
@@ -91,25 +95,23 @@ def _with_content(folder: Path, value: PointValue) -> PointValue | list[str]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Deciding:
-    """What of a case decides a stroke, as :func:`fingerprint` wants it."""
+    """What of a case decides a point, as :func:`fingerprint` wants it."""
 
     source: str
     bodies: Mapping[str, CaseBody]
 
     @classmethod
-    def of(cls, case: ValveCase, tree: CaseTree) -> "_Deciding":
+    def of(cls, case: AnyCase, tree: CaseTree) -> "_Deciding":
         data = {name: value for name, value in tree.data.items() if name not in _ASIDE}
         return cls(source=json.dumps(data, sort_keys=True, default=str), bodies=case.bodies)
 
 
-def _own_code(case: ValveCase) -> Iterator[bytes]:
+def _own_code(case: AnyCase) -> Iterator[bytes]:
     for name, digest in case.own_components.items():
         # a worker process knows the script that started it by another name
         yield f"{name.replace('__mp_main__:', '__main__:')} {digest}".encode()
-    for name, part in case.network.components.items():
-        file = getattr(part, "file", None)  # of an FMU
-        if isinstance(file, Path):
-            yield f"{name} {sha256(file.read_bytes()).hexdigest()}".encode()
+    for name, file in case.component_files.items():
+        yield f"{name} {sha256(file.read_bytes()).hexdigest()}".encode()
 
 
 def _data(key: str, point: KeptPoint) -> Mapping[str, Any]:
@@ -118,12 +120,16 @@ def _data(key: str, point: KeptPoint) -> Mapping[str, Any]:
         "values": dict(point.values),
         "failure": point.failure,
         "notes": list(point.notes),
-    }
+    } | ({"model": point.model} if point.model else {})
 
 
 def _kept(data: Mapping[str, Any]) -> tuple[str, KeptPoint]:
     values = {
         str(name): None if value is None else float(value) for name, value in data["values"].items()
     }
-    notes = tuple(map(str, data["notes"]))
-    return str(data["point"]), KeptPoint(values=values, failure=str(data["failure"]), notes=notes)
+    return str(data["point"]), KeptPoint(
+        values=values,
+        failure=str(data["failure"]),
+        notes=tuple(map(str, data["notes"])),
+        model=str(data.get("model", "")),
+    )

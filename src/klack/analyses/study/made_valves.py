@@ -11,9 +11,9 @@ from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
 from klack.analyses.study.scatter import Scatter, made_space, scatter_of
+from klack.case.any_case import AnyCase
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.studies.robust import RobustValue
 
@@ -104,7 +104,7 @@ class MadeValves:
         )
 
 
-def made_valves_of(case: ValveCase, source: StudySource, space: Space) -> MadeValves | None:
+def made_valves_of(case: AnyCase, source: StudySource, space: Space) -> MadeValves | None:
     """Made valves of a study; None for one that compares designs as drawn.
 
     Raises
@@ -120,7 +120,7 @@ def made_valves_of(case: ValveCase, source: StudySource, space: Space) -> MadeVa
 
 
 def _of_today(
-    case: ValveCase, source: StudySource, space: Space, scatter: Scatter
+    case: AnyCase, source: StudySource, space: Space, scatter: Scatter
 ) -> tuple[Written, ...]:
     try:
         own = made_space(case, source, space)

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.sensitivities.parameters import SlopeSpace
+from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.columns import (
     measure_columns,
     point_fields,
     require_some,
     row_warnings,
 )
+from klack.analyses.study.computing import sounds_of
 from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
 from klack.analyses.study.gradients import Gradients, require_gradients
@@ -25,13 +27,12 @@ from klack.analyses.study.pace import Pace
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values, require_varied, space_of
 from klack.analyses.study.record import Optimum, PointSound, StudyColumn, StudyRecord
-from klack.analyses.study.strokes import AskedPoints, sounds_of
 from klack.analyses.study.where import HERE, Where
 from klack.analyses.study.wording import number_text
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
@@ -47,7 +48,6 @@ _EDGE = 1e-3
 """Share that points keep from the ends of a distribution without ends."""
 _REFINED = 8
 """Most points of the front that are refined."""
-_HEARD = ("click", "design")
 _PLAYED = 8
 """Points of the front whose sound is kept, beside the recommended one and that of today."""
 _POLLS = 4
@@ -55,7 +55,7 @@ _POLLS = 4
 
 
 def run_optimisation(
-    case: ValveCase,
+    case: AnyCase,
     tree: CaseTree,
     source: StudySource,
     *,
@@ -70,7 +70,7 @@ def run_optimisation(
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     source : StudySource
@@ -128,7 +128,7 @@ def run_optimisation(
         **case_fields(case),
         **run_fields(begin, clock, "pymoo"),
         **work.evaluation.effort(work.done),
-        **point_fields(asked, space, work.values, work.found),
+        **point_fields(asked, space, work.values, work.found, today),
         study_text=source.text,
         design=optimum.algorithm,
         measures=columns,
@@ -382,7 +382,7 @@ def _optimum(
 
 def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound, ...]:
     """Of the case as it is and of points spread over the front, if the noise was asked for."""
-    if front.best < 0 or not any(item.of in _HEARD for item in work.asked_today.chosen):
+    if front.best < 0 or not any(item.is_noise for item in work.asked_today.chosen):
         return ()
     chosen = spread_over(front.ordered, _PLAYED)
     points = list(dict.fromkeys([-1, front.best, *map(int, chosen)]))

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from klack.analyses.study.wording import shown_unit
+from klack.case.any_case import AnyCase
 from klack.case.key_path import Quantity, kind_at, node_at, quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study import StudyParameter, Written
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.studies.expression import RESERVED
@@ -94,7 +94,7 @@ def written(value: float | str, kind: Kind | None) -> PointValue:
     return float(value) if kind.bare else f"{float(value)!r} {kind.unit}"
 
 
-def parameters_of(case: ValveCase, source: StudySource) -> tuple[Parameter, ...]:
+def parameters_of(case: AnyCase, source: StudySource) -> tuple[Parameter, ...]:
     """Find the parameters of a study in its case, and read their values.
 
     Raises
@@ -128,7 +128,7 @@ def short_names(names: Mapping[str, object] | tuple[str, ...]) -> dict[str, str]
     return {word: name for word, name in found.items() if word not in shared}
 
 
-def _parameter(case: ValveCase, source: StudySource, name: str, item: StudyParameter) -> Parameter:
+def _parameter(case: AnyCase, source: StudySource, name: str, item: StudyParameter) -> Parameter:
     at: Key = ("parameters", name)
     try:
         place = split_path(name)

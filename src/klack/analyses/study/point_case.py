@@ -7,7 +7,7 @@ from klack.analyses.study.record import StudyColumn, StudyRecord
 from klack.case.case_tree import tree_of
 from klack.case.inserting import with_values
 from klack.case.key_path import split_path
-from klack.case.valve_reader import read_valve_case
+from klack.case.valve_reader import read_any_case
 from klack.errors import InputError
 
 __all__ = ["case_of_point"]
@@ -48,7 +48,7 @@ def case_of_point(record: StudyRecord, point: int | None, folder: Path) -> tuple
     made = f"Point {point} of a study by klack {record.version}, {record.created[:10]}: "
     text = with_values(tree, values, f"{made}{record.design}.\nMade from {record.case}.")
     if not record.own_components:
-        read_valve_case(text, folder / name)
+        read_any_case(text, folder / name)
     return name, text
 
 

@@ -11,13 +11,13 @@ from threading import Lock
 from time import perf_counter
 from typing import Self
 
-from klack.analyses.study.chosen_measures import chosen_measures
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.computing import Builds, compute_alone
+from klack.analyses.study.kinds import kind_of
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.sent_case import SentCase
-from klack.analyses.study.strokes import AskedPoints, Builds, compute_alone
 from klack.analyses.workers import Failure, answer
 from klack.case.points import PointKey, Points, PointValue
-from klack.case.variants import Variant
 
 __all__ = ["Answer", "PointOrder", "answered"]
 
@@ -41,7 +41,7 @@ class PointOrder:
 
     keys: tuple[PointKey, ...]
     measures: tuple[str, ...]
-    variant: Variant
+    variant: str
     written: tuple[Mapping[str, PointValue], ...]
 
     @classmethod
@@ -96,11 +96,13 @@ class _CaseAtWork:
         self._folder = "" if Path.cwd() == Path(sent.folder) else f"{sent.folder}{os.sep}"
 
     def rows(self, order: PointOrder) -> tuple[PointRow, ...]:
+        kind = kind_of(self._case)
         asked = AskedPoints(
+            kind=kind,
             case=self._case,
             tree=self._tree,
             points=Points(order.keys, order.written),
-            chosen=chosen_measures(self._case, order.measures),
+            chosen=kind.measures(self._case, order.measures),
             variant=order.variant,
         )
         return tuple(self._sent(row) for row in compute_alone(asked, self._builds))

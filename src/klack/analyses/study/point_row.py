@@ -23,6 +23,8 @@ class PointRow:
     by_chance : bool
         True if the same point may be computed another time: the memory was full, or a component
         of the user's own has failed.
+    model : str
+        What the numbers come from, in words: level, modes and meshes of an impact.
     """
 
     values: tuple[float | None, ...]
@@ -30,6 +32,7 @@ class PointRow:
     notes: tuple[str, ...] = ()
     others: tuple[warnings.WarningMessage, ...] = ()
     by_chance: bool = False
+    model: str = ""
 
     @property
     def numbers(self) -> tuple[float, ...]:

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.computing import Builds, compute_points
 from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.strokes import AskedPoints, Builds, compute_points
 from klack.closing import Closing
 from klack.cores import available_cores
 from klack.progress import Progress
@@ -73,11 +74,12 @@ class ThreadWorkers(Closing):
 
     def __init__(self, threads: int | None = None) -> None:
         self._threads, self._builds = threads, Builds()
+        self._most = 0
 
     @property
     def count(self) -> int:
-        """Threads at most."""
-        return available_cores() if self._threads is None else self._threads
+        """Threads that computed points at a time, at most; those that may before the first."""
+        return self._most or self._threads or available_cores()
 
     def compute(
         self,
@@ -87,8 +89,10 @@ class ThreadWorkers(Closing):
         progress: Progress,
     ) -> None:
         """Compute some of the points, those with the same bodies one after another."""
-        compute_points(asked, places, keep, self._threads, progress, self._builds)
+        threads, builds = self._threads, self._builds
+        most = compute_points(asked, places, keep, threads, progress, builds)
+        self._most = max(self._most, most)
 
     def close(self) -> None:
         """Forget the bodies."""
-        self._builds = Builds()
+        self._builds.close()

@@ -17,11 +17,11 @@ from klack.analyses.study.parameters import (
     unit_of,
     written,
 )
+from klack.case.any_case import AnyCase
 from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.reader import text_of
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, one_of
 from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
@@ -192,7 +192,7 @@ class StudyPoints:
     cube: NDArray[np.float64] | None = None
 
 
-def space_of(case: ValveCase, source: StudySource) -> Space:
+def space_of(case: AnyCase, source: StudySource) -> Space:
     """Parameters and expressions of a study, found in its case.
 
     Raises
@@ -223,7 +223,7 @@ def points_in(source: StudySource, space: Space) -> StudyPoints:
 
 
 def linked_of(
-    case: ValveCase, source: StudySource, parameters: Sequence[Parameter]
+    case: AnyCase, source: StudySource, parameters: Sequence[Parameter]
 ) -> tuple[Linked, ...]:
     """Expressions of a study in the order in which they can be computed.
 

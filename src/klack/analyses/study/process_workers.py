@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from klack.analyses.study.agenda import Agenda
+from klack.analyses.study.asked_points import AskedPoints, groups_of
 from klack.analyses.study.point_order import Answer, PointOrder, answered
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.sent_case import SentCase
-from klack.analyses.study.strokes import AskedPoints, groups_of
 from klack.analyses.study.tally import Tally
 from klack.analyses.workers import Failure, WorkerDied, WorkerPool, shared, unwrapped
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
-from klack.case.valve import ValveCase
 from klack.closing import Closing
 from klack.errors import ConvergenceError
 from klack.memory import require_memory
@@ -34,7 +34,7 @@ class ProcessWorkers(Closing):
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     processes : int
@@ -47,7 +47,7 @@ class ProcessWorkers(Closing):
 
     words = "processes"
 
-    def __init__(self, case: ValveCase, tree: CaseTree, processes: int) -> None:
+    def __init__(self, case: AnyCase, tree: CaseTree, processes: int) -> None:
         require_memory(
             "workers",
             processes * PROCESS_SIZE,

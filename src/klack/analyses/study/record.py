@@ -211,7 +211,7 @@ class StudyRecord(CaseRecord):
     study_text : str
         Of the file of the study; empty if it stands in the case.
     variant : str
-        Of the stroke.
+        Of the stroke; of an impact its level.
     design : str
         Where the points lie, in words.
     threads : int
@@ -235,6 +235,9 @@ class StudyRecord(CaseRecord):
         Of drawn points: the probability of missing each bound.
     workers : str
         What computed them: threads, processes, or workers of dask.
+    model : str
+        What the numbers of an impact come from: level, modes and meshes of the case as it is, and
+        at how many points they differ; empty for strokes.
     """
 
     study_text: str
@@ -255,6 +258,7 @@ class StudyRecord(CaseRecord):
     missed: tuple[MissedBound, ...] = ()
     sounds: tuple[PointSound, ...] = ()
     workers: str = "threads"
+    model: str = ""
 
     @property
     def count(self) -> int:

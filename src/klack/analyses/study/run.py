@@ -4,6 +4,7 @@ from pathlib import Path
 from time import perf_counter
 
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.columns import (
     measure_columns,
     point_fields,
@@ -19,11 +20,10 @@ from klack.analyses.study.record import StudyRecord
 from klack.analyses.study.robustness import missed_bounds
 from klack.analyses.study.scatter import made_space
 from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
-from klack.analyses.study.strokes import AskedPoints
 from klack.analyses.study.where import HERE, Where
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 
@@ -34,7 +34,7 @@ _DRAWN = ("sobol", "latin-hypercube", "made")
 
 
 def asked_points(
-    case: ValveCase, tree: CaseTree, source: StudySource
+    case: AnyCase, tree: CaseTree, source: StudySource
 ) -> tuple[StudyPoints, AskedPoints]:
     """Check a study as far as that is possible without a run.
 
@@ -57,7 +57,7 @@ def asked_points(
 
 
 def run_study(
-    case: ValveCase,
+    case: AnyCase,
     tree: CaseTree,
     source: StudySource,
     *,
@@ -69,7 +69,7 @@ def run_study(
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     source : StudySource
@@ -114,7 +114,7 @@ def run_study(
         **case_fields(case),
         **run_fields(begin, clock),
         **evaluation.effort(len(asked.points)),
-        **point_fields(asked, points.space, points.values, found),
+        **point_fields(asked, points.space, points.values, found, today),
         study_text=source.text,
         design=points.design,
         measures=columns,

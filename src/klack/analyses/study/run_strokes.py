@@ -1,10 +1,11 @@
 """One variant of a stroke at many points, as a table."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from klack.analyses.point_table import PointTable, RunsInterrupted
+from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.strokes import AskedPoints, row_table
 from klack.analyses.study.where import HERE, Where
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints
@@ -34,7 +35,7 @@ def run_strokes(
     points : sequence of mappings, or mapping of sequences
         Key of the case to a value with its unit, for every point; or a list of values by key.
     measures : iterable of str
-        See :class:`~klack.analyses.study.chosen_measures.ChosenMeasure`.
+        See :func:`~klack.analyses.study.stroke_measures.stroke_measures`.
     variant : str, optional
         The first one of the case by default.
     where : Where
@@ -51,11 +52,38 @@ def run_strokes(
     RunsInterrupted
         On Ctrl-C, with the table of what was computed until then.
     """
-    asked = AskedPoints.of(case, tree, points, measures, variant)
+    asked = ask(case, tree, points, measures, variant)
     rows: list[PointRow | None] = [None] * len(asked.points)
     try:
         with where.open(case, tree) as workers:
             workers.compute(asked, range(len(rows)), rows.__setitem__, progress)
     except KeyboardInterrupt:
-        raise RunsInterrupted(row_table(asked, rows)) from None
-    return row_table(asked, rows)
+        raise RunsInterrupted(_row_table(asked, rows)) from None
+    return _row_table(asked, rows)
+
+
+def _row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTable:
+    """Table of all points; those without a row were not computed."""
+    none = PointRow((None,) * len(asked.chosen), NOT_COMPUTED)
+    rows = [none if row is None else row for row in found]
+    return PointTable(
+        case=asked.case.name,
+        variant=asked.variant,
+        points=tuple(
+            column_of(
+                key.name,
+                key.unit,
+                [
+                    key.value(row[key.name]) if key.name in row else None
+                    for row in asked.points.written
+                ],
+            )
+            for key in asked.points.keys
+        ),
+        measures=tuple(
+            column_of(item.name, item.measure.unit, [row.values[k] for row in rows], item.measure)
+            for k, item in enumerate(asked.chosen)
+        ),
+        failures=tuple(row.failure for row in rows),
+        warnings=tuple(row.notes for row in rows),
+    )

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from klack.analyses.study.parameters import Parameter, written
 from klack.analyses.study.points import Space, Values
+from klack.case.any_case import AnyCase
 from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study import StudyRobust
 from klack.case.study_source import StudySource
-from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.studies.designs import sobol_sequence
@@ -87,7 +87,7 @@ class Scatter:
         return {**self.space.written(self.space.completed(inside)), **others}
 
 
-def scatter_of(case: ValveCase, source: StudySource, space: Space) -> Scatter | None:
+def scatter_of(case: AnyCase, source: StudySource, space: Space) -> Scatter | None:
     """Scatter of made valves; None for a study without.
 
     Raises
@@ -107,7 +107,7 @@ def scatter_of(case: ValveCase, source: StudySource, space: Space) -> Scatter | 
     )
 
 
-def made_space(case: ValveCase, source: StudySource, space: Space) -> Space:
+def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
     """Parameters of valves made after the case as it is: what scatters, about its value there.
 
     Keys that follow from what scatters follow here too; all others keep their value.
@@ -164,7 +164,7 @@ def _today(item: _Scattered, known: Values) -> float:
 
 
 def _scattered(
-    case: ValveCase, source: StudySource, space: Space, given: StudyRobust
+    case: AnyCase, source: StudySource, space: Space, given: StudyRobust
 ) -> tuple[_Scattered, ...]:
     parameters = {item.name: item for item in space.parameters}
     linked = {item.name for item in space.linked}
@@ -175,7 +175,7 @@ def _scattered(
 
 
 def _one(
-    case: ValveCase,
+    case: AnyCase,
     source: StudySource,
     parameters: Mapping[str, Parameter],
     linked: set[str],

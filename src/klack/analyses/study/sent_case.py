@@ -12,8 +12,8 @@ from typing import Self
 import klack
 from klack.analyses.study.log import point_log_form
 from klack.analyses.unfinished import code_of_klack
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
-from klack.case.valve import ValveCase
 from klack.elasticity.factorization import chosen_backend
 from klack.errors import InputError
 
@@ -45,7 +45,7 @@ class SentCase:
     versions: Mapping[str, str]
 
     @classmethod
-    def of(cls, case: ValveCase, tree: CaseTree) -> Self:
+    def of(cls, case: AnyCase, tree: CaseTree) -> Self:
         """Case ready to be sent.
 
         Raises
@@ -74,7 +74,7 @@ class SentCase:
     def _key(self) -> tuple[object, ...]:
         return self.content, self.folder, self.mark, *sorted(self.versions.items())
 
-    def read(self) -> tuple[ValveCase, CaseTree]:
+    def read(self) -> tuple[AnyCase, CaseTree]:
         """Check the case where it has arrived.
 
         Raises
@@ -96,7 +96,7 @@ class SentCase:
         if not tree.path.is_absolute() and Path.cwd() != Path(self.folder):
             tree = replace(tree, path=Path(self.folder) / tree.path)
         try:
-            case = tree.case()
+            case = tree.any_case()
         except InputError as error:
             raise InputError(
                 error.where,

@@ -27,6 +27,7 @@ from klack.analyses.study.wording import (
     largest_first,
     missed_cells,
     rate_text,
+    variant_words,
 )
 from klack.terminal.tables import TextTable
 
@@ -94,7 +95,8 @@ class StudyJson(TypedDict):
     schema: Literal["klack-study/1"]
     case: str
     klack: Version
-    variant: str
+    variant: Annotated[str, Field(description="Of the stroke; of an impact its level.")]
+    model: Annotated[str, Field(description="Of an impact: its modes, law and meshes.")]
     design: str
     points: int
     failed: int
@@ -130,6 +132,7 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "case": record.case,
         "klack": record.version,
         "variant": record.variant,
+        "model": record.model,
         "design": record.design,
         "points": record.count,
         "failed": int(record.failed.sum()),
@@ -218,7 +221,7 @@ def _column(item: StudyColumn) -> ColumnJson:
 def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
     """What a terminal shows: how each parameter varies, and the range of each measure."""
     yield TextTable(
-        title=f"{record.title or record.case}, {record.variant}",
+        title=f"{record.title or record.case}, {variant_words(record)}",
         columns=("parameter", "today", "values"),
         rows=[
             [item.name, in_words(item, item.today), item.spread]
@@ -256,6 +259,8 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             columns=("parameter", "alone", "", "with interactions", ""),
             rows=[[name, *index_cells(item, k)] for k, name in enumerate(item.parameters)],
         )
+    if record.model:
+        yield f"Model: {record.model}."
     yield rate_text(record)
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from klack.analyses.study.asked_points import AskedPoints, groups_of
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.point_workers import PointWorkers, ThreadWorkers
 from klack.analyses.study.process_workers import PROCESS_SIZE, ProcessWorkers
-from klack.analyses.study.strokes import AskedPoints, groups_of
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
-from klack.case.valve import ValveCase
 from klack.closing import Closing
 from klack.cores import available_cores
 from klack.errors import InputError
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HERE", "Where"]
 
-_NOISE = 64
-"""Points with noise (0.15 s) that make up for the start of processes (4 s)."""
+_HOLDING = 64
+"""Points with noise (0.15 s), or impacts, that make up for the start of processes (4 s)."""
 _GEOMETRIES = 16
 """New bodies (0.7 s) that do: threads mesh one after another."""
 
@@ -78,7 +78,7 @@ class Where:
             require_dask()
 
     @contextmanager
-    def open(self, case: ValveCase, tree: CaseTree) -> Iterator[PointWorkers]:
+    def open(self, case: AnyCase, tree: CaseTree) -> Iterator[PointWorkers]:
         """Workers for the points of a case, which end with this block.
 
         Raises
@@ -92,7 +92,7 @@ class Where:
         finally:
             workers.close()
 
-    def _of(self, case: ValveCase, tree: CaseTree) -> PointWorkers:
+    def _of(self, case: AnyCase, tree: CaseTree) -> PointWorkers:
         if self.dask is not None:
             from klack.analyses.study.dask_workers import DaskWorkers
 
@@ -111,7 +111,7 @@ HERE = Where()
 class _Fitting(Closing):
     """Threads, until there are many points that processes compute faster."""
 
-    def __init__(self, case: ValveCase, tree: CaseTree) -> None:
+    def __init__(self, case: AnyCase, tree: CaseTree) -> None:
         self._case, self._tree = case, tree
         self._chosen: PointWorkers = ThreadWorkers()
         self._points = 0
@@ -146,14 +146,13 @@ class _Fitting(Closing):
         self._bodies |= {tuple(group.made.items()) for group in groups_of(asked, places)}
         if self._processes() < 2 or _has_python(self._case):
             return False
-        noise = any(item.of in ("click", "design") for item in asked.chosen)
-        return (noise and self._points >= _NOISE) or len(self._bodies) >= _GEOMETRIES
+        slow = asked.kind.holds_interpreter(asked) and self._points >= _HOLDING
+        return slow or len(self._bodies) >= _GEOMETRIES
 
     def _processes(self) -> int:
         return min(available_cores(), int(0.8 * available_memory().size / PROCESS_SIZE))
 
 
-def _has_python(case: ValveCase) -> bool:
+def _has_python(case: AnyCase) -> bool:
     """Components of the user's own and FMUs, which need not bear several calls at a time."""
-    parts: Sequence[Any] = list(case.network.components.values())
-    return bool(case.own_components) or any(hasattr(part, "file") for part in parts)
+    return bool(case.own_components) or bool(case.component_files)

@@ -29,6 +29,7 @@ __all__ = [
     "rate_text",
     "short_labels",
     "shown_unit",
+    "variant_words",
 ]
 
 
@@ -75,6 +76,11 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
         return fixed(value, 1, item.unit)
     unit, factor = shown_unit(item.unit)
     return quantity(factor * value, unit, digits)
+
+
+def variant_words(record: StudyRecord) -> str:
+    """Variant of a stroke, or level of an impact."""
+    return f"level '{record.variant}'" if record.model else record.variant
 
 
 EFFECT_COLUMNS = ("parameter", "size", "standard error", "mean", "scatter", "effects")

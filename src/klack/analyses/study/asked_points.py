@@ -1,0 +1,207 @@
+"""Points of a case, what is computed at each of them, and by which kind of calculation."""
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol
+
+from typing_extensions import TypeVar
+
+from klack.analyses.study.chosen_measures import ChosenMeasure
+from klack.analyses.study.point_row import PointRow
+from klack.case.bodies import CaseFile
+from klack.case.case_tree import CaseTree
+from klack.case.points import PointKey, Points, PointValue
+from klack.case.study import CaseStudy
+from klack.errors import KlackError
+from klack.input.problem import Key
+from klack.progress import Progress
+from klack.signals import TimeSeries
+
+__all__ = ["AskedPoints", "PointGroup", "PointKind", "Taken", "groups_of"]
+
+CaseT = TypeVar("CaseT", bound=CaseFile, default=Any)
+Built = TypeVar("Built", default=Any)
+
+Taken = Callable[[], Sequence[warnings.WarningMessage]]
+"""Warnings of the thread that calls it, since it called last."""
+
+
+class PointKind(Protocol[CaseT, Built]):
+    """What a study computes at its points: strokes of a valve, impacts of two bodies.
+
+    Points are computed one by one, each by the functions of a single run, so that a row depends
+    neither on who computes it nor on the other points.  Those with the same bodies share what is
+    built for them.
+    """
+
+    builds: int
+    """Groups of points whose bodies are kept for the next ones."""
+
+    def asked_variant(self, study: CaseStudy) -> str | None:
+        """What the study says of the variant.
+
+        Raises
+        ------
+        InputError
+            For a key of the study that this kind of case does not have; ``where`` is that key.
+        """
+
+    def variant(self, case: CaseT, name: str | None) -> str:
+        """Check that a case can run a variant, or level; its own one by default.
+
+        Raises
+        ------
+        InputError
+        """
+
+    def measures(self, case: CaseT, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
+        """Measures by their names, each once.
+
+        Raises
+        ------
+        InputError
+            With the nearest name, at ``measures``.
+        """
+
+    def require_keys(self, keys: Iterable[PointKey]) -> None:
+        """Refuse points that exchange what is the same for all of them.
+
+        Raises
+        ------
+        InputError
+        """
+
+    def makes_bodies(self, case: CaseT, place: Key) -> bool:
+        """Whether what is built for a group may follow from what stands there."""
+
+    def holds_interpreter(self, asked: "AskedPoints[CaseT]") -> bool:
+        """Whether threads compute these points hardly faster than one of them."""
+
+    def build(
+        self,
+        asked: "AskedPoints[CaseT]",
+        group: "PointGroup",
+        tree: CaseTree,
+        case: CaseT,
+        progress: Progress,
+    ) -> Built:
+        """Bodies, modes and laws of a group.
+
+        Parameters
+        ----------
+        asked : AskedPoints
+        group : PointGroup
+        tree : CaseTree
+            With the values of the group.
+        case : Case or ValveCase
+            Of the first point.
+        progress : callable
+
+        Raises
+        ------
+        KlackError, LinAlgError, MemoryError
+        """
+
+    def close(self, built: Built) -> None:
+        """Free what was built."""
+
+    def crew(
+        self,
+        asked: "AskedPoints[CaseT]",
+        built: Built,
+        places: Sequence[int],
+        threads: int | None,
+    ) -> int:
+        """Threads for these points.
+
+        Raises
+        ------
+        InputError
+            If so many points at a time do not fit into the memory.
+        """
+
+    def row(
+        self,
+        asked: "AskedPoints[CaseT]",
+        built: Built,
+        place: int,
+        check: Callable[[], None],
+        taken: Taken,
+    ) -> PointRow:
+        """Compute one point, in whichever thread.
+
+        Parameters
+        ----------
+        asked : AskedPoints
+        built : object
+        place : int
+        check : callable
+            Called now and then; raises :class:`~klack.analyses.threads.Stopped` to give up.
+        taken : callable
+            See :func:`klack.analyses.threads.warnings_of_threads`.
+        """
+
+    def pressure(self, asked: "AskedPoints[CaseT]", built: Built, place: int) -> TimeSeries | None:
+        """Sound of a click of one point; None where there is none.
+
+        Raises
+        ------
+        KlackError
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskedPoints(Generic[CaseT]):
+    """Points of a case, and what is computed at every one of them.
+
+    Parameters
+    ----------
+    kind : PointKind
+    case : Case or ValveCase
+    tree : CaseTree
+        The same as it was written.
+    points : Points
+    chosen : tuple of ChosenMeasure
+    variant : str
+        Of the stroke; of an impact its level.
+    """
+
+    kind: PointKind[CaseT, Any] = field(compare=False)
+    case: CaseT
+    tree: CaseTree
+    points: Points
+    chosen: tuple[ChosenMeasure, ...]
+    variant: str
+
+    def failed(self, error: BaseException) -> PointRow:
+        """Row of a point without measures."""
+        known = isinstance(error, KlackError)
+        text = str(error) if known else f"{type(error).__name__}: {error}"
+        return PointRow((None,) * len(self.chosen), text, by_chance=not known)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointGroup:
+    """Points with the same bodies and contact laws.
+
+    Parameters
+    ----------
+    made : mapping of Key to value
+        What these points exchange that bodies and laws follow from.
+    places : tuple of int
+        Of the points.
+    """
+
+    made: Mapping[Key, PointValue]
+    places: tuple[int, ...]
+
+
+def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ...]:
+    """Points that share their bodies, in the order of the first one of each group."""
+    found: dict[tuple[tuple[Key, PointValue], ...], list[int]] = {}
+    for i in places:
+        changes = asked.points.changes(i).items()
+        made = tuple(item for item in changes if asked.kind.makes_bodies(asked.case, item[0]))
+        found.setdefault(made, []).append(i)
+    return tuple(PointGroup(made=dict(made), places=tuple(at)) for made, at in found.items())

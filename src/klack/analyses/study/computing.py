@@ -1,0 +1,228 @@
+"""Points of one case on the threads of this process, those with the same bodies together.
+
+Meshes, modes and contact laws are made once for all points that leave them as they are.  Every
+point is computed alone and from rest, by the very functions that compute a single run: its numbers
+depend neither on the number of threads nor on the other points.
+"""
+
+import warnings
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext, suppress
+from dataclasses import replace
+from typing import Any
+
+from klack.analyses.study.asked_points import AskedPoints, PointGroup, groups_of
+from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.tally import Tally
+from klack.analyses.threads import on_threads, one_thread_of_blas, warnings_of_threads
+from klack.case.points import case_at, with_changes
+from klack.closing import Closing
+from klack.errors import InputError, KlackError
+from klack.progress import Progress, silent
+from klack.signals import TimeSeries
+from klack.stages import FAILURES
+
+__all__ = ["Builds", "compute_alone", "compute_points", "sounds_of"]
+
+
+class Builds(Closing):
+    """Bodies and laws of the latest groups, for the next points of the same case."""
+
+    def __init__(self) -> None:
+        self._found: OrderedDict[tuple[object, ...], tuple[AskedPoints, Any]] = OrderedDict()
+
+    def find(self, asked: AskedPoints, group: PointGroup) -> Any:
+        """What a group needs; None if it is not there."""
+        return self._found.get(self._key(asked, group), (None, None))[1]
+
+    def keep(self, asked: AskedPoints, group: PointGroup, built: Any) -> None:
+        """Keep it, and let go of the oldest."""
+        key = self._key(asked, group)
+        self._found[key] = asked, built
+        self._found.move_to_end(key)
+        while len(self._found) > asked.kind.builds:
+            self._forget(*self._found.popitem(last=False)[1])
+
+    def close(self) -> None:
+        """Let go of all of them."""
+        while self._found:
+            self._forget(*self._found.popitem()[1])
+
+    def _forget(self, asked: AskedPoints, built: Any) -> None:
+        asked.kind.close(built)
+
+    def _key(self, asked: AskedPoints, group: PointGroup) -> tuple[object, ...]:
+        touched = tuple(key.place for key in asked.points.keys)
+        return (id(asked.tree), asked.variant, touched, tuple(group.made.items()))
+
+
+def compute_points(
+    asked: AskedPoints,
+    places: Iterable[int],
+    keep: Callable[[int, PointRow], None],
+    threads: int | None = None,
+    progress: Progress = silent,
+    builds: Builds | None = None,
+) -> int:
+    """Compute some of the points, those with the same bodies one after another.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    places : iterable of int
+        Of the points that are wanted.
+    keep : callable
+        Called in this thread with each place and its row, in the order of their end.
+    threads : int, optional
+    progress : callable
+    builds : Builds, optional
+        Bodies and laws that were made before.
+
+    Returns
+    -------
+    int
+        Points that were computed at a time, at most.
+
+    Raises
+    ------
+    InputError
+        Where so many points at a time do not fit into the memory.
+    KeyboardInterrupt
+        Ctrl-C, after the rows that were finished have been kept.
+    """
+    wanted, most = list(places), 0
+    tally = Tally(len(asked.points), len(wanted), keep, progress)
+    holder = Builds() if builds is None else nullcontext(builds)
+    with holder as kept, tally, one_thread_of_blas():
+        for group in groups_of(asked, wanted):
+            tally.tell()
+            most = max(most, _run_group(asked, group, tally, threads, progress, kept))
+    return most
+
+
+def _run_group(
+    asked: AskedPoints,
+    group: PointGroup,
+    tally: Tally,
+    threads: int | None,
+    progress: Progress,
+    builds: Builds,
+) -> int:
+    built, left = builds.find(asked, group), group.places
+    if built is None:
+        built, left = _build(asked, group, tally, progress)
+    if built is None:
+        return 0
+    builds.keep(asked, group, built)
+    with warnings_of_threads() as taken:
+        crew = asked.kind.crew(asked, built, left, threads)
+        taken()
+        on_threads(
+            left,
+            lambda i, check: asked.kind.row(asked, built, i, check, taken),
+            crew,
+            tally,
+            tally.tell,
+        )
+    return crew
+
+
+def compute_alone(asked: AskedPoints, builds: Builds) -> list[PointRow]:
+    """Compute all points in this thread, one after another.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    builds : Builds
+        Bodies and laws that were made before.
+
+    Returns
+    -------
+    list of PointRow
+        In the order of the points; warnings of the bodies go with the last one.
+    """
+    found: dict[int, PointRow] = {}
+    with warnings.catch_warnings(record=True) as caught, one_thread_of_blas():
+        warnings.simplefilter("always")
+        for group in groups_of(asked, range(len(asked.points))):
+            _run_alone(asked, group, found, builds)
+    rows = [found[i] for i in range(len(found))]
+    if caught and rows:
+        rows[-1] = replace(rows[-1], others=(*rows[-1].others, *caught))
+    return rows
+
+
+def _run_alone(
+    asked: AskedPoints, group: PointGroup, found: dict[int, PointRow], builds: Builds
+) -> None:
+    built, left = builds.find(asked, group), group.places
+    is_new = built is None
+    if built is None:
+        built, left = _build(asked, group, found.__setitem__, silent)
+    if built is None:
+        return
+    with warnings_of_threads() as taken:
+        if is_new:
+            try:
+                asked.kind.crew(asked, built, left, 1)
+            except InputError as error:  # the memory is full at this moment
+                found.update(dict.fromkeys(left, replace(asked.failed(error), by_chance=True)))
+                return
+            taken()
+            builds.keep(asked, group, built)
+        for i in left:
+            found[i] = asked.kind.row(asked, built, i, _never, taken)
+
+
+def _never() -> None:
+    """Nothing asks this work to stop."""
+
+
+def _build(
+    asked: AskedPoints, group: PointGroup, keep: Callable[[int, PointRow], None], progress: Progress
+) -> tuple[Any, tuple[int, ...]]:
+    """Bodies and laws for the first point that the case allows, and the points that are left.
+
+    None if it allows none.  Points that cannot be computed have their rows.
+    """
+    tree = replace(asked.tree, data=with_changes(asked.tree.data, group.made))
+    for k, i in enumerate(group.places):
+        try:
+            case = case_at(type(asked.case), tree, tree, asked.points.changes(i))
+        except InputError as error:
+            keep(i, asked.failed(error))
+            continue
+        left = group.places[k:]
+        try:
+            return asked.kind.build(asked, group, tree, case, progress), left
+        except FAILURES as error:
+            for place in left:
+                keep(place, asked.failed(error))
+            return None, ()
+    return None, ()
+
+
+def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None, ...]:
+    """Sound of a click of every point, computed once more; None where there is none.
+
+    Parameters
+    ----------
+    asked : AskedPoints
+    progress : callable
+    """
+    found: list[TimeSeries | None] = [None] * len(asked.points)
+    done = 0
+    with warnings.catch_warnings(), one_thread_of_blas():
+        warnings.simplefilter("ignore")  # the points have been computed, and their doubts told
+        for group in groups_of(asked, range(len(found))):
+            built, left = _build(asked, group, lambda place, row: None, silent)
+            if built is None:
+                continue
+            for i in left:
+                progress("sounds", done / len(found))
+                with suppress(KlackError):
+                    found[i] = asked.kind.pressure(asked, built, i)
+                done += 1
+            asked.kind.close(built)
+    return tuple(found)

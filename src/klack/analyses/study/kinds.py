@@ -1,0 +1,57 @@
+"""Which kind of calculation the points of a case are."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from klack.analyses.study.asked_points import AskedPoints, PointKind
+from klack.analyses.study.impacts import IMPACTS
+from klack.analyses.study.strokes import STROKES
+from klack.case.any_case import AnyCase
+from klack.case.case_tree import CaseTree
+from klack.case.points import GivenPoints, points_of
+from klack.case.schema import Case
+
+__all__ = ["ask", "kind_of"]
+
+
+def kind_of(case: AnyCase) -> PointKind[Any, Any]:
+    """Impacts of two bodies, or strokes of a whole valve."""
+    return IMPACTS if isinstance(case, Case) else STROKES
+
+
+def ask(
+    case: AnyCase,
+    tree: CaseTree,
+    points: GivenPoints,
+    measures: Iterable[str],
+    variant: str | None,
+) -> AskedPoints:
+    """Check everything that can be known before the first run.
+
+    Parameters
+    ----------
+    case : Case or ValveCase
+    tree : CaseTree
+        The same as it was written.
+    points : sequence of mappings, or mapping of sequences
+    measures : iterable of str
+    variant : str or None
+        Of a stroke; of an impact its level.
+
+    Raises
+    ------
+    InputError
+        For a key, a unit, a measure or a variant that does not exist.
+    """
+    kind = kind_of(case)
+    chosen = kind.measures(case, measures)
+    asked = points_of(case, tree, points)
+    kind.require_keys(asked.keys)
+    return AskedPoints(
+        kind=kind,
+        case=case,
+        tree=tree,
+        points=asked,
+        chosen=chosen,
+        variant=kind.variant(case, variant),
+    )

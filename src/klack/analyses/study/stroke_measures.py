@@ -1,0 +1,97 @@
+"""Measures of a stroke by their names: of all of it, of single impacts, of its noise."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from operator import attrgetter
+
+from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.record import StrokeVariant
+from klack.analyses.stroke.summary import first_impact
+from klack.analyses.study.chosen_measures import (
+    NOISE_NAMES,
+    NOISE_WORDS,
+    ChosenMeasure,
+    PointNoise,
+    choose_measures,
+    noise_measure,
+)
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import END_STOP
+from klack.input.problem import one_of
+from klack.simulation.network_result import ImpactEvent
+
+__all__ = ["StrokeOfPoint", "stroke_measures"]
+
+_OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
+_OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokeOfPoint:
+    """Stroke of a point, and its noise.
+
+    Parameters
+    ----------
+    variant : StrokeVariant
+    noise : PointNoise
+    """
+
+    variant: StrokeVariant
+    noise: PointNoise
+
+
+def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
+    """Find measures of a stroke by their names, each once.
+
+    ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat`` that is no
+    mere tremble, see :func:`~klack.analyses.stroke.summary.first_impact`; ``"seat.2.peak_force"``
+    of the second one in the list of all impacts; ``"noise.sound_exposure_level_weighted"``.
+
+    Raises
+    ------
+    InputError
+        For a name that a stroke of this case does not have, with the nearest one; for none at all.
+    """
+    stops = [name for name, part in case.network.components.items() if part.type == END_STOP]
+    known = [
+        *_OF_VARIANTS,
+        *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS),
+        *NOISE_NAMES,
+    ]
+    return choose_measures(
+        names, lambda name: _found(name, stops), known, _known_words(stops), "opening_time"
+    )
+
+
+def _found(name: str, stops: list[str]) -> ChosenMeasure | None:
+    if name in _OF_VARIANTS:
+        return ChosenMeasure(name, _OF_VARIANTS[name], "variant", attrgetter("variant"))
+    stop, _, rest = name.partition(".")
+    *number, key = rest.split(".")
+    if stop in stops and key in _OF_IMPACTS and len(number) < 2:
+        if not number:
+            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, 0))
+        if number[0].isascii() and number[0].isdecimal() and int(number[0]) > 0:
+            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, int(number[0])))
+    return noise_measure(name)
+
+
+def _impact_on(stop: str, number: int) -> Callable[[StrokeOfPoint], ImpactEvent | None]:
+    """Impact on a stop of this number from 1; for 0 the first one that is no mere tremble."""
+
+    def impact(run: StrokeOfPoint) -> ImpactEvent | None:
+        if number:
+            return next(iter(run.variant.impacts(stop)[number - 1 :]), None)
+        return first_impact(run.variant, stop)
+
+    return impact
+
+
+def _known_words(stops: list[str]) -> str:
+    words = f"one of: {one_of(_OF_VARIANTS)}; {NOISE_WORDS}"
+    if not stops:
+        return words
+    return (
+        f"{words}; or of the first impact on a stop, {stops[0]}.KEY (of the second one "
+        f"{stops[0]}.2.KEY), with a stop of: {one_of(stops)}, and a key of: {one_of(_OF_IMPACTS)}"
+    )

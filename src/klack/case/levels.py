@@ -1,0 +1,16 @@
+"""Levels of an impact, from rigid masses to every degree of freedom."""
+
+from typing import Literal, get_args
+
+__all__ = ["LEVELS", "Level"]
+
+Level = Literal[
+    "lumped",
+    "reduced",
+    "reduced-attachment",
+    "reduced-none",
+    "reduced-participation",
+    "interface",
+    "full",
+]
+LEVELS: tuple[Level, ...] = get_args(Level)
