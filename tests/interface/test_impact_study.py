@@ -287,6 +287,20 @@ def test_optimum_keeps_its_bound_and_exports_its_case(ball, tmp_path):
     assert float(found["peak_force"]) == columns(record)["peak_force"][best]
 
 
+def test_impacts_made_after_the_case_are_counted(ball, tmp_path):
+    """Truth: the peak force rises with the speed, so that half of them are above that of today."""
+    text = """
+  parameters: {motion.speed: {from: 0.3 m/s, to: 0.6 m/s}}
+  measures: [peak_force]
+  constraints: {peak_force: {most: today}}
+  robust: {scatter: {motion.speed: 0.02 m/s}}
+"""
+    record = klack.run_study(ball, write(tmp_path, text), made=8).record
+    speed, force = columns(record, "parameters")[SPEED], columns(record)["peak_force"]
+    assert record.missed[0].missed == 4
+    assert (np.argsort(speed) == np.argsort(force)).all()
+
+
 WRONG = [
     (SPEED, "network.components.spring.preload", "there is no 'network'"),
     (SPEED, "motion.sped", "did you mean 'speed'?"),

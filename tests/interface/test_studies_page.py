@@ -19,7 +19,8 @@ QUOTED = [block for kind, block in BLOCKS if not kind and "klack " not in block]
 
 def test_the_study_of_the_page_is_the_file_beside_it():
     """All but what the last step of the page adds."""
-    shown, added, robust = (block for kind, block in BLOCKS if kind == "yaml")
+    shown, added, robust, impact = (block for kind, block in BLOCKS if kind == "yaml")
+    assert impact == FILE.with_name("impact_study.yaml").read_text(encoding="utf-8")
     assert robust in ROBUST.read_text(encoding="utf-8")
     left = FILE.read_text(encoding="utf-8")
     for line in (shown + added).splitlines():
@@ -45,6 +46,14 @@ def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place
     kept = [] if command == "sensitivities" else ["--out", str(tmp_path / "out"), "--no-report"]
     assert main([command, case, "--study", str(file), *kept]) == 0
     compare(QUOTED[place], capsys.readouterr().out, f"studies.md, block {place}")
+
+
+@pytest.mark.slow
+def test_a_study_of_impacts_prints_what_the_page_shows(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    study = ["--study", "docs/how-to/impact_study.yaml", "--no-report", "--out", str(tmp_path)]
+    assert main(["study", "demo-valve-axisymmetric", *study]) == 0
+    compare(QUOTED[6], capsys.readouterr().out, "studies.md, impacts")
 
 
 @pytest.mark.slow

@@ -135,9 +135,8 @@ def rate_text(record: StudyRecord) -> str:
     parts = [f"{record.computed} points computed now"]
     if record.computed and record.point_time > 0.0:
         rate = 3600.0 * record.computed / record.point_time
-        parts[0] += (
-            f" in {format_si(record.point_time, 's', 3)} on {record.threads} {record.workers}"
-        )
+        crew = f"{record.threads} {record.workers}" if record.threads > 1 else "one core"
+        parts[0] += f" in {format_si(record.point_time, 's', 3)} on {crew}"
         parts.append(f"{rate:.3g} in an hour")
     if record.kept:
         parts.append(f"{record.kept} were there")
