@@ -28,7 +28,7 @@ from klack.progress import Progress
 from klack.simulation.impact import simulate_impact
 from klack.stages import StageClock, collected_warnings
 
-__all__ = ["run_given_impact"]
+__all__ = ["require_given_levels", "run_given_impact"]
 
 _POINTS = 50
 
@@ -53,7 +53,7 @@ def run_given_impact(
         For other levels, and for models that cannot be used.
     """
     begin = perf_counter()
-    wanted = _checked(case, levels)
+    wanted = require_given_levels(case, levels)
     clock = StageClock(progress, result_cache())
     attempts = Attempts()
     with collected_warnings() as notes:
@@ -96,7 +96,13 @@ def run_given_impact(
     return study
 
 
-def _checked(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
+def require_given_levels(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
+    """Check that bodies without surfaces can run the levels; return them without repetition.
+
+    Raises
+    ------
+    InputError
+    """
     wanted = case.require_levels(levels)
     for level in wanted:
         if level not in GIVEN_LEVELS:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.given_models import require_given_levels
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bodies, run_impact
 from klack.analyses.impact.summary import no_estimate
@@ -15,7 +16,7 @@ from klack.analyses.noise.source import impact_sources
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.impact_measures import ImpactOfPoint, impact_measures
-from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.point_row import PointRow, doubts_in, others_in
 from klack.analyses.threads import Stopped
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at
@@ -66,7 +67,10 @@ class _Impacts:
 
     def variant(self, case: Case, name: str | None) -> str:
         """The level ``reduced`` by default."""
-        return case.require_levels([name or "reduced"])[0]
+        (level,) = case.require_levels([name or "reduced"])
+        if not case.has_surfaces:
+            require_given_levels(case, [level])
+        return level
 
     def measures(self, case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
         """Of a level, and of its noise."""
@@ -145,13 +149,14 @@ class _Impacts:
         except Stopped:
             raise
         except Exception as error:  # one point less, as the caller says
-            return replace(asked.failed(error), others=tuple(taken()))
+            return replace(asked.failed(error), others=others_in(taken()))
+        caught = taken()
         notes = [*study.warnings, contact_doubt(study.contact), no_estimate(study)]
-        notes += [_other_answer(study, asked.variant), *run.noise.notes]
+        notes += [_other_answer(study, asked.variant), *run.noise.notes, *doubts_in(caught)]
         return PointRow(
             values,
             notes=tuple(dict.fromkeys(filter(None, notes))),
-            others=tuple(taken()),
+            others=others_in(caught),
             model=_model(study, asked.variant),
         )
 

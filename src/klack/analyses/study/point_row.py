@@ -1,9 +1,12 @@
 """What one point of a study leaves behind."""
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-__all__ = ["PointRow"]
+from klack.errors import AccuracyWarning
+
+__all__ = ["PointRow", "doubts_in", "others_in"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,3 +41,15 @@ class PointRow:
     def numbers(self) -> tuple[float, ...]:
         """Values with nan where there is none."""
         return tuple(float("nan") if value is None else value for value in self.values)
+
+
+def doubts_in(caught: Iterable[warnings.WarningMessage]) -> tuple[str, ...]:
+    """Warnings that are doubts about numbers, as text."""
+    return tuple(str(item.message) for item in caught if issubclass(item.category, AccuracyWarning))
+
+
+def others_in(
+    caught: Iterable[warnings.WarningMessage],
+) -> tuple[warnings.WarningMessage, ...]:
+    """Warnings that are no doubt about a number, to be shown as usual."""
+    return tuple(item for item in caught if not issubclass(item.category, AccuracyWarning))

@@ -3,7 +3,6 @@
 The time loop runs outside of the interpreter, so that threads share meshes, modes and laws.
 """
 
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -22,7 +21,7 @@ from klack.analyses.stroke.run import (
 )
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.point_row import PointRow, doubts_in, others_in
 from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
 from klack.analyses.threads import Stopped
 from klack.assembling.body_summary import BodySummary
@@ -34,7 +33,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
 from klack.case.variants import Variant
 from klack.cores import available_cores
-from klack.errors import AccuracyWarning, InputError, KlackError
+from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.memory import require_memory
 from klack.progress import Progress, silent
@@ -224,18 +223,15 @@ class _Strokes:
         except Stopped:
             raise
         except BaseException as error:  # a component of the user's own may raise anything
-            return replace(asked.failed(error), others=_others(taken()))
+            return replace(asked.failed(error), others=others_in(taken()))
         caught = taken()
         result = whole.variant.result
-        doubts = [
-            str(item.message) for item in caught if issubclass(item.category, AccuracyWarning)
-        ]
         begun = result.start.notes if result.start is not None else ()
         rest = rest_note(whole.variant.name, result, roles.seat)
-        notes = [*built.notes, *doubts, *whole.noise.notes]
+        notes = [*built.notes, *doubts_in(caught), *whole.noise.notes]
         notes += [note for note in begun if not any(note in other for other in notes)]
         notes += [rest] if rest else []
-        return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=_others(caught))
+        return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=others_in(caught))
 
     def pressure(
         self, asked: AskedPoints[ValveCase], built: _Built, place: int
@@ -284,8 +280,3 @@ def _noise_source(
     runs: dict[Variant, VariantRun] = {valve.case.one_variant(asked.variant): run}
     study = stroke_study(valve, roles, runs, made, bodies=built.bodies, stops=built.stops)
     return stroke_sources(study, case=valve.case)[0]
-
-
-def _others(caught: Iterable[warnings.WarningMessage]) -> tuple[warnings.WarningMessage, ...]:
-    """Warnings that are no doubt about a number, to be shown as usual."""
-    return tuple(item for item in caught if not issubclass(item.category, AccuracyWarning))
