@@ -11,9 +11,10 @@ from scipy.special import ndtr, ndtri
 
 from klack.studies.designs import even_levels
 
-__all__ = ["Listed", "Normal", "Range", "Spread"]
+__all__ = ["CUT", "Listed", "Normal", "Range", "Spread"]
 
-_CUT = 5.0  # standard deviations
+CUT = 5.0
+"""Standard deviations at which a normal distribution is cut off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +57,12 @@ class Normal:
 
     def at(self, share: float) -> float:
         """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
-        below = float(ndtr(-_CUT))
+        below = float(ndtr(-CUT))
         return self.mean + self.deviation * float(ndtri(below + share * (1.0 - 2.0 * below)))
 
     def share(self, value: float) -> float:
         """Probability below a value; 0 and 1 where the distribution is cut off."""
-        below = float(ndtr(-_CUT))
+        below = float(ndtr(-CUT))
         part = (float(ndtr((value - self.mean) / self.deviation)) - below) / (1.0 - 2.0 * below)
         return min(max(part, 0.0), 1.0)
 

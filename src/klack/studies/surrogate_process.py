@@ -1,0 +1,212 @@
+"""Gaussian process: a random function with the covariance of near points, given the values.
+
+Sources: C. E. Rasmussen and C. K. I. Williams (2006), Gaussian Processes for Machine Learning,
+chapters 2 and 5; J. E. Oakley and A. O'Hagan (2004), J. R. Statist. Soc. B 66, 751-769, for the
+shares of the variance; O. Dubrule (1983), Mathematical Geology 15, 687-699, for leaving out points.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from klack.studies.surrogate_axis import SurrogateAxis
+from klack.studies.surrogate_library import require_scikit_learn
+from klack.studies.surrogate_model import Shares
+
+__all__ = ["ProcessFit", "ProcessModel"]
+
+Floats = NDArray[np.float64]
+
+_LENGTHS = (0.15, 300.0)
+"""Bounds of a length of correlation, in standard deviations of its parameter."""
+_NOISE = (1e-8, 1.0)
+"""Bounds of the variance of noise, of the variance of the values."""
+_SIZES = (1e-3, 1e5)
+_STARTS = (1.7, 6.0)
+"""Lengths that the search for the largest likelihood starts from."""
+_LEAST_NOISE = 1e-8
+"""Of the process: with less, weights cancel to less than four digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """Covariance of the values at two points, up to a factor.
+
+    ``exp(-sum over columns of (x - x')^2 / (2 length^2)) + (noise if both are the same point)``
+
+    Parameters
+    ----------
+    lengths : array (columns)
+        Of all parameters, see :meth:`SurrogateAxis.columns`.
+    noise : float
+        What no smooth function explains, such as that of late bounces.
+    """
+
+    lengths: Floats
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProcessModel:
+    """Mean of a Gaussian process: m(t) = mean + sum over points of weight * covariance.
+
+    Parameters
+    ----------
+    axes : tuple of SurrogateAxis
+    columns : tuple of array (points, columns)
+        Of the points that it was fitted to, for each parameter.
+    lengths : tuple of array (columns)
+        For each parameter.
+    mean : float
+    weights : array (points)
+    noise : float
+        Variance of noise, of that of the process.
+    """
+
+    axes: tuple[SurrogateAxis, ...]
+    columns: tuple[Floats, ...]
+    lengths: tuple[Floats, ...]
+    mean: float
+    weights: Floats
+    noise: float
+
+    def predict(self, t: Floats) -> Floats:
+        """Values (points) at coordinates (points, parameters)."""
+        factors = (self._factor(k, t[:, k]) for k in range(len(self.axes)))
+        return self.mean + _product(factors) @ self.weights
+
+    def main_effect(self, parameter: int, t: Floats) -> Floats:
+        """Mean over all other parameters where one has the coordinates t, shape of t."""
+        means = self._means()
+        means[parameter] = 1.0
+        return self.mean + self._factor(parameter, t) @ (self.weights * np.prod(means, axis=0))
+
+    def shares(self) -> Shares:
+        """Parts of its variance: the covariance is a product over parameters, means are sums."""
+        means, axes = self._means(), range(len(self.axes))
+        squares = [self._squares(k) for k in axes]
+        rest = _product(squares)
+        centre = float(self.weights @ np.prod(means, axis=0))
+        first, total = np.empty(len(axes)), np.empty(len(axes))
+        for k in axes:
+            effect = self.main_effect(k, self.axes[k].nodes) - self.mean - centre
+            first[k] = self.axes[k].weights @ effect**2
+            others = _product(squares[:k] + squares[k + 1 :]) if len(axes) > 1 else 1.0
+            alone = squares[k] - np.outer(means[k], means[k])
+            total[k] = self.weights @ (alone * others) @ self.weights
+        variance = float(self.weights @ rest @ self.weights - centre**2)
+        return Shares(variance, first, total)
+
+    @property
+    def made_of(self) -> str:
+        """Its noise, in words."""
+        return f"{len(self.weights)} covariances, noise {self.noise:.1g} of the variance"
+
+    def _factor(self, k: int, t: Floats) -> Floats:
+        return _factor(self.axes[k].columns(t), self.columns[k], self.lengths[k])
+
+    def _means(self) -> Floats:
+        """Means of the factors over their parameter, shape (parameters, points)."""
+        return np.array(
+            [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
+        )
+
+    def _squares(self, k: int) -> Floats:
+        """Means of the products of two factors, shape (points, points)."""
+        own = self._factor(k, self.axes[k].nodes)
+        return own.T @ (self.axes[k].weights[:, None] * own)
+
+
+class ProcessFit:
+    """Gaussian process of points: its lengths of correlation and noise by maximum likelihood.
+
+    The mean is constant and unknown (ordinary kriging).
+
+    Parameters
+    ----------
+    axes : sequence of SurrogateAxis
+    t : array (points, parameters)
+        Coordinates.
+    """
+
+    def __init__(self, axes: Sequence[SurrogateAxis], t: Floats) -> None:
+        self._axes = tuple(axes)
+        self._columns = tuple(axis.columns(t[:, k]) for k, axis in enumerate(self._axes))
+
+    def choose(self, y: Floats, rows: NDArray[np.int64]) -> Covariance:
+        """Covariance that makes the values of these rows most likely, by scikit-learn.
+
+        Raises
+        ------
+        MissingExtraError
+        """
+        require_scikit_learn()
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+        x = np.hstack(self._columns)[rows]
+        own = (y[rows] - np.mean(y[rows])) / np.std(y[rows])
+        best = None
+        with warnings.catch_warnings():  # a bound that is reached is no fault
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            for length in _STARTS:
+                near = RBF(np.full(x.shape[1], length), _LENGTHS)
+                start = ConstantKernel(1.0, _SIZES) * near + WhiteKernel(1e-4, _NOISE)
+                tried = GaussianProcessRegressor(start, alpha=0.0, random_state=0).fit(x, own)
+                if best is None or tried.log_marginal_likelihood_value_ > best[0]:
+                    best = tried.log_marginal_likelihood_value_, tried.kernel_
+        assert best is not None
+        near, noise = best[1].k1, best[1].k2
+        ratio = noise.noise_level / near.k1.constant_value
+        return Covariance(np.atleast_1d(near.k2.length_scale), max(ratio, _LEAST_NOISE))
+
+    def residuals(self, y: Floats, chosen: Covariance) -> Floats:
+        """Each value minus its prediction from all other values with the same covariance.
+
+        With the covariance matrix K and ``P = K^-1 - K^-1 1 (1' K^-1 1)^-1 1' K^-1``, which is the
+        inverse with an unknown mean, ``e_i = (P y)_i / P_ii`` (Dubrule 1983).
+        """
+        inverse = cho_solve(self._decomposed(chosen), np.eye(len(y)))
+        sums = np.sum(inverse, axis=1)
+        projected = inverse - np.outer(sums, sums) / np.sum(sums)
+        return (projected @ y) / np.diag(projected)
+
+    def model(self, y: Floats, chosen: Covariance) -> ProcessModel:
+        """Process with this covariance, given all values."""
+        decomposed = self._decomposed(chosen)
+        ones = cho_solve(decomposed, np.ones(len(y)))
+        mean = float(ones @ y / np.sum(ones))
+        weights = cho_solve(decomposed, y - mean)
+        return ProcessModel(
+            self._axes, self._columns, self._lengths(chosen), mean, weights, chosen.noise
+        )
+
+    def _decomposed(self, chosen: Covariance) -> tuple[Floats, bool]:
+        pairs = zip(self._columns, self._lengths(chosen), strict=True)
+        matrix = _product(_factor(own, own, lengths) for own, lengths in pairs)
+        matrix[np.diag_indices_from(matrix)] += chosen.noise
+        return cho_factor(matrix, lower=True)
+
+    def _lengths(self, chosen: Covariance) -> tuple[Floats, ...]:
+        ends = np.cumsum([own.shape[1] for own in self._columns])
+        return tuple(np.split(chosen.lengths, ends[:-1]))
+
+
+def _factor(a: Floats, b: Floats, lengths: Floats) -> Floats:
+    """Factor (a, b) of the covariance that one parameter gives."""
+    apart = (a[:, None, :] - b[None, :, :]) / lengths
+    return np.exp(-0.5 * np.sum(apart**2, axis=2))
+
+
+def _product(factors: Any) -> Floats:
+    found: Floats | None = None
+    for own in factors:
+        found = own if found is None else found * own
+    assert found is not None
+    return found
