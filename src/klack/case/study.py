@@ -20,6 +20,7 @@ __all__ = [
     "StudyParameter",
     "StudyRobust",
     "StudySearch",
+    "StudySurrogate",
     "Written",
 ]
 
@@ -192,6 +193,16 @@ class StudyRobust(Section):
     seed: Count = Field(default=1, description="Of the random numbers.")
 
 
+class StudySurrogate(Section):
+    """Function fitted to each measure of klack study: shares of the variance, main effects."""
+
+    kind: Literal["polynomial-chaos", "gaussian-process"] = Field(
+        description="polynomial-chaos: polynomials of all parameters, up to 10 000 points; "
+        "gaussian-process: from the covariance of near points, up to 500 points. For the designs "
+        "sobol, latin-hypercube, made and file.",
+    )
+
+
 class CaseStudy(Section):
     """Parameters that vary, what follows from them, and what is computed at every point."""
 
@@ -219,6 +230,11 @@ class CaseStudy(Section):
         default_factory=dict, description="Measures and the bounds that a design has to keep."
     )
     search: StudySearch = Field(default=StudySearch(), description="Of klack optimise.")
+    surrogate: StudySurrogate | None = Field(
+        default=None,
+        description="Of klack study: what each measure follows, from the points of one design, "
+        "with its leave-one-out error.",
+    )
     robust: StudyRobust | None = Field(
         default=None,
         description="Scatter of made valves; with it klack optimise compares designs by what these "

@@ -153,7 +153,7 @@ def fit_surrogate(
     error, largest = float(np.sqrt(np.mean(own**2))), float(np.max(np.abs(own)))
     found = (*counts, predictivity, unit * error, unit * largest, residuals)
     if not predictivity >= GOOD:
-        return Surrogate(*found, f"Q2 is below {GOOD:g}: it does not predict the measure")
+        return Surrogate(*found, f"Q2 is below {GOOD:g}; more points or narrower ranges may help")
     shares = fit.model(scaled, chosen).shares()
     return Surrogate(
         *found,

@@ -87,20 +87,26 @@ class ProcessModel:
         return self.mean + self._factor(parameter, t) @ (self.weights * np.prod(means, axis=0))
 
     def shares(self) -> Shares:
-        """Parts of its variance: the covariance is a product over parameters, means are sums."""
-        means, axes = self._means(), range(len(self.axes))
-        squares = [self._squares(k) for k in axes]
-        rest = _product(squares)
-        centre = float(self.weights @ np.prod(means, axis=0))
+        """Parts of its variance: the covariance is a product over parameters, means are sums.
+
+        Weights of neighbours are large and of both signs.  Sums over pairs of points are taken in
+        extended precision, where the processor has it; in double precision they cancel to three
+        digits.
+        """
+        axes = range(len(self.axes))
+        fine = [self._moments(k) for k in axes]
+        means, squares = [mean for mean, _ in fine], [square for _, square in fine]
+        weights = self.weights.astype(np.longdouble)
+        centre = weights @ np.prod(means, axis=0)
         first, total = np.empty(len(axes)), np.empty(len(axes))
         for k in axes:
-            effect = self.main_effect(k, self.axes[k].nodes) - self.mean - centre
+            effect = self.main_effect(k, self.axes[k].nodes) - self.mean - float(centre)
             first[k] = self.axes[k].weights @ effect**2
-            others = _product(squares[:k] + squares[k + 1 :]) if len(axes) > 1 else 1.0
             alone = squares[k] - np.outer(means[k], means[k])
-            total[k] = self.weights @ (alone * others) @ self.weights
-        variance = float(self.weights @ rest @ self.weights - centre**2)
-        return Shares(variance, first, total)
+            both = _product((alone, *squares[:k], *squares[k + 1 :]))
+            total[k] = weights @ both @ weights
+        variance = float(weights @ _product(squares) @ weights - centre**2)
+        return Shares(variance, first, np.maximum(total, first))
 
     @property
     def made_of(self) -> str:
@@ -116,10 +122,14 @@ class ProcessModel:
             [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
         )
 
-    def _squares(self, k: int) -> Floats:
-        """Means of the products of two factors, shape (points, points)."""
-        own = self._factor(k, self.axes[k].nodes)
-        return own.T @ (self.axes[k].weights[:, None] * own)
+    def _moments(self, k: int) -> tuple[Any, Any]:
+        """Means (points) and products (points, points) of the factors, in extended precision."""
+        axis = self.axes[k]
+        at: Any = axis.columns(axis.nodes).astype(np.longdouble)
+        own: Any = self.columns[k].astype(np.longdouble)
+        factor = _factor(at, own, self.lengths[k])
+        mass = axis.weights.astype(np.longdouble)
+        return mass @ factor, factor.T @ (mass[:, None] * factor)
 
 
 class ProcessFit:

@@ -8,14 +8,18 @@ from klack.analyses.sample import rank_correlation
 from klack.analyses.study.figures import (
     effect_bars,
     front_charts,
+    main_effect_charts,
     parallel_chart,
     scatter_chart,
     sensitivity_bars,
+    surrogate_bars,
 )
-from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord
+from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord, StudySurrogate
 from klack.analyses.study.wording import (
     EFFECT_COLUMNS,
     MISSED_COLUMNS,
+    SHARE_COLUMNS,
+    SURROGATE_COLUMNS,
     change,
     effect_cells,
     index_cells,
@@ -24,6 +28,7 @@ from klack.analyses.study.wording import (
     on_page,
     rate_text,
     short_labels,
+    surrogate_cells,
     variant_words,
 )
 from klack.report.page import Content, Section, Sound, Table
@@ -70,6 +75,7 @@ def study_content(record: StudyRecord) -> Content:
         _missed_section(record),
         _screening_section(record, labels),
         _sensitivity_section(record, labels),
+        *_surrogate_sections(record, labels),
         Section(title="Parameters", tables=(_parameter_table(record),)),
         Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
     ]
@@ -294,7 +300,7 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
         for item in known
         for k, name in enumerate(item.parameters)
     ]
-    heads = ("measure", "parameter", "alone", "", "with interactions", "")
+    heads = ("measure", "parameter", *SHARE_COLUMNS)
     told = [
         f"{labels[item.measure]}: {item.reason}." for item in record.sensitivities if item.reason
     ]
@@ -315,6 +321,79 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
         charts=tuple(sensitivity_bars(item, labels) for item in known),
         tables=(Table(columns=heads, rows=tuple(rows)),) if rows else (),
     )
+
+
+def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
+    """How well surrogates predict, and what follows from those that do; none without them."""
+    if not record.surrogates:
+        return ()
+    own = {item.name: item for item in record.measures}
+    used = [item for item in record.surrogates if not item.reason]
+    told = [
+        "Each point is predicted from the others. Q2 is 1 for a perfect prediction and 0 for one "
+        "that is no better than the mean of all points; errors are in the unit of the measure.",
+        "No computed point is replaced: tables, bounds and fronts are of computed points alone.",
+        *(
+            f"Nothing is derived from that of {labels[item.measure]}: {item.reason}."
+            for item in record.surrogates
+            if item.reason
+        ),
+    ]
+    found = [
+        Section(
+            title="Surrogates: what they predict",
+            paragraphs=tuple(told),
+            tables=(
+                Table(
+                    columns=SURROGATE_COLUMNS,
+                    rows=tuple(
+                        (
+                            labels[item.measure],
+                            *surrogate_cells(own[item.measure], item, on_page),
+                        )
+                        for item in record.surrogates
+                    ),
+                ),
+            ),
+        )
+    ]
+    if used:
+        heads = ("measure", "parameter", *SHARE_COLUMNS)
+        rows = tuple(
+            (labels[item.measure], labels[name], *index_cells(item, k))
+            for item in used
+            for k, name in enumerate(item.parameters)
+        )
+        found.append(
+            Section(
+                title="Surrogates: which parameter causes the scatter",
+                charts=tuple(surrogate_bars(item, labels) for item in used),
+                tables=(Table(columns=heads, rows=rows),),
+            )
+        )
+        found.append(
+            Section(
+                title="Surrogates: main effects",
+                charts=tuple(
+                    chart for item in used for chart in main_effect_charts(record, item, labels)
+                ),
+                tables=_word_effects(own, used, labels),
+            )
+        )
+    return tuple(found)
+
+
+def _word_effects(
+    own: dict[str, StudyColumn], used: list[StudySurrogate], labels: dict[str, str]
+) -> tuple[Table, ...]:
+    """Main effects of parameters that are words."""
+    rows = tuple(
+        (labels[item.measure], labels[of.parameter], word, on_page(own[item.measure], float(mean)))
+        for item in used
+        for of in item.effects
+        for word, mean in zip(of.words, of.mean, strict=False)
+    )
+    return (Table(columns=("measure", "parameter", "value", "mean"), rows=rows),) if rows else ()
 
 
 def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
@@ -374,6 +453,18 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "once it is known while all others are free. The difference is what it does together with "
         "others. Intervals hold 95 %, by drawing base points again.",
     ),
+    (
+        "surrogate",
+        "A function of the parameters, fitted to the computed points of one measure: polynomial "
+        "chaos (Blatman and Sudret 2011) or Gaussian process (Rasmussen and Williams 2006). Its "
+        "leave-one-out error is that of each point, predicted by a fit to all others. Below Q2 = "
+        "0.9, or with too few points, nothing is derived from it. Intervals of its shares are the "
+        "largest change that an error of this root mean square can make.",
+    ),
+    (
+        "main effect",
+        "Mean of the surrogate over the distributions of all parameters but one.",
+    ),
 )
 
 _OF_STROKES = (
@@ -390,6 +481,6 @@ _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "Points",
         "Between the points nothing was computed: a minimum of the table is the best of these "
-        "points, not of the range.",
+        "points, not of the range. A surrogate estimates there, with its error.",
     ),
 )

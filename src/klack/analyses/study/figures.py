@@ -12,6 +12,8 @@ from klack.analyses.study.record import (
     Sensitivity,
     StudyColumn,
     StudyRecord,
+    StudySurrogate,
+    SurrogateEffect,
 )
 from klack.analyses.study.wording import largest_first, shown_unit
 from klack.report.chart import (
@@ -28,10 +30,21 @@ from klack.report.chart import (
 )
 from klack.report.wording import printed_unit
 
-__all__ = ["effect_bars", "front_charts", "parallel_chart", "scatter_chart", "sensitivity_bars"]
+__all__ = [
+    "effect_bars",
+    "front_charts",
+    "main_effect_charts",
+    "parallel_chart",
+    "scatter_chart",
+    "sensitivity_bars",
+    "surrogate_bars",
+]
 
 _MOST_LINES = 4000
 """More lines hide each other and cost bytes."""
+_MOST_EFFECTS = 3
+"""Main effects that are drawn of one measure."""
+_LEAST_SHARE = 0.01
 _MARGIN = 0.05
 """Of the range of an axis, free at its ends."""
 
@@ -196,13 +209,26 @@ def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]
 
 
 def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
-    """Shares of the variance of a measure, the largest first."""
+    """Shares of the variance of a measure from base points, the largest first."""
+    note = f"From {item.rows} base points; the table has the intervals."
+    return _share_bars(item, f"sensitivity-{item.measure}", note, labels)
+
+
+def surrogate_bars(item: StudySurrogate, labels: Mapping[str, str]) -> BarChart:
+    """Shares of the variance of a surrogate, the largest first."""
+    note = f"By a surrogate of {item.points} points; the table has what its error can change."
+    return _share_bars(item, f"surrogate-{item.measure}", note, labels)
+
+
+def _share_bars(
+    item: Sensitivity | StudySurrogate, name: str, note: str, labels: Mapping[str, str]
+) -> BarChart:
     order = np.argsort(-np.nan_to_num(item.total))
     alone = np.clip(np.nan_to_num(item.first[order]), 0.0, None)
     total = np.clip(np.nan_to_num(item.total[order]), 0.0, None)
     alone = np.minimum(alone, total)
     return BarChart(
-        name=f"sensitivity-{item.measure}",
+        name=name,
         title=f"Variance of {labels[item.measure]}",
         x=AxisSpec(label="share of the variance", unit="%"),
         rows=tuple(labels[item.parameters[k]] for k in order),
@@ -215,7 +241,54 @@ def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
                 hatch="/",
             ),
         ),
-        note=f"From {item.rows} base points; the table has the intervals.",
+        note=note,
+    )
+
+
+def main_effect_charts(
+    record: StudyRecord, item: StudySurrogate, labels: Mapping[str, str]
+) -> tuple[Chart, ...]:
+    """Main effects of the parameters that a measure follows most, with the computed points."""
+    own = {of.name: of for of in (*record.parameters, *record.measures)}
+    order = np.argsort(-item.total, kind="stable")
+    shown = [item.effects[k] for k in order if item.total[k] >= _LEAST_SHARE]
+    numbers = [of for of in shown if not of.words][:_MOST_EFFECTS]
+    return tuple(_main_effect(own[item.measure], own[of.parameter], of, labels) for of in numbers)
+
+
+def _main_effect(
+    measure: StudyColumn,
+    parameter: StudyColumn,
+    effect: SurrogateEffect,
+    labels: Mapping[str, str],
+) -> Chart:
+    x, x_factor = _axis(parameter, labels)
+    y, y_factor = _axis(measure, labels)
+    curves = (
+        Curve(
+            x=x_factor * parameter.values,
+            y=y_factor * measure.values,
+            label="computed points",
+            colour="sky",
+            width=1.4,
+            drawn="points",
+            names=tuple(f"point {i}" for i in range(parameter.values.size)),
+        ),
+        Curve(
+            x=x_factor * effect.at,
+            y=y_factor * effect.mean,
+            label="surrogate, mean over all other parameters",
+            colour="red",
+            width=2.2,
+        ),
+    )
+    return Chart(
+        name=f"effect-{measure.name}-{parameter.name}",
+        title=f"{labels[measure.name]} over {labels[parameter.name]}: main effect",
+        x=x,
+        panels=(Panel(y=y, curves=curves),),
+        note="Dots: computed points, which scatter by what the other parameters do. Line: mean of "
+        "the surrogate over the other parameters.",
     )
 
 

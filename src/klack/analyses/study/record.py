@@ -16,6 +16,8 @@ __all__ = [
     "Sensitivity",
     "StudyColumn",
     "StudyRecord",
+    "StudySurrogate",
+    "SurrogateEffect",
 ]
 
 Column = NDArray[np.float64]
@@ -124,6 +126,76 @@ class Screening:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SurrogateEffect:
+    """Mean of a surrogate over all parameters but one.
+
+    Parameters
+    ----------
+    parameter : str
+    at : array [SI]
+        Values of the parameter; of words, which of them.
+    words : tuple of str
+        That ``at`` counts.
+    mean : array, as ``at`` [unit of the measure]
+    """
+
+    parameter: str
+    at: Column
+    words: tuple[str, ...]
+    mean: Column
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudySurrogate:
+    """Surrogate of one measure over all points: its leave-one-out error, and what follows from it.
+
+    Parameters
+    ----------
+    measure : str
+    kind : str
+    made_of : str
+        In words.
+    points, failed, repeated : int
+        Different points with a value, which it was fitted to; points without a value; points that
+        repeat another one.
+    predictivity : float
+        Q2 of the points, each predicted from the others.
+    error, largest : float [unit of the measure]
+        Root mean square and largest of the leave-one-out residuals.
+    residuals : array, shape (points of the study,)
+        Value minus prediction from the other points; nan where there is none.
+    reason : str
+        Why nothing follows from it; empty if something does.
+    parameters : tuple of str
+    first, first_low, first_high, total, total_low, total_high : array, shape (parameters,)
+        Shares of the variance as of :class:`Sensitivity`, with the largest change that the error
+        can make in them; nan with a reason.
+    effects : tuple of SurrogateEffect
+        Of each parameter; empty with a reason.
+    """
+
+    measure: str
+    kind: str
+    made_of: str
+    points: int
+    failed: int
+    repeated: int
+    predictivity: float
+    error: float
+    largest: float
+    residuals: Column
+    reason: str
+    parameters: tuple[str, ...]
+    first: Column
+    first_low: Column
+    first_high: Column
+    total: Column
+    total_low: Column
+    total_high: Column
+    effects: tuple[SurrogateEffect, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
     """What a search among the points of a study has found.
 
@@ -229,6 +301,8 @@ class StudyRecord(CaseRecord):
         Of each measure, from the design of Saltelli.
     screenings : tuple of Screening
         Of each measure, from the trajectories of Morris.
+    surrogates : tuple of StudySurrogate
+        Of each measure, if asked for.
     optimum : Optimum or None
         Of ``klack optimise``.
     missed : tuple of MissedBound
@@ -254,6 +328,7 @@ class StudyRecord(CaseRecord):
     notes: tuple[str, ...]
     sensitivities: tuple[Sensitivity, ...] = ()
     screenings: tuple[Screening, ...] = ()
+    surrogates: tuple[StudySurrogate, ...] = ()
     optimum: Optimum | None = None
     missed: tuple[MissedBound, ...] = ()
     sounds: tuple[PointSound, ...] = ()

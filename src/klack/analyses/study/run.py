@@ -20,6 +20,11 @@ from klack.analyses.study.record import StudyRecord
 from klack.analyses.study.robustness import missed_bounds
 from klack.analyses.study.scatter import made_space
 from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
+from klack.analyses.study.surrogates import (
+    require_surrogates,
+    surrogate_warnings,
+    surrogates_of,
+)
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
@@ -51,6 +56,7 @@ def asked_points(
         space = made_space(case, source, space)
         names = (*names, *study.objectives)
     points = points_in(source, space)
+    require_surrogates(source, points)
     # the last one is the case as it is, to compare with
     written = [*map(points.space.written, points.values), {}]
     return points, asked_of(case, tree, source, written, names)
@@ -110,6 +116,8 @@ def run_study(
     bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
     columns = measure_columns(asked, found, today)
     varied = [item.name for item in points.space.varied]
+    wanted = source.study.surrogate
+    surrogates = surrogates_of(wanted.kind, points, columns, clock) if wanted else ()
     return StudyRecord(
         **case_fields(case),
         **run_fields(begin, clock),
@@ -126,6 +134,7 @@ def run_study(
             if source.study.design.kind == "morris" and points.cube is not None
             else ()
         ),
+        surrogates=surrogates,
         missed=(
             missed_bounds(
                 bounds,
@@ -140,6 +149,7 @@ def run_study(
             *_bounds_by_today(source),
             *notes,
             *row_warnings(found, today, columns),
+            *surrogate_warnings(surrogates),
         ),
     )
 

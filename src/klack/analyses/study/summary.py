@@ -16,10 +16,14 @@ from klack.analyses.study.record import (
     Sensitivity,
     StudyColumn,
     StudyRecord,
+    StudySurrogate,
+    SurrogateEffect,
 )
 from klack.analyses.study.wording import (
     EFFECT_COLUMNS,
     MISSED_COLUMNS,
+    SHARE_COLUMNS,
+    SURROGATE_COLUMNS,
     change,
     effect_cells,
     in_words,
@@ -27,6 +31,7 @@ from klack.analyses.study.wording import (
     largest_first,
     missed_cells,
     rate_text,
+    surrogate_cells,
     variant_words,
 )
 from klack.terminal.tables import TextTable
@@ -62,6 +67,35 @@ class EffectJson(TypedDict):
     mean: Annotated[Real, Field(description="Mean with their signs, mu.")]
     scatter: Annotated[Real, Field(description="Standard deviation, sigma.")]
     effects: Annotated[int, Field(description="How many.")]
+
+
+class SurrogateEffectJson(TypedDict):
+    """Mean of a surrogate over all parameters but one."""
+
+    at: Annotated[list[Real | str], Field(description="Values of the parameter, SI, or words.")]
+    mean: Annotated[list[Real], Field(description="In the unit of the measure.")]
+
+
+class SurrogateJson(TypedDict):
+    """Function fitted to the points of a measure; no computed value is replaced by it."""
+
+    kind: str
+    made_of: str
+    points: Annotated[int, Field(description="Different points that it was fitted to.")]
+    failed: Annotated[int, Field(description="Points without a value, left out.")]
+    repeated: Annotated[int, Field(description="Points that repeat another one, left out.")]
+    predictivity: Annotated[Real, Field(description="Q2, each point predicted from the others.")]
+    error: Annotated[Real, Field(description="Root mean square of the leave-one-out residuals.")]
+    largest_error: Annotated[Real, Field(description="The largest of them, without sign.")]
+    residuals: Annotated[
+        list[Real], Field(description="Value minus prediction from the other points.")
+    ]
+    reason: Annotated[str, Field(description="Why nothing follows from it; empty if it does.")]
+    shares: Annotated[
+        dict[str, IndexJson],
+        Field(description="Sobol's indices, and how far the error can move them."),
+    ]
+    effects: Annotated[dict[str, SurrogateEffectJson], Field(description="By parameter.")]
 
 
 class MissedBoundJson(TypedDict):
@@ -111,6 +145,7 @@ class StudyJson(TypedDict):
         dict[str, dict[str, EffectJson]],
         Field(description="Elementary effects by measure and parameter, of Morris's design."),
     ]
+    surrogates: Annotated[dict[str, SurrogateJson], Field(description="By measure.")]
     missed_bounds: Annotated[
         list[MissedBoundJson], Field(description="Of drawn points, for each bound.")
     ]
@@ -147,6 +182,7 @@ def study_to_json(record: StudyRecord) -> StudyJson:
             item.measure: {name: _effects(item, k) for k, name in enumerate(item.parameters)}
             for item in record.screenings
         },
+        "surrogates": {item.measure: _surrogate(item) for item in record.surrogates},
         "missed_bounds": [_missed(item) for item in record.missed],
         "optimum": None if record.optimum is None else _optimum(record.optimum),
         "failures": list(record.failures),
@@ -195,7 +231,33 @@ def _optimum(found: Optimum) -> OptimumJson:
     }
 
 
-def _indices(item: Sensitivity, k: int) -> IndexJson:
+def _surrogate(item: StudySurrogate) -> SurrogateJson:
+    return {
+        "kind": item.kind,
+        "made_of": item.made_of,
+        "points": item.points,
+        "failed": item.failed,
+        "repeated": item.repeated,
+        "predictivity": number_or_none(item.predictivity),
+        "error": number_or_none(item.error),
+        "largest_error": number_or_none(item.largest),
+        "residuals": [number_or_none(value) for value in item.residuals],
+        "reason": item.reason,
+        "shares": {}
+        if item.reason
+        else {name: _indices(item, k) for k, name in enumerate(item.parameters)},
+        "effects": {of.parameter: _effect_curve(of) for of in item.effects},
+    }
+
+
+def _effect_curve(item: SurrogateEffect) -> SurrogateEffectJson:
+    at: list[Any] = item.at.tolist()
+    if item.words:
+        at = [item.words[int(value)] for value in item.at]
+    return {"at": at, "mean": item.mean.tolist()}
+
+
+def _indices(item: Sensitivity | StudySurrogate, k: int) -> IndexJson:
     return {
         "first": number_or_none(item.first[k]),
         "first_low": number_or_none(item.first_low[k]),
@@ -256,9 +318,26 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
     for item in record.sensitivities:
         yield TextTable(
             title=f"Shares of the variance of {item.measure} (95 % intervals)",
-            columns=("parameter", "alone", "", "with interactions", ""),
+            columns=("parameter", *SHARE_COLUMNS),
             rows=[[name, *index_cells(item, k)] for k, name in enumerate(item.parameters)],
         )
+    if record.surrogates:
+        yield TextTable(
+            title=f"Each point predicted from the others by {record.surrogates[0].kind}",
+            columns=SURROGATE_COLUMNS,
+            rows=[
+                [item.measure, *surrogate_cells(own[item.measure], item, in_words)]
+                for item in record.surrogates
+            ],
+        )
+    for fitted in record.surrogates:
+        if not fitted.reason:
+            yield TextTable(
+                title=f"Shares of the variance of {fitted.measure} by its surrogate (with what its "
+                "error can change)",
+                columns=("parameter", *SHARE_COLUMNS),
+                rows=[[name, *index_cells(fitted, k)] for k, name in enumerate(fitted.parameters)],
+            )
     if record.model:
         yield f"Model: {record.model}."
     yield rate_text(record)

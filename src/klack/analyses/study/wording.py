@@ -11,6 +11,7 @@ from klack.analyses.study.record import (
     Sensitivity,
     StudyColumn,
     StudyRecord,
+    StudySurrogate,
 )
 from klack.report.wording import fixed, quantity
 from klack.units import format_si
@@ -18,6 +19,8 @@ from klack.units import format_si
 __all__ = [
     "EFFECT_COLUMNS",
     "MISSED_COLUMNS",
+    "SHARE_COLUMNS",
+    "SURROGATE_COLUMNS",
     "change",
     "effect_cells",
     "in_words",
@@ -29,6 +32,7 @@ __all__ = [
     "rate_text",
     "short_labels",
     "shown_unit",
+    "surrogate_cells",
     "variant_words",
 ]
 
@@ -116,7 +120,10 @@ def missed_cells(item: MissedBound) -> tuple[str, ...]:
     return (item.bound, str(item.points), str(item.missed), likely, interval, str(item.failed))
 
 
-def index_cells(item: Sensitivity, k: int) -> tuple[str, ...]:
+SHARE_COLUMNS = ("alone", "", "with interactions", "")
+
+
+def index_cells(item: Sensitivity | StudySurrogate, k: int) -> tuple[str, ...]:
     """Indices of one parameter with their intervals: alone, and with interactions."""
     return (
         _index(item.first[k]),
@@ -124,6 +131,32 @@ def index_cells(item: Sensitivity, k: int) -> tuple[str, ...]:
         _index(item.total[k]),
         f"{_index(item.total_low[k])} to {_index(item.total_high[k])}",
     )
+
+
+SURROGATE_COLUMNS = ("measure", "points", "Q2", "root mean square", "largest", "made of")
+
+
+def surrogate_cells(
+    measure: StudyColumn, item: StudySurrogate, text: Callable[[StudyColumn, float], str]
+) -> tuple[str, ...]:
+    """Leave-one-out error of a surrogate, and what it is made of or that nothing follows."""
+    known = isfinite(item.predictivity)
+    errors = (text(measure, item.error), text(measure, item.largest))
+    if known and measure.unit.startswith("dB"):
+        errors = (f"{item.error:.2g} {measure.unit}", f"{item.largest:.2g} {measure.unit}")
+    return (
+        str(item.points),
+        _predictivity(item.predictivity),
+        *errors,
+        "not used" if item.reason else item.made_of,
+    )
+
+
+def _predictivity(value: float) -> str:
+    """Q2 with three digits, towards 1 with as many as tell it from 1."""
+    if not isfinite(value):
+        return "–"
+    return f"{value:.3f}" if value < 0.999 else f"1 − {1.0 - value:.1g}"
 
 
 def _index(value: float) -> str:

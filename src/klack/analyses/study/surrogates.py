@@ -1,0 +1,195 @@
+"""Surrogates of the measures of a study, over the parameters that vary."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.study.points import StudyPoints, require_varied
+from klack.analyses.study.record import StudyColumn, StudySurrogate, SurrogateEffect
+from klack.case.study_source import StudySource
+from klack.errors import InputError
+from klack.input.problem import one_of
+from klack.progress import Progress
+from klack.studies.evenness import unevenness
+from klack.studies.spread import Listed
+from klack.studies.surrogate import Surrogate, SurrogateKind, fit_surrogate
+from klack.studies.surrogate_axis import SurrogateAxis
+from klack.studies.surrogate_library import require_scikit_learn
+
+__all__ = ["require_surrogates", "surrogate_warnings", "surrogates_of"]
+
+_DESIGNS = ("sobol", "latin-hypercube", "made", "file")
+"""Designs that may fill the ranges evenly; a grid hides what is between its levels."""
+_MOST = {"polynomial-chaos": 10_000, "gaussian-process": 500}
+_UNEVEN = 4.0
+_OUTSIDE = 1e-9
+_CURVE = 41
+_STAGE = "surrogates"
+
+
+def require_surrogates(source: StudySource, points: StudyPoints) -> None:
+    """Refuse, before the first run, surrogates that could not tell how wrong they are.
+
+    Raises
+    ------
+    InputError
+        For a design that does not fill the ranges, for too many points, and for points of a file
+        that lie outside of the ranges, on few levels, or crowded.
+    MissingExtraError
+        Without scikit-learn.
+    """
+    if (asked := source.study.surrogate) is None:
+        return
+    kind, design = asked.kind, source.study.design.kind
+    if design not in _DESIGNS:
+        raise InputError(
+            source.where(("surrogate",)),
+            got=f"a surrogate of the design {design}",
+            expected=f"a design that fills the ranges: {one_of(_DESIGNS)}",
+            hint="use kind: sobol; on few levels, or around few points, a surrogate cannot tell "
+            "how wrong it is elsewhere.",
+        )
+    if len(points.values) > _MOST[kind]:
+        raise InputError(
+            source.where(("surrogate", "kind")),
+            got=f"a {kind} of {len(points.values)} points",
+            expected=f"at most {_MOST[kind]} points",
+            hint="use kind: polynomial-chaos, or fewer points.",
+        )
+    require_varied(source, points.space.varied)
+    require_scikit_learn()
+    if design == "file":
+        _require_even(source, points)
+
+
+def _require_even(source: StudySource, points: StudyPoints) -> None:
+    """Points of a file have to lie in the ranges and fill them as random points do."""
+    where = str(source.study.design.file)
+    shares = []
+    for item, axis in zip(points.space.varied, _axes(points), strict=True):
+        values = [point[item.name] for point in points.values]
+        outside = [value for value in values if not _is_inside(axis, value)]
+        if outside:
+            raise InputError(
+                where,
+                got=f"{item.name}: {len(outside)} values such as {outside[0]!r} (SI)",
+                expected=f"values of the study: {item.text()}",
+                hint="widen the range, or remove these rows; a surrogate does not extrapolate.",
+            )
+        if isinstance(axis.spread, Listed):
+            continue
+        if 2 * len(set(values)) < len(values):
+            raise InputError(
+                where,
+                got=f"{item.name}: {len(set(values))} different values in {len(values)} points",
+                expected="a different one in most points",
+                hint="use kind: sobol; a surrogate cannot tell how wrong it is between few levels.",
+            )
+        shares.append([axis.spread.share(float(value)) for value in values])
+    found = unevenness(np.array(shares).T) if shares else 0.0
+    if found > _UNEVEN:
+        raise InputError(
+            where,
+            got=f"points with {found:.3g} times the squared discrepancy of random ones",
+            expected=f"points that fill the ranges: at most {_UNEVEN:g} times",
+            hint="use kind: sobol, or give the ranges or distributions that the points have.",
+        )
+
+
+def _is_inside(axis: SurrogateAxis, value: float | str) -> bool:
+    spread = axis.spread
+    if axis.words:
+        return str(value) in axis.words
+    if isinstance(spread, Listed):
+        return bool(np.isclose(float(value), np.array(spread.values, dtype=float)).any())
+    return bool(np.abs(axis.coordinate([value])[0]) <= 1.0 + _OUTSIDE)
+
+
+def _axes(points: StudyPoints) -> list[SurrogateAxis]:
+    return [SurrogateAxis.of(item.spread) for item in points.space.varied]
+
+
+def surrogates_of(
+    kind: SurrogateKind, points: StudyPoints, measures: Sequence[StudyColumn], progress: Progress
+) -> tuple[StudySurrogate, ...]:
+    """Fit a surrogate to each measure.
+
+    Raises
+    ------
+    MissingExtraError
+    """
+    axes, names = _axes(points), tuple(item.name for item in points.space.varied)
+    values = [[point[name] for point in points.values] for name in names]
+    t = np.column_stack([axis.coordinate(own) for axis, own in zip(axes, values, strict=True)])
+    found = []
+    for k, item in enumerate(measures):
+        progress(_STAGE, k / len(measures))
+        fitted = fit_surrogate(kind, axes, t, item.values)
+        found.append(_recorded(kind, item.name, names, axes, fitted))
+    progress(_STAGE, 1.0)
+    return tuple(found)
+
+
+def _recorded(
+    kind: str,
+    measure: str,
+    names: tuple[str, ...],
+    axes: Sequence[SurrogateAxis],
+    fitted: Surrogate,
+) -> StudySurrogate:
+    none = np.full(len(names), np.nan)
+    first, total = fitted.first, fitted.total
+    return StudySurrogate(
+        measure=measure,
+        kind=kind,
+        made_of=fitted.model.made_of if fitted.model else "",
+        points=fitted.points,
+        failed=fitted.failed,
+        repeated=fitted.repeated,
+        predictivity=fitted.predictivity,
+        error=fitted.error,
+        largest=fitted.largest,
+        residuals=fitted.residuals,
+        reason=fitted.reason,
+        parameters=names,
+        first=first.value if first else none,
+        first_low=first.low if first else none,
+        first_high=first.high if first else none,
+        total=total.value if total else none,
+        total_low=total.low if total else none,
+        total_high=total.high if total else none,
+        effects=tuple(_effect(fitted, axes, names, k) for k in range(len(names)))
+        if fitted.model
+        else (),
+    )
+
+
+def _effect(
+    fitted: Surrogate, axes: Sequence[SurrogateAxis], names: Sequence[str], k: int
+) -> SurrogateEffect:
+    axis, t = axes[k], axes[k].shown(_CURVE)
+    assert fitted.model is not None
+    at: NDArray[np.float64] = t if axis.words else np.array([axis.value(float(x)) for x in t])
+    return SurrogateEffect(
+        parameter=names[k],
+        at=at,
+        words=axis.words,
+        mean=fitted.model.main_effect(k, t),
+    )
+
+
+def surrogate_warnings(surrogates: Sequence[StudySurrogate]) -> tuple[str, ...]:
+    """Measures without a surrogate, and points that surrogates leave out."""
+    found = [
+        f"The surrogate gives no shares and no main effects of '{item.measure}': {item.reason}."
+        for item in surrogates
+        if item.reason
+    ]
+    found += [
+        f"The surrogate of '{item.measure}' is fitted without {item.failed} points that have no "
+        "value: where they lie, it extrapolates."
+        for item in surrogates
+        if item.failed and not item.reason
+    ]
+    return tuple(found)
