@@ -19,7 +19,7 @@ QUOTED = [block for kind, block in BLOCKS if not kind and "klack " not in block]
 
 def test_the_study_of_the_page_is_the_file_beside_it():
     """All but what the last step of the page adds."""
-    shown, added, robust, impact = (block for kind, block in BLOCKS if kind == "yaml")
+    shown, _, added, robust, impact = (block for kind, block in BLOCKS if kind == "yaml")
     assert impact == FILE.with_name("impact_study.yaml").read_text(encoding="utf-8")
     assert robust in ROBUST.read_text(encoding="utf-8")
     left = FILE.read_text(encoding="utf-8")
@@ -34,8 +34,8 @@ def test_the_study_of_the_page_is_the_file_beside_it():
     [
         (0, "study", "sobol"),
         (1, "study", "saltelli"),
-        pytest.param(2, "sensitivities", "sobol", marks=pytest.mark.slow),
-        (3, "optimise", "sobol"),
+        pytest.param(3, "sensitivities", "sobol", marks=pytest.mark.slow),
+        (4, "optimise", "sobol"),
     ],
 )
 def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place, command, design):
@@ -48,12 +48,24 @@ def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place
     compare(QUOTED[place], capsys.readouterr().out, f"studies.md, block {place}")
 
 
+def test_surrogate_of_the_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    asked = next(block for kind, block in BLOCKS if kind == "yaml" and "surrogate" in block)
+    file = tmp_path / "study.yaml"
+    text = FILE.read_text(encoding="utf-8")
+    file.write_text(text.replace("  design: {kind: sobol, points: 128}\n", asked), encoding="utf-8")
+    case = "docs/how-to/small_valve.yaml"
+    out = str(tmp_path / "out")
+    assert main(["study", case, "--study", str(file), "--no-report", "--out", out]) == 0
+    compare(QUOTED[2], capsys.readouterr().out, "studies.md, surrogate")
+
+
 @pytest.mark.slow
 def test_a_study_of_impacts_prints_what_the_page_shows(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
     study = ["--study", "docs/how-to/impact_study.yaml", "--no-report", "--out", str(tmp_path)]
     assert main(["study", "demo-valve-axisymmetric", *study]) == 0
-    compare(QUOTED[6], capsys.readouterr().out, "studies.md, impacts")
+    compare(QUOTED[7], capsys.readouterr().out, "studies.md, impacts")
 
 
 @pytest.mark.slow
@@ -62,13 +74,13 @@ def test_robust_optimum_and_the_valves_made_after_it(tmp_path, capsys, monkeypat
     out, case = str(tmp_path / "out"), tmp_path / "case"
     asked = ["--study", str(ROBUST), "--no-report", "--out"]
     assert main(["optimise", "docs/how-to/small_valve.yaml", *asked, out]) == 0
-    compare(QUOTED[4], capsys.readouterr().out, "studies.md, robust optimum")
-    point = re.search(r"Point (\d+)", QUOTED[4])[1]
+    compare(QUOTED[5], capsys.readouterr().out, "studies.md, robust optimum")
+    point = re.search(r"Point (\d+)", QUOTED[5])[1]
     assert main(["export", out, "--to", "case", "--point", point, "--out", str(case)]) == 0
     made = str(case / f"small_valve_point_{point}.yaml")
     capsys.readouterr()
     assert main(["study", made, *asked, str(tmp_path / "made"), "--made", "1024"]) == 0
-    compare(QUOTED[5], capsys.readouterr().out, "studies.md, made valves")
+    compare(QUOTED[6], capsys.readouterr().out, "studies.md, made valves")
 
 
 @pytest.mark.slow
