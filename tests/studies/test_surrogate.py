@@ -276,6 +276,15 @@ def test_a_word_that_one_point_has_is_no_knowledge():
     assert not found.predictivity > 0.9
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_measure_that_differs_at_one_point_is_not_explained(kind):
+    """Without that point all values are the same."""
+    t = 2 * sobol_sequence(40, 2, 1) - 1
+    found = fit_surrogate(kind, [UNIT] * 2, t, (np.arange(40) == 5) * 1.0)
+    assert found.predictivity < 0.1
+    assert "Q2" in found.reason
+
+
 def test_no_error_is_no_interval():
     found = share_estimates(np.array([0.0, 0.3, 1.0]), 1.0, 0.0)
     assert found.low == pytest.approx(found.value)

@@ -161,7 +161,7 @@ class ProcessFit:
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
         x = np.hstack(self._columns)[rows]
-        own = (y[rows] - np.mean(y[rows])) / np.std(y[rows])
+        own = (y[rows] - np.mean(y[rows])) / (np.std(y[rows]) or 1.0)
         best = None
         with warnings.catch_warnings():  # a bound that is reached is no fault
             warnings.simplefilter("ignore", ConvergenceWarning)
