@@ -130,7 +130,10 @@ def run_impact(
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
     clock = StageClock(progress, result_cache())
-    bodies = impact_bodies(case, levels=wanted, certify=certify, progress=clock, threads=threads)
+    with collected_warnings() as notes:
+        placed = place_bodies(case, clock, threads=threads)
+        _require_time_to_touch(case, placed.case.contact.gap)
+    bodies = _with_modes(placed, notes, wanted, certify, clock)
     return _study(case, bodies, wanted, certify, begin, clock, threads, is_last=True)
 
 
@@ -167,10 +170,21 @@ def impact_bodies(
     """Mesh, place, factorise and find the modes of an impact; see :func:`run_impact`."""
     with collected_warnings() as notes:
         placed = place_bodies(case, progress, threads=threads)
+    return _with_modes(placed, notes, levels, certify, progress)
+
+
+def _with_modes(
+    placed: PlacedBodies,
+    before: Sequence[str],
+    levels: Sequence[str],
+    certify: bool,
+    progress: Progress,
+) -> ImpactBodies:
+    with collected_warnings() as notes:
         pools = mode_pools(
             placed, at_least=_modes_needed(placed.case, levels, certify), progress=progress
         )
-    return ImpactBodies(placed=placed, pools=pools, notes=tuple(notes))
+    return ImpactBodies(placed=placed, pools=pools, notes=(*before, *notes))
 
 
 def impact_of_bodies(
@@ -231,8 +245,8 @@ def _study(
     attempts = Attempts()
     with collected_warnings() as notes:
         problem = contact_problem(case, bodies.placed, clock)
+        _require_time_to_touch(case, problem.case.contact.gap)
         case = problem.case
-        _require_time_to_touch(case, case.contact.gap)
         reduced = [level for level in wanted if level.startswith("reduced")]
         clock("reduced", 0.0)
         with warnings_of("modes of the case"):
