@@ -36,10 +36,10 @@ from number import Number, Size
 
 import klack
 from klack.analyses.study import process_workers
-from klack.analyses.study.dask_workers import DaskWorkers, _Pace
+from klack.analyses.study.dask_workers import DaskWorkers, _TaskSize
+from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.point_workers import PointWorkers
-from klack.analyses.study.strokes import AskedPoints
 from klack.analyses.study.where import Where
 from klack.case.valve import ValveCase
 from klack.progress import silent
@@ -169,7 +169,7 @@ def compute(
     case: klack.CaseOnHand, crew: PointWorkers, measures: Sequence[str], points: Sequence[Point]
 ) -> list[tuple[float | None, ...]]:
     """Values of the points, all of which can be computed."""
-    asked = AskedPoints.of(checked(case), case.tree, points, measures, "wet")
+    asked = ask(checked(case), case.tree, points, measures, "wet")
     found: dict[int, PointRow] = {}
     crew.compute(asked, range(len(points)), found.__setitem__, silent)
     assert not any(row.failure for row in found.values()), found
@@ -185,18 +185,21 @@ def small_rows(points: int) -> list[Number]:
         assert isinstance(crew, DaskWorkers)
         written = [{PRELOAD: f"{11 + 1e-3 * k} N"} for k in range(points)]
         compute(case, crew, ("opening_time",), written[:4])
-        for what, most in (("one by one", 1), ("joined", _Pace._most)):
+        for what, most in (("one by one", 1), ("joined", _TaskSize._most)):
             best = float("inf")
             for _ in range(3):
                 spent: list[float] = []
-                learn = _Pace.learn
+                learn = _TaskSize.learn
 
                 def noted(self: Any, answer: Any, spent: Any = spent, learn: Any = learn) -> None:
                     spent.append(answer.seconds)
                     learn(self, answer)
 
-                with patch.object(_Pace, "learn", noted), patch.object(_Pace, "_most", most):
-                    crew._pace = _Pace()
+                with (
+                    patch.object(_TaskSize, "learn", noted),
+                    patch.object(_TaskSize, "_most", most),
+                ):
+                    crew._size = _TaskSize()
                     begin = perf_counter()
                     compute(case, crew, ("opening_time",), written)
                     whole = perf_counter() - begin
