@@ -4,6 +4,7 @@ Truth: the same points on one thread of this process, bit for bit; the log of a 
 interrupted.
 """
 
+import asyncio
 import importlib
 import importlib.metadata
 import os
@@ -12,9 +13,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent import futures
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import psutil
 import pytest
@@ -25,6 +28,7 @@ import klack
 from klack.analyses.study import dask_workers, sent_case
 from klack.analyses.study.agenda import Agenda
 from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.dask_tasks import DaskTasks
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_order import PointOrder, answered
 from klack.analyses.study.sent_case import SentCase
@@ -461,6 +465,36 @@ class TestRefused:
         assert isinstance(found, Failure)
         assert "needle.inp" in " ".join(found.parts)
         assert "the same path on every machine" in found.parts[3]
+
+    @pytest.mark.parametrize(
+        ("error", "is_lost"),
+        [
+            (TimeoutError(), True),
+            (OSError("gone"), True),
+            (futures.CancelledError(), True),
+            (asyncio.CancelledError(), True),
+            (ValueError("unreadable"), False),
+        ],
+    )
+    def test_rows_that_cannot_be_read_are_not_asked_for_again(
+        self, error: BaseException, is_lost: bool
+    ):
+        """Those of a worker that is lost are: dask has them computed once more."""
+        case = klack.load_case(SMALL)
+        future = Mock(status="finished")
+        future.result.side_effect = error
+        future.add_done_callback.side_effect = lambda told: told(future)
+        client = Mock()
+        client.submit.return_value = future
+        sent = SentCase.of(valve(case), case.tree)
+        tasks = DaskTasks(client, sent, asked(case, [{}]), Mock(), Mock())
+        tasks.submit((0,))
+        if is_lost:
+            tasks.settle(0.01)
+            assert len(tasks) == 1
+        else:
+            with pytest.raises(ValueError, match="unreadable"):
+                tasks.settle(0.01)
 
     def test_a_class_that_a_worker_cannot_import(self, deadly: klack.CaseOnHand):
         sent = SentCase.of(valve(deadly), deadly.tree)

@@ -1,7 +1,9 @@
 """Points on their way through a cluster of dask, and what comes back."""
 
+import asyncio
 from collections import Counter
 from collections.abc import Callable
+from concurrent import futures
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, TypeVar
 from uuid import uuid4
@@ -18,10 +20,12 @@ from klack.errors import InputError
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-__all__ = ["DaskTasks"]
+__all__ = ["LOST", "DaskTasks"]
 
 Given = TypeVar("Given")
 
+LOST = (OSError, futures.CancelledError, asyncio.CancelledError)
+"""Raised where a worker, or the scheduler, is lost; a timeout is the first of them."""
 _FETCH = 5.0
 """For the rows of a task to come from its worker [s]."""
 _ROUNDS = 2
@@ -113,10 +117,17 @@ class DaskTasks:
 
         The worker that has them may be lost at this moment.  Dask has them computed again then; a
         fetch of all tasks at once would wait for that, and lose the rows of others meanwhile.
+
+        Raises
+        ------
+        Exception
+            Where what has come cannot be read: it would not be read another time either.
         """
         try:
             address, found = future.result(timeout=_FETCH)
-        except Exception:  # of whatever kind: the state of the task tells what to do
+        except (Exception, *LOST) as error:
+            if future.status == "finished" and not isinstance(error, LOST):
+                raise
             self._lost.add(future)
             return []
         places = self._places.pop(future)

@@ -1,6 +1,5 @@
 """Points on a cluster, by dask.distributed."""
 
-from asyncio import CancelledError
 from collections import deque
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 import klack
 from klack.analyses.study.agenda import Agenda
 from klack.analyses.study.asked_points import AskedPoints, groups_of
-from klack.analyses.study.dask_tasks import DaskTasks
+from klack.analyses.study.dask_tasks import LOST, DaskTasks
 from klack.analyses.study.point_order import Answer
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.sent_case import SentCase
@@ -119,7 +118,7 @@ class DaskWorkers(Closing):
                         tasks.submit(agenda.take(most=points))
                     tasks.settle(_LOOK)
                 tally.tell()
-            except (OSError, CancelledError) as error:
+            except LOST as error:
                 raise self._lost(error) from None
             finally:
                 if self._client.status == "running":
@@ -134,7 +133,7 @@ class DaskWorkers(Closing):
                 self._count_workers(progress)
                 sleep(_LOOK / 10)
             self._count_workers(progress)
-        except (OSError, CancelledError) as error:
+        except LOST as error:
             raise self._lost(error) from None
         finally:
             probe.release()
