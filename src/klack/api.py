@@ -532,18 +532,14 @@ def sensitivities(
         For a parameter or a measure that has no derivative.
     """
     from klack.analyses.sensitivities.run import run_sensitivities
-    from klack.case.study_source import study_of
+    from klack.case.study_source import study_if_any
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
     checked = _of_kind(given, ValveCase, "a whole valve")
-    file = None if study is None else Path(study)
-    source = None
-    if file is not None or checked.study is not None:
-        source = study_of(checked, given.tree, file)
     return run_sensitivities(
         checked,
         given.tree,
-        source,
+        study_if_any(checked, given.tree, None if study is None else Path(study)),
         parameters=parameters,
         measures=measures,
         variant=variant,

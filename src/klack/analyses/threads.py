@@ -13,7 +13,7 @@ from typing import Any, TextIO, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["Stopped", "on_threads", "one_thread_of_blas", "warnings_of_threads"]
+__all__ = ["Stopped", "never_stopped", "on_threads", "one_thread_of_blas", "warnings_of_threads"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -101,6 +101,10 @@ def _taken(
         return False
     keep(item, result)
     return True
+
+
+def never_stopped() -> None:
+    """The check of work that nothing asks to stop."""
 
 
 @contextmanager

@@ -113,7 +113,8 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
     A case without ``contact.gap`` gets the one that is drawn, so that every level starts there.
     """
     pair = build_bodies(case, progress)
-    case = _with_drawn_gap(case, pair)
+    if case.contact.gap is None:
+        case = _with_gap(case, _drawn_gap(pair))
     progress("factorise", 0.0)
     cache = result_cache()
     upper = Flexibility(
@@ -149,7 +150,7 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
     bodies : PlacedBodies
     progress : callable
     """
-    case = _with_drawn_gap(case, bodies.pair)
+    case = _with_gap(case, bodies.case.contact.gap)
     static = static_ladder(
         bodies.pair,
         bodies.flexibility_upper,
@@ -182,10 +183,14 @@ def _budget(case: Case, body: ElasticBody, progress: Progress) -> Budget:
     )
 
 
-def _with_drawn_gap(case: Case, pair: BodyPair) -> Case:
+def _drawn_gap(pair: BodyPair) -> float:
+    upper, lower = pair.upper.mesh, pair.lower.mesh
+    return axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
+
+
+def _with_gap(case: Case, gap: float | None) -> Case:
+    """The gap of the bodies, where the case gives none."""
     if case.contact.gap is not None:
         return case
-    upper, lower = pair.upper.mesh, pair.lower.mesh
-    drawn = axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
-    contact = case.contact.model_copy(update={"gap": drawn})
+    contact = case.contact.model_copy(update={"gap": gap})
     return case.model_copy(update={"contact": contact})

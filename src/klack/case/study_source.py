@@ -11,7 +11,7 @@ from klack.case.study import CaseStudy, StudyFile
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text
 
-__all__ = ["StudySource", "study_of"]
+__all__ = ["StudySource", "study_if_any", "study_of"]
 
 
 _MOST_VALVES = 1_000_000
@@ -99,3 +99,8 @@ def study_of(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySo
             hint="add the section, or give a file with it: --study FILE.",
         )
     return StudySource(study=case.study, path=tree.path, lines=tree.lines)
+
+
+def study_if_any(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySource | None:
+    """:func:`study_of`; None for a case without one, and no file."""
+    return study_of(case, tree, file) if file is not None or case.study is not None else None

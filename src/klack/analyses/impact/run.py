@@ -213,6 +213,7 @@ def impact_of_bodies(
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
+    _require_time_to_touch(case, bodies.placed.case.contact.gap)
     clock = StageClock(progress, result_cache())
     return _study(case, bodies, wanted, certify, begin, clock, None, is_last=False)
 
@@ -245,7 +246,6 @@ def _study(
     attempts = Attempts()
     with collected_warnings() as notes:
         problem = contact_problem(case, bodies.placed, clock)
-        _require_time_to_touch(case, problem.case.contact.gap)
         case = problem.case
         reduced = [level for level in wanted if level.startswith("reduced")]
         clock("reduced", 0.0)

@@ -58,17 +58,15 @@ def sensitivities(
         from klack.analyses.sensitivities.run import run_sensitivities
         from klack.case.case_tree import read_case_tree
         from klack.case.shipped import find_case
-        from klack.case.study_source import study_of
+        from klack.case.study_source import study_if_any
 
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
-    given = study is not None or checked.study is not None
-    source = study_of(checked, tree, study) if given else None
     with show_progress(wanted.quiet) as progress:
         record = run_sensitivities(
             checked,
             tree,
-            source,
+            study_if_any(checked, tree, study),
             parameters=parameter or (),
             measures=measure or (),
             variant=variant,

@@ -13,12 +13,19 @@ from klack.case.bodies import CaseFile
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, Points, PointValue
 from klack.case.study import CaseStudy
-from klack.errors import KlackError
+from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.progress import Progress
 from klack.signals import TimeSeries
 
-__all__ = ["AskedPoints", "PointGroup", "PointKind", "Taken", "groups_of"]
+__all__ = [
+    "AskedPoints",
+    "PointGroup",
+    "PointKind",
+    "Taken",
+    "groups_of",
+    "require_same_for_all",
+]
 
 CaseT = TypeVar("CaseT", bound=CaseFile, default=Any)
 Built = TypeVar("Built", default=Any)
@@ -205,3 +212,29 @@ def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ..
         made = tuple(item for item in changes if asked.kind.makes_bodies(asked.case, item[0]))
         found.setdefault(made, []).append(i)
     return tuple(PointGroup(made=dict(made), places=tuple(at)) for made, at in found.items())
+
+
+def require_same_for_all(keys: Iterable[PointKey], section: Key, what: str, hint: str) -> None:
+    """Refuse points that exchange what stands in a section of the case.
+
+    Parameters
+    ----------
+    keys : iterable of PointKey
+    section : tuple
+        ``("run", "variants")``.
+    what : str
+        ``"variant"``.
+    hint : str
+
+    Raises
+    ------
+    InputError
+    """
+    for key in keys:
+        if key.place[: len(section)] == section:
+            raise InputError(
+                f"points: {key.name}",
+                got=f"a {what} as a part of a point",
+                expected=f"one {what} for all points",
+                hint=hint,
+            )

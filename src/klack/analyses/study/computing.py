@@ -15,7 +15,12 @@ from typing import Any
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, groups_of
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.tally import Tally
-from klack.analyses.threads import on_threads, one_thread_of_blas, warnings_of_threads
+from klack.analyses.threads import (
+    never_stopped,
+    on_threads,
+    one_thread_of_blas,
+    warnings_of_threads,
+)
 from klack.case.points import case_at, with_changes
 from klack.closing import Closing
 from klack.errors import InputError, KlackError
@@ -172,11 +177,7 @@ def _run_alone(
             taken()
             builds.keep(asked, group, built)
         for i in left:
-            found[i] = asked.kind.row(asked, built, i, _never, taken)
-
-
-def _never() -> None:
-    """Nothing asks this work to stop."""
+            found[i] = asked.kind.row(asked, built, i, never_stopped, taken)
 
 
 def _build(

@@ -95,15 +95,7 @@ def scatter_chart(
             (f"high {labels[second.name]}", every[~is_low], "orange"),
         ]
     curves = [
-        Curve(
-            x=x_factor * first.values[chosen],
-            y=y_factor * measure.values[chosen],
-            label=label,
-            colour=colour,
-            width=1.6,
-            drawn="points",
-            names=tuple(f"point {i}" for i in chosen),
-        )
+        _points(x_factor * first.values, y_factor * measure.values, chosen, label, colour, 1.6)
         for label, chosen, colour in groups
         if chosen.size
     ]
@@ -144,15 +136,7 @@ def _front_chart(
         ("recommended", every == found.best, "green", 3.4),
     ]
     curves = [
-        Curve(
-            x=x_factor * first.values[kept],
-            y=y_factor * other.values[kept],
-            label=label,
-            colour=colour,
-            width=width,
-            drawn="points",
-            names=tuple(f"point {i}" for i in every[kept]),
-        )
+        _points(x_factor * first.values, y_factor * other.values, every[kept], label, colour, width)
         for label, kept, colour, width in groups
         if kept.any()
     ]
@@ -179,6 +163,26 @@ def _framed(
     margin = _MARGIN * float(np.ptp(values))
     frame = (float(values.min()) - margin, float(values.max()) + margin)
     return replace(spec, range=frame), factor
+
+
+def _points(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    places: NDArray[np.int64],
+    label: str,
+    colour: Colour,
+    width: float,
+) -> Curve:
+    """Dots at some of the points of the study, each with its number."""
+    return Curve(
+        x=x[places],
+        y=y[places],
+        label=label,
+        colour=colour,
+        width=width,
+        drawn="points",
+        names=tuple(f"point {i}" for i in places),
+    )
 
 
 def _today(x: float, y: float) -> Curve:
@@ -264,16 +268,10 @@ def _main_effect(
 ) -> Chart:
     x, x_factor = _axis(parameter, labels)
     y, y_factor = _axis(measure, labels)
+    every = np.arange(parameter.values.size)
+    own = (x_factor * parameter.values, y_factor * measure.values)
     curves = (
-        Curve(
-            x=x_factor * parameter.values,
-            y=y_factor * measure.values,
-            label="computed points",
-            colour="sky",
-            width=1.4,
-            drawn="points",
-            names=tuple(f"point {i}" for i in range(parameter.values.size)),
-        ),
+        _points(*own, every, "computed points", "sky", 1.4),
         Curve(
             x=x_factor * effect.at,
             y=y_factor * effect.mean,

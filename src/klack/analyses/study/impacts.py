@@ -13,11 +13,11 @@ from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bod
 from klack.analyses.impact.summary import no_estimate
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import impact_sources
-from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken
+from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.impact_measures import ImpactOfPoint, impact_measures
 from klack.analyses.study.point_row import PointRow, doubts_in, others_in
-from klack.analyses.threads import Stopped
+from klack.analyses.threads import Stopped, never_stopped
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at
 from klack.case.schema import Case
@@ -78,14 +78,8 @@ class _Impacts:
 
     def require_keys(self, keys: Iterable[PointKey]) -> None:
         """All but the levels."""
-        for key in keys:
-            if key.place[:2] == ("run", "levels"):
-                raise InputError(
-                    f"points: {key.name}",
-                    got="a level as a part of a point",
-                    expected="one level for all points",
-                    hint="write level: interface in the study, and compute two of them.",
-                )
+        hint = "write level: interface in the study, and compute two of them."
+        require_same_for_all(keys, ("run", "levels"), "level", hint)
 
     def makes_bodies(self, case: Case, place: Key) -> bool:
         """Whether meshes, places or modes may follow from what stands there.
@@ -162,7 +156,7 @@ class _Impacts:
 
     def pressure(self, asked: AskedPoints[Case], built: _Built, place: int) -> TimeSeries | None:
         """Sound of a click."""
-        return _impact(asked, built, place, lambda: None)[1].noise.pressure
+        return _impact(asked, built, place, never_stopped)[1].noise.pressure
 
 
 IMPACTS = _Impacts()

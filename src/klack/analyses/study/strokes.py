@@ -19,11 +19,11 @@ from klack.analyses.stroke.run import (
     stroke_study,
     variant_network,
 )
-from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken
+from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.point_row import PointRow, doubts_in, others_in
 from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
-from klack.analyses.threads import Stopped
+from klack.analyses.threads import Stopped, never_stopped
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
@@ -108,14 +108,8 @@ class _Strokes:
 
     def require_keys(self, keys: Iterable[PointKey]) -> None:
         """All but the variants."""
-        for key in keys:
-            if key.place[:2] == ("run", "variants"):
-                raise InputError(
-                    f"points: {key.name}",
-                    got="a variant as a part of a point",
-                    expected="one variant for all points",
-                    hint='write variant="dry", and compute two tables.',
-                )
+        hint = 'write variant="dry", and compute two tables.'
+        require_same_for_all(keys, ("run", "variants"), "variant", hint)
 
     def makes_bodies(self, case: ValveCase, place: Key) -> bool:
         """Whether meshes, modes or contact laws may follow from what stands there.
@@ -237,15 +231,11 @@ class _Strokes:
         self, asked: AskedPoints[ValveCase], built: _Built, place: int
     ) -> TimeSeries | None:
         """Sound of a click."""
-        return _point_run(asked, built, place, _never)[0].noise.pressure
+        return _point_run(asked, built, place, never_stopped)[0].noise.pressure
 
 
 STROKES = _Strokes()
 """Strokes of a case of a whole valve."""
-
-
-def _never() -> None:
-    """Nothing asks this work to stop."""
 
 
 def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
