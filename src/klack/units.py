@@ -55,6 +55,7 @@ __all__ = [
     "VolumeFlow",
     "base_powers",
     "format_si",
+    "is_level",
     "parse_quantity",
     "takes_prefix",
 ]
@@ -430,6 +431,11 @@ def takes_prefix(unit: str) -> bool:
     """
     plain = unit in ("", "-", "K", "degC", "deg", "%") or unit.startswith(("kg", "1/"))
     return not plain and "^" not in unit.split("/")[0]
+
+
+def is_level(unit: str) -> bool:
+    """Whether a unit is that of a level, which is relative already: ``"dB"``, ``"dBA"``."""
+    return unit.startswith("dB")
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:

@@ -44,7 +44,7 @@ def write(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("opening.peak_force:", "noise.radiated_energy:", "noise.radiated_energy'?, without"),
+        ("opening.peak_force:", "noise.loudness_max:", "noise.loudness_max'?, without"),
         ("lift: {from: 90 um, to: 110 um}", "lift: {values: [90 um, 110 um]}", "a list of values"),
         ("  variant: dry\n", f"  variant: dry\n{ROBUST}", "a robust search"),
         (
@@ -70,12 +70,12 @@ class TestPolish:
         case = klack.load_case(SMALL)
         source = study_of(case.checked, case.tree, write(tmp_path, STUDY))
         space = space_of(case.checked, source)
-        names = ("opening.peak_force", "opening_time")
+        names = ("opening.peak_force", "opening_time", "noise.force_level")
         asked = asked_of(case.checked, case.tree, source, [{}], names)
         slopes = require_gradients(source, asked, space)
         goals = Goals(
-            objectives=("opening.peak_force", "opening_time"),
-            signs=(-1.0, 1.0),
+            objectives=names,
+            signs=(-1.0, 1.0, 1.0),
             bounds=(Bound(measure="opening_time", value=165e-6, is_most=False),),
         )
         point = np.array([0.4, 0.6, 0.3])
@@ -85,10 +85,12 @@ class TestPolish:
         shares = [point + way * 0.05 * axis for axis in np.eye(3) for way in (1.0, -1.0)]
         written = [space.written(space.at(share)) for share in shares]
         table = klack.run_many(SMALL, written, names, variant="dry")
-        force, time = ((table[name][::2] - table[name][1::2]) / 0.1 for name in names)
+        force, time, level = ((table[name][::2] - table[name][1::2]) / 0.1 for name in names)
         largest = np.abs(force).max()
         np.testing.assert_allclose(of_objectives[0], -force, rtol=0.01, atol=0.01 * largest)
         np.testing.assert_allclose(of_objectives[1], time, rtol=0.01)
+        # all bounces count in a level, those of the two strokes by 0.005 dB each
+        np.testing.assert_allclose(of_objectives[2], level, atol=2 * 0.005 / 0.1)
         np.testing.assert_allclose(of_bounds[0], -time / 165e-6, rtol=0.01)
         assert gradients.notes == []
 

@@ -166,12 +166,38 @@ class TangentRun:
                 return np.ascontiguousarray(values[..., 0])
             return np.asarray(values[..., 0] + amount * values[..., _FIRST + direction])
 
-        time, points, means = at(self._time), at(self._points), at(self._means)
-        fine = [at(part) for part in self._fine]
-        means_of, points_of, moving = self._columns
+        time, points, fine = at(self._time), at(self._points), [at(part) for part in self._fine]
         finder = ImpactFinder(self.rows, float(self._time[0, 0]))
+        moving = self._columns[2]
         speeds = {name: np.ascontiguousarray(points[:, i]) for name, i in moving.items()}
         finder.feed(time, speeds, fine)
+        return replace(self._result(time, points, at(self._means), fine), events=finder.events())
+
+    def rates(self, direction: int) -> tuple[NetworkResult, NDArray[np.float64]]:
+        """Derivatives with the parameter of a direction, at times that move along.
+
+        Returns
+        -------
+        rates : NetworkResult
+            Derivatives of all channels and forces in place of them, at the times of the run itself;
+            without impacts.
+        late : array, shape (looks + 1,) [s per unit]
+            Derivatives of the times that divide the run into equal parts.
+        """
+        lane = _FIRST + direction
+        fine = [np.concatenate([part[:, :2, 0], part[:, 2:, lane]], axis=1) for part in self._fine]
+        time, points, means = self._time[:, 0], self._points[..., lane], self._means[..., lane]
+        return self._result(time, points, means, fine), self._time[:, lane]
+
+    def _result(
+        self,
+        time: NDArray[np.float64],
+        points: NDArray[np.float64],
+        means: NDArray[np.float64],
+        fine: Sequence[NDArray[np.float64]],
+    ) -> NetworkResult:
+        """What was recorded, as channels by their names; without impacts."""
+        means_of, points_of, _ = self._columns
         count = (len(time) - 1) // self.looks
         ends = np.arange(count + 1) * self.looks
         channels = {
@@ -200,7 +226,7 @@ class TangentRun:
             time=time[ends],
             channels=channels,
             interfaces=records,
-            events=finder.events(),
+            events=(),
             books=EnergyBooks(supplies={}, losses={}, stores_before={}, stores_after={}),
             sizes=self.sizes,
             steps=StepCounts(*([0] * (CLOCK - 2))),

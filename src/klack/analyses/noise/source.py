@@ -42,6 +42,7 @@ __all__ = [
     "SourceStop",
     "impact_sources",
     "load_sources",
+    "net_force",
     "run_sources",
     "stroke_sources",
 ]
@@ -248,7 +249,7 @@ def stroke_sources(
         _require_stops(study.case, variant)
         followed, cut = first_part(variant.result)
         variant = replace(variant, result=followed)
-        net = _net_force(study, variant)
+        net = net_force(study, variant)
         last = interrupted_impact(variant.result.events, net)
         found.append(
             NoiseSource(
@@ -329,7 +330,7 @@ def _end(event: ImpactEvent) -> float:
     return event.time + event.contact_time
 
 
-def _net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
+def net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
     """Mass times acceleration of the centre of mass of the needle [N], in records."""
     masses = [body.mass for body in study.bodies if body.name == study.needle]
     speed = variant.channel(study.channels.velocity)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from klack.analyses.record import CaseRecord
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
+from klack.units import is_level
 
 __all__ = ["HOLDS", "ImpactSlope", "MeasureSlopes", "SensitivityRecord", "SlopeParameter"]
 
@@ -69,9 +70,12 @@ class MeasureSlopes:
     strayed: float = 0.0
 
     def elasticity(self, k: int, parameter: SlopeParameter) -> float | None:
-        """Relative change of the measure over that of a parameter; None at a value of zero."""
+        """Relative change of the measure over that of a parameter.
+
+        None at a value of zero, and of a level, which is relative already.
+        """
         slope = self.slopes[k]
-        if slope is None or not self.value or parameter.value == 0.0:
+        if slope is None or not self.value or parameter.value == 0.0 or is_level(self.unit):
             return None
         return slope * parameter.value / self.value
 

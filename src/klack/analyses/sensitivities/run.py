@@ -17,7 +17,7 @@ from klack.analyses.sensitivities.record import (
 from klack.analyses.sensitivities.slopes import TIMES, SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.study.chosen_measures import ChosenMeasure
-from klack.analyses.study.stroke_measures import stroke_measures
+from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
 from klack.case.case_tree import CaseTree
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
@@ -27,14 +27,16 @@ from klack.input.problem import one_of
 from klack.progress import Progress, silent
 from klack.simulation.tangent_run import TangentRun
 from klack.stages import StageClock, collected_warnings
-from klack.units import format_si
+from klack.units import format_si, is_level
 
 __all__ = ["run_sensitivities"]
 
 _OF_IMPACTS = ("approach_speed", "peak_force", "impulse")
+_HEARD = "noise.sound_exposure_level_weighted"
 _SHARE = 0.01  # of the size, by which all parameters change in the check
 _GROWN = 5.0  # times all before, and as much as the time itself: what bounces do that are chaotic
 _RESOLVED = 1e-3  # of a measure that is no time: what the steps of a run resolve of it
+_RESOLVED_LEVEL = 0.01  # [dB]: the same of a force
 
 
 def run_sensitivities(
@@ -89,7 +91,7 @@ def run_sensitivities(
     with collected_warnings() as notes:
         runner = SlopeRunner(case, tree, space, name, clock, threads)
         runs = runner.tangents()
-        slopes = [runner.slopes(runs, item) for item in chosen]
+        slopes = runner.slopes(runs, chosen)
         others, not_checked = _others_of(runner) if check else (None, ())
     step = runs[0].sizes.step
     pairs = zip(chosen, slopes, strict=True)
@@ -111,6 +113,7 @@ def run_sensitivities(
         warnings=(
             *_left_out(case, source, space, measures, chosen),
             *notes,
+            *runner.notes,
             *not_checked,
             *_doubts(found, impacts),
         ),
@@ -127,6 +130,7 @@ def _measures(
         roles = find_roles(case)
         stops = [stop for stop in (roles.opening_stop, roles.seat) if stop]
         wanted = [*TIMES, *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS)]
+        wanted += [_HEARD] if case.noise is not None else []
     chosen = stroke_measures(case, wanted)
     fitting = tuple(item for item in chosen if has_slope(item))
     if (names and len(fitting) < len(chosen)) or not fitting:
@@ -134,8 +138,8 @@ def _measures(
         raise InputError(
             "--measure",
             got=f"'{bad.name}', which has no derivative here",
-            expected="times of opening and closing, and measures of impacts: "
-            + one_of([*TIMES, *(f"seat.{key}" for key in _OF_IMPACTS)]),
+            expected="times of opening and closing, measures of impacts, energies and levels of "
+            f"the noise: {one_of([*TIMES, *(f'seat.{key}' for key in _OF_IMPACTS), _HEARD])}",
             hint="klack study computes any measure at other values of a parameter.",
         )
     return fitting
@@ -160,7 +164,10 @@ def _left_out(
         every = dict.fromkeys((*source.study.measures, *source.study.constraints))
         left = [name for name in every if name not in known]
         if left:
-            found.append(f"No derivatives of {one_of(left)}: only times and impacts have them.")
+            found.append(
+                f"No derivatives of {one_of(left)}: only times, impacts, and energies and levels "
+                "of the noise have them."
+            )
     return tuple(found)
 
 
@@ -172,13 +179,13 @@ class _Others:
     ----------
     time : float [s]
         Processor time of one of them.
-    same, plus, minus : StrokeVariant
+    same, plus, minus : StrokeOfPoint
     """
 
     time: float
-    same: StrokeVariant
-    plus: StrokeVariant
-    minus: StrokeVariant
+    same: StrokeOfPoint
+    plus: StrokeOfPoint
+    minus: StrokeOfPoint
 
 
 def _others_of(runner: SlopeRunner) -> tuple[_Others | None, tuple[str, ...]]:
@@ -228,6 +235,8 @@ def _checked(
     resolution = _RESOLVED * abs(value or 0.0)
     if item.measure.unit == "s":
         resolution = step
+    elif is_level(item.measure.unit):
+        resolution = _RESOLVED_LEVEL
     return MeasureSlopes(
         name=item.name,
         title=item.measure.name,
@@ -262,7 +271,7 @@ def _impacts(
         largest = max((item.growth for item in found), default=inf)
         deviation, is_doubtful = None, growth > max(_GROWN * largest, touch.time)
         if others is not None:
-            ends = (others.plus, others.minus)
+            ends = (others.plus.variant, others.minus.variant)
             times = [_touch_time(end, touch.stop, number) for end in ends]
             if times[0] is not None and times[1] is not None and growth > 0.0:
                 predicted = sum(s * _SHARE * part for s, part in zip(signs, parts, strict=True))

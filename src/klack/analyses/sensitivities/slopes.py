@@ -1,17 +1,27 @@
 """Strokes with derivatives, at the case or about another point of the same parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from math import isfinite
 from time import process_time
-from typing import Any, Self
+from typing import Self
 
 from klack.analyses.noise.body import Transfers
+from klack.analyses.noise.source import NoiseSource, stroke_sources
+from klack.analyses.sensitivities.moving_forces import MovedForces, moved_forces
 from klack.analyses.sensitivities.parameters import SlopeSpace, VariedKey
-from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.stroke.run import run_variant, variant_network, variant_of
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.run import (
+    VariantRun,
+    body_summaries,
+    one_variant,
+    stop_summaries,
+    study_of_run,
+    variant_network,
+    variant_of,
+)
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.stroke_measures import StrokeOfPoint
 from klack.assembling.valve import Valve, build_valve, filled_network
@@ -20,10 +30,9 @@ from klack.case.points import case_at, checked_parts, points_of
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
-from klack.errors import InputError, KlackError
+from klack.errors import InputError
 from klack.network.rows import Rows
 from klack.progress import Progress
-from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import has_python_steps
 from klack.simulation.tangent_numbers import Direction
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents
@@ -33,15 +42,20 @@ __all__ = ["TIMES", "SlopeRunner", "has_slope", "measured"]
 TIMES = ("opening_time", "closing_time")
 """Measures of a stroke, beside those of its impacts, that have derivatives."""
 
+_OF_NOISE = ("J", "dB", "dBA")
+"""Units of measures of the noise that do: energies and levels."""
+
 _SHIFT = 3e-5  # of the size of a parameter: what its numbers are differentiated by
 _AHEAD = 1e-6  # of the size: what a measure is differentiated by, along straight lines
 _STAGE = "derivatives"
 
 
 def has_slope(item: ChosenMeasure) -> bool:
-    """Whether a measure has derivatives here: times of the stroke, and impacts."""
+    """Whether a measure has derivatives: times of the stroke, impacts, energies and levels."""
     if item.of == "impact":
         return True
+    if item.is_noise:
+        return item.measure.unit in _OF_NOISE
     return item.of == "variant" and item.name.partition("_at_")[0] in TIMES
 
 
@@ -64,6 +78,9 @@ class SlopeRunner:
         self._places = {key.name: key.place for key in points.keys}
         valve = build_valve(case, clock, threads=threads)
         self._tree, self._valve = tree, valve
+        self._bodies, self._stops = body_summaries(valve), stop_summaries(valve)
+        self._transfers = Transfers()
+        self.notes: tuple[str, ...] = ()
         self._parts = checked_parts(tree, case, self._places.values())
         self.valve = self.at({})
         self.roles: ValveRoles = find_roles(self.valve.case, self.valve.network)
@@ -131,42 +148,68 @@ class SlopeRunner:
                 ) from None
         return Direction(name=item.name, plus=ends[0], minus=ends[1], distance=2.0 * shift)
 
-    def variant(self, result: NetworkResult) -> StrokeVariant:
-        """Times of the needle in a run."""
-        rows = variant_network(self.valve, self.name).rows()
-        return variant_of(self.valve, self.roles, self.name, rows, result)
-
-    def stroke(self, shifts: Mapping[str, float]) -> StrokeVariant:
+    def stroke(self, shifts: Mapping[str, float]) -> StrokeOfPoint:
         """Stroke without derivatives, with shifted parameters."""
         valve = self.at(shifts)
-        rows = variant_network(valve, self.name).rows()
-        result = run_variant(valve.case, rows, lambda fraction: self.clock("check", fraction))
-        return variant_of(valve, self.roles, self.name, rows, result)
+        run = one_variant(
+            valve, self.roles, self.name, None, lambda stage, done: self.clock("check", done)
+        )
+        if run.failure is not None:
+            raise run.failure
+
+        def source() -> NoiseSource:
+            return stroke_sources(self._study(valve, run), case=valve.case)[0]
+
+        return StrokeOfPoint(run.variant, PointNoise(source, self._transfers))
 
     def slopes(
-        self, runs: Sequence[TangentRun], item: ChosenMeasure
-    ) -> tuple[float | None, tuple[float | None, ...]]:
-        """Value of a measure, and its derivatives [per unit of each parameter]."""
-        value = measured(item, self.variant(runs[0].moved(0, 0.0)))
-        found: list[float | None] = []
+        self, runs: Sequence[TangentRun], items: Sequence[ChosenMeasure]
+    ) -> list[tuple[float | None, tuple[float | None, ...]]]:
+        """Value of each measure, and its derivatives [per unit of each parameter].
+
+        What speaks against the noise of the run is kept in ``notes``.
+        """
+        point = self._ahead(runs[0], 0)(0.0)
+        values = [measured(item, point) for item in items]
+        self.notes = tuple(point.noise.notes)
+        found: list[list[float | None]] = [[] for _ in items]
         for k, parameter in enumerate(self.space.varied):
-            run, place = runs[k // DIRECTIONS], k % DIRECTIONS
+            at = self._ahead(runs[k // DIRECTIONS], k % DIRECTIONS)
             ahead = _AHEAD * parameter.size
-            ends = [
-                measured(item, self.variant(run.moved(place, way * ahead))) for way in (1.0, -1.0)
-            ]
-            if value is None or ends[0] is None or ends[1] is None:
-                found.append(None)
-            else:
-                found.append((ends[0] - ends[1]) / (2.0 * ahead))
-        return value, tuple(found)
+            plus, minus = at(ahead), at(-ahead)
+            for item, value, slopes in zip(items, values, found, strict=True):
+                ends = measured(item, plus), measured(item, minus)
+                if value is None or ends[0] is None or ends[1] is None:
+                    slopes.append(None)
+                else:
+                    slopes.append((ends[0] - ends[1]) / (2.0 * ahead))
+        return list(zip(values, map(tuple, found), strict=True))
+
+    def _ahead(self, run: TangentRun, direction: int) -> Callable[[float], StrokeOfPoint]:
+        """The stroke where the parameter of a direction has changed by an amount."""
+        rows = variant_network(self.valve, self.name).rows()
+
+        def moved(amount: float) -> VariantRun:
+            result = run.moved(direction, amount)
+            variant = variant_of(self.valve, self.roles, self.name, rows, result)
+            return VariantRun(variant=variant, rows=rows, failure=None)
+
+        @cache
+        def forces() -> MovedForces:
+            study = self._study(self.valve, moved(0.0))
+            return moved_forces(study, self.valve.case, run, direction)
+
+        def at(amount: float) -> StrokeOfPoint:
+            noise = PointNoise(lambda: forces().at(amount), self._transfers)
+            return StrokeOfPoint(moved(amount).variant, noise)
+
+        return at
+
+    def _study(self, valve: Valve, run: VariantRun) -> StrokeStudy:
+        return study_of_run(valve, self.roles, self.name, run, self._bodies, self._stops)
 
 
-def measured(item: ChosenMeasure, variant: StrokeVariant) -> float | None:
+def measured(item: ChosenMeasure, point: StrokeOfPoint) -> float | None:
     """Value of a measure in a stroke; None where it has none."""
-    value = item.value(StrokeOfPoint(variant, PointNoise(_no_noise, Transfers())))
+    value = item.value(point)
     return value if value is not None and isfinite(value) else None
-
-
-def _no_noise() -> Any:
-    raise KlackError("no noise of a run with derivatives")

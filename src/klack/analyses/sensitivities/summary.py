@@ -10,7 +10,7 @@ from klack.analyses.json_parts import Real, Version
 from klack.analyses.sensitivities.record import MeasureSlopes, SensitivityRecord, SlopeParameter
 from klack.analyses.study.wording import shown_unit
 from klack.terminal.tables import TextTable
-from klack.units import format_si
+from klack.units import format_si, is_level
 
 __all__ = ["SensitivitiesJson", "sensitivities_to_json", "sensitivities_told"]
 
@@ -27,7 +27,8 @@ class SlopeJson(TypedDict):
 
     derivative: Annotated[Real, Field(description="Unit of the measure per unit of the parameter.")]
     elasticity: Annotated[
-        Real, Field(description="Relative change of the measure over that of the parameter.")
+        Real,
+        Field(description="Relative change of the measure over the parameter's; not of a level."),
     ]
 
 
@@ -180,6 +181,8 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
 
 
 def _quantity(value: float, unit: str) -> str:
+    if is_level(unit):
+        return f"{value:.4g} {unit}"
     shown, factor = shown_unit(unit)
     return format_si(factor * value, shown, 4)
 

@@ -48,6 +48,7 @@ __all__ = [
     "run_variant",
     "stop_summaries",
     "stroke_study",
+    "study_of_run",
     "variant_network",
     "variant_of",
 ]
@@ -280,6 +281,19 @@ def one_variant(
     setup_time = perf_counter() - begin - result.wall_time
     variant = variant_of(valve, roles, name, rows, result, setup_time)
     return VariantRun(variant=variant, rows=rows, failure=failure)
+
+
+def study_of_run(
+    valve: Valve,
+    roles: ValveRoles,
+    name: Variant,
+    run: VariantRun,
+    bodies: tuple[BodySummary, ...],
+    stops: tuple[StopSummary, ...],
+) -> StrokeStudy:
+    """Record of one variant among many strokes; see :func:`stroke_study`."""
+    made = run_fields(0.0, StageClock(silent))
+    return stroke_study(valve, roles, {name: run}, made, bodies=bodies, stops=stops)
 
 
 def variant_of(

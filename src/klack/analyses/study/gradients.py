@@ -118,7 +118,8 @@ class Gradients:
         try:
             runner = self.runner.about(self.slopes.at(self.space.at(point)))
             runs = runner.tangents()
-            found = {item.name: runner.slopes(runs, item)[1] for item in self.chosen}
+            slopes = runner.slopes(runs, self.chosen)
+            found = {item.name: row for item, (_, row) in zip(self.chosen, slopes, strict=True)}
         except KlackError as error:
             self.notes.append(f"The polish by derivatives ended early: {error}")
             raise NoValue from None

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field, replace
 
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
-from klack.analyses.record import run_fields
 from klack.analyses.stroke.record import StopSummary
 from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.run import (
-    VariantRun,
     body_summaries,
     one_variant,
     stop_summaries,
-    stroke_study,
+    study_of_run,
     variant_network,
 )
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
@@ -31,16 +29,15 @@ from klack.case.points import PointKey, PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
-from klack.case.variants import Variant
 from klack.cores import available_cores
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.memory import require_memory
-from klack.progress import Progress, silent
+from klack.progress import Progress
 from klack.signals import TimeSeries
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
-from klack.stages import StageClock, collected_warnings
+from klack.stages import collected_warnings
 
 __all__ = ["STROKES"]
 
@@ -258,15 +255,9 @@ def _point_run(
     run = one_variant(valve, roles, variant, None, lambda stage, fraction: check())
     if run.failure is not None:
         raise run.failure
-    noise = PointNoise(lambda: _noise_source(asked, built, valve, roles, run), built.transfers)
-    return StrokeOfPoint(run.variant, noise), roles
 
+    def source() -> NoiseSource:
+        study = study_of_run(valve, roles, variant, run, built.bodies, built.stops)
+        return stroke_sources(study, case=valve.case)[0]
 
-def _noise_source(
-    asked: AskedPoints[ValveCase], built: _Built, valve: Valve, roles: ValveRoles, run: VariantRun
-) -> NoiseSource:
-    """What the noise of a point comes from; the section ``noise`` is that of the point."""
-    made = run_fields(0.0, StageClock(silent))
-    runs: dict[Variant, VariantRun] = {valve.case.one_variant(asked.variant): run}
-    study = stroke_study(valve, roles, runs, made, bodies=built.bodies, stops=built.stops)
-    return stroke_sources(study, case=valve.case)[0]
+    return StrokeOfPoint(run.variant, PointNoise(source, built.transfers)), roles

@@ -14,7 +14,7 @@ from klack.analyses.study.record import (
     StudySurrogate,
 )
 from klack.report.wording import fixed, quantity
-from klack.units import format_si
+from klack.units import format_si, is_level
 
 __all__ = [
     "EFFECT_COLUMNS",
@@ -55,7 +55,7 @@ def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
 
 def number_text(value: float, unit: str, digits: int = 4) -> str:
     """A number [SI] with its unit; levels to a tenth."""
-    if unit.startswith("dB"):
+    if is_level(unit):
         return f"{value:.1f} {unit}"
     shown, factor = shown_unit(unit)
     return format_si(factor * value, shown, digits)
@@ -65,7 +65,7 @@ def change(item: StudyColumn, value: float) -> str:
     """How far a value is from that of today: in per cent, of levels the difference."""
     if item.words or not (isfinite(value) and isfinite(item.today)):
         return "–"
-    if item.unit.startswith("dB"):
+    if is_level(item.unit):
         return f"{value - item.today:+.1f} {item.unit}"
     if item.today == 0.0:
         return "–"
@@ -76,7 +76,7 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
     """Value of a column as a report prints it."""
     if item.words or not isfinite(value):
         return in_words(item, value)
-    if item.unit.startswith("dB"):
+    if is_level(item.unit):
         return fixed(value, 1, item.unit)
     unit, factor = shown_unit(item.unit)
     return quantity(factor * value, unit, digits)
@@ -142,7 +142,7 @@ def surrogate_cells(
     """Leave-one-out error of a surrogate, and what it is made of or that nothing follows."""
     known = isfinite(item.predictivity)
     errors = (text(measure, item.error), text(measure, item.largest))
-    if known and measure.unit.startswith("dB"):
+    if known and is_level(measure.unit):
         errors = (f"{item.error:.2g} {measure.unit}", f"{item.largest:.2g} {measure.unit}")
     return (
         str(item.points),
