@@ -9,7 +9,7 @@ import pytest
 
 from klack.cli.main import main
 
-STROKES = ("demo-stroke", "measured")
+STROKES = ("demo-stroke", pytest.param("measured", marks=pytest.mark.slow))
 COUNT = """
 import sys
 from klack.warming.counted import counted

@@ -165,7 +165,15 @@ def test_code_of_another_processor_is_not_run(program):
 NOT_PICKLED = b"klack code 1\n" + hashlib.sha256(b"code").digest() + b"code"
 
 
-@pytest.mark.parametrize("damage", [b"", b"klack code 1\n", b"klack code 0\n", NOT_PICKLED, None])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        b"",
+        *(pytest.param(x, marks=pytest.mark.slow) for x in (b"klack code 1\n", b"klack code 0\n")),
+        NOT_PICKLED,
+        None,
+    ],
+)
 def test_damaged_code_is_compiled_again(program, damage):
     end(start(program))
     for file in files(program):

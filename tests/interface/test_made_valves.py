@@ -23,7 +23,7 @@ ROBUST = f"""
       {PRELOAD}: 0.3 N
       lift: 2 um
       {MASS}: 0.05 g
-    valves: 16
+    valves: 8
 """
 STUDY = f"""klack: 1
 study:
@@ -35,7 +35,7 @@ study:
   measures: [opening_time]
   objectives: {{opening.peak_force: minimise}}
   constraints: {{opening_time: {{most: 165 us}}}}
-  search: {{population: 20, generations: 6, refinements: 60}}
+  search: {{population: 12, generations: 4, refinements: 12}}
   variant: dry
 """
 
@@ -149,14 +149,14 @@ class TestRobustSearch:
         case = klack.load_case(SMALL)
         for name, unit in ((PRELOAD, "N"), (GAP, "m")):
             case = case.with_value(name, f"{float(own[name][point])!r} {unit}")
-        made = columns(klack.run_study(case, file, made=16).record)
+        made = columns(klack.run_study(case, file, made=8).record)
         for name in ("opening_time", "opening.peak_force"):
             expected = made[name].mean() + 2.0 * made[name].std(ddof=1)
             assert own[f"{name} (mean + 2 sd)"][point] == pytest.approx(expected, rel=1e-12)
 
     def test_today_has_its_made_valves_too(self, found):
         file, result = found
-        made = columns(klack.run_study(SMALL, file, made=16).record)["opening_time"]
+        made = columns(klack.run_study(SMALL, file, made=8).record)["opening_time"]
         today = {item.name: item.today for item in result.record.measures}
         expected = made.mean() + 2.0 * made.std(ddof=1)
         assert today["opening_time (mean + 2 sd)"] == pytest.approx(expected, rel=1e-12)
@@ -165,7 +165,7 @@ class TestRobustSearch:
         told = found[1].record.optimum
         assert told.objectives == ("opening.peak_force (mean + 2 sd)",)
         assert told.bounds == ("opening_time (mean + 2 sd) at most 165 us",)
-        assert "16 valves made after each design" in told.algorithm
+        assert "8 valves made after each design" in told.algorithm
 
     def test_a_design_with_a_valve_that_fails_has_no_value(self, tmp_path):
         wide = ROBUST.replace("lift: 2 um", "lift: 80 um")

@@ -180,7 +180,9 @@ class TestKept:
         (tmp_path / "a.inp").write_text("2")
         assert point_key(tree, "dry", {"bodies.needle.geometry.mesh.file": "a.inp"}) != before
 
-    @pytest.mark.parametrize("lines", [1, 3, 6])
+    @pytest.mark.parametrize(
+        "lines", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 6))]
+    )
     def test_killed_at_any_point_it_resumes_to_the_same_numbers(self, study, tmp_path, lines):
         """The signal cannot be caught; a line that was cut off is computed again."""
         whole = klack.run_study(SMALL, study).record
