@@ -20,6 +20,7 @@ from klack.analyses.study.parameters import short_names
 from klack.case.reader import parse
 from klack.cli.main import main
 from klack.errors import InputError
+from klack.report.html import write_report
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"
@@ -639,6 +640,33 @@ class TestOptimum:
         assert stroke["opening_time"].value == value
         assert main(["export", str(out), "--to", "case", "--point", "9999"]) == 2
         assert "--point" in capsys.readouterr().err
+
+    def test_the_best_so_far_is_a_page_while_it_runs(self, tmp_path, capsys, monkeypatch):
+        pages = []
+
+        def seen(content, path):
+            write_report(content, path)
+            pages.append((content, path.read_text()))
+
+        monkeypatch.setattr("klack.analyses.study.pace._FIRST", 0.0)
+        monkeypatch.setattr("klack.analyses.study.progress_page.write_report", seen)
+        out = tmp_path / "out"
+        command = ["optimise", str(SMALL), "--study", str(write(tmp_path, OPTIMUM))]
+        assert main([*command, "--out", str(out)]) == 0
+        told = capsys.readouterr().err.replace("\n", "").replace(" ", "")
+        assert str(out / "progress.html") in told
+        counts = [int(content.subtitle.split(" points")[0].split()[-1]) for content, _ in pages]
+        assert len(counts) > 1
+        assert counts == sorted(set(counts))
+        assert all("the search is running" in text for _, text in pages)
+        assert not (out / "progress.html").exists()
+
+        def broken(content, path):
+            raise OSError("no space left")
+
+        monkeypatch.setattr("klack.analyses.study.progress_page.write_report", broken)
+        assert main([*command, "--out", str(tmp_path / "other")]) == 0
+        assert capsys.readouterr().err.count("no space left") == 1
 
     @pytest.mark.parametrize(
         ("old", "new", "words"),

@@ -72,7 +72,8 @@ def optimise(
     """Search the ranges of a study for the best points: one to four objectives, within bounds."""
     from klack.analyses.study.optimise import run_optimisation
 
-    return _run(run_optimisation, "optimum", case, study, component, wanted, workers, dask)
+    words = (case, study, component, wanted, workers, dask)
+    return _run(run_optimisation, "optimum", *words, is_search=True)
 
 
 def _run(
@@ -85,6 +86,7 @@ def _run(
     workers: int | None,
     dask: str | None,
     made: int | None = None,
+    is_search: bool = False,
 ) -> int:
     if workers is not None:
         require_positive("--workers", workers, "processes")
@@ -93,6 +95,7 @@ def _run(
 
     from klack.analyses.study.analysis import STUDY
     from klack.analyses.study.log import point_log_form
+    from klack.analyses.study.progress_page import ProgressPage
     from klack.analyses.study.where import Where
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
@@ -106,5 +109,11 @@ def _run(
         source, name = source.made(made), "made"
     ending = Ending.of(wanted, f"{checked.name}-{name}")
     with ending.resumable(point_log_form(checked, tree)[0]) as progress:
-        record = run(checked, tree, source, folder=ending.folder, where=where, progress=progress)
-    return ending.end(STUDY, record)
+        page = ProgressPage(ending.folder, progress)
+        seen = {"seen": page.write} if is_search and ending.report else {}
+        record = run(
+            checked, tree, source, folder=ending.folder, where=where, progress=progress, **seen
+        )
+    code = ending.end(STUDY, record)
+    page.remove()
+    return code

@@ -1,6 +1,6 @@
 """``klack optimise``: search the points of a study for those that no other one beats."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -62,6 +62,7 @@ def run_optimisation(
     folder: Path | None = None,
     where: Where = HERE,
     progress: Progress = silent,
+    seen: Callable[[StudyRecord], None] | None = None,
 ) -> StudyRecord:
     """Search for the best points of a study, and refine those of the front.
 
@@ -80,6 +81,8 @@ def run_optimisation(
     where : Where
         Points are computed.
     progress : callable
+    seen : callable, optional
+        Takes what was found so far, now and then.
 
     Raises
     ------
@@ -107,8 +110,32 @@ def run_optimisation(
         today = work.rows([{}], work.names)[0]
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
-        sides = front.goals.sides
+        robust_today = made.row_of_today(front.goals.sides, work.rows) if made else None
         search = _search(source, space, front.goals)
+
+        def record(
+            sounds: tuple[PointSound, ...] = (), warnings: tuple[str, ...] = ()
+        ) -> StudyRecord:
+            columns = measure_columns(asked, work.found, today)
+            if made is not None and robust_today is not None:
+                columns += made.columns(columns, front.goals.sides, work.made_rows, robust_today)
+            optimum = _optimum(front, search.settings.algorithm, source, columns, made)
+            of_rows = row_warnings(work.found, today, columns)
+            return StudyRecord(
+                **case_fields(case),
+                **run_fields(begin, clock, "pymoo"),
+                **work.evaluation.effort(work.done),
+                **point_fields(asked, space, work.values, work.found, today),
+                study_text=source.text,
+                design=optimum.algorithm,
+                measures=columns,
+                optimum=optimum,
+                sounds=sounds,
+                warnings=(*_doubts(optimum), *warnings, *of_rows),
+            )
+
+        if seen is not None:
+            work.now_and_then = lambda: seen(record())
         for cube in search:
             search.tell(*work.told(cube, front))
         require_some(source, work.found)
@@ -118,24 +145,8 @@ def run_optimisation(
                 for cube in refinement:
                     refinement.tell(*work.told(cube, front))
         ended = _polish(source, work, front, slopes, clock) if slopes is not None else []
-        columns = measure_columns(asked, work.found, today)
-        if made is not None:
-            robust_today = made.row_of_today(sides, work.rows)
-            columns += made.columns(columns, sides, work.made_rows, robust_today)
         sounds = _sounds(work, front, clock)
-    optimum = _optimum(front, search.settings.algorithm, source, columns, made)
-    return StudyRecord(
-        **case_fields(case),
-        **run_fields(begin, clock, "pymoo"),
-        **work.evaluation.effort(work.done),
-        **point_fields(asked, space, work.values, work.found, today),
-        study_text=source.text,
-        design=optimum.algorithm,
-        measures=columns,
-        optimum=optimum,
-        sounds=sounds,
-        warnings=(*_doubts(optimum), *ended, *notes, *row_warnings(work.found, today, columns)),
-    )
+    return record(sounds, (*ended, *notes))
 
 
 class _Work:
@@ -165,6 +176,7 @@ class _Work:
         self._shown = tuple(source.study.objectives)
         self._units = {item.name: item.measure.unit for item in self.asked_today.chosen}
         self.done = 0
+        self.now_and_then: Callable[[], None] = lambda: None
 
     def asked(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
@@ -211,7 +223,8 @@ class _Work:
         self.found += rows
         self.cubes += list(cube)
         objectives, violations = front.add(columns)
-        self._pace.tell(self.done, self.evaluation.computed, self._best_words(front))
+        if self._pace.tell(self.done, self.evaluation.computed, self._best_words(front)):
+            self.now_and_then()
         return objectives, violations
 
     def _best_words(self, front: "_Front") -> str:

@@ -24,8 +24,8 @@ class Pace:
         self._begin = self._last = perf_counter()
         self._wait = _FIRST
 
-    def tell(self, done: int, computed: int, best: str = "") -> None:
-        """A line, unless the last one was just now.
+    def tell(self, done: int, computed: int, best: str = "") -> bool:
+        """A line, unless the last one was just now; whether there was one.
 
         Parameters
         ----------
@@ -38,7 +38,7 @@ class Pace:
         """
         now = perf_counter()
         if now - self._last < self._wait or done >= self._most:
-            return
+            return False
         self._last, self._wait = now, min(2.0 * self._wait, _LONGEST)
         text = f"{done} of {self._most} points"
         if computed:
@@ -46,6 +46,7 @@ class Pace:
             text += f", {3600.0 * rate:.3g} in an hour"
             text += f", {duration_text((self._most - done) / rate)} left"
         remark(self._progress, f"{text}; {best}" if best else text)
+        return True
 
 
 def duration_text(seconds: float) -> str:
