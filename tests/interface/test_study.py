@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 
 import klack
+from klack.analyses.study.asked_points import groups_of
+from klack.analyses.study.kinds import ask
 from klack.analyses.study.parameters import short_names
 from klack.case.reader import parse
 from klack.cli.main import main
@@ -435,6 +437,19 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
             assert values[3] == truth[name.partition(".")[2]].value
             if name != "noise.loudness_max":  # too faint to have one
                 assert len({*values.tolist()}) == 4
+
+    def test_the_way_to_the_ear_makes_no_bodies(self, tmp_path):
+        case = tmp_path / "rod.yaml"
+        case.write_text(self.ROD)
+        loaded = klack.load_case(case)
+        points = [
+            {"noise.mount.stiffness": "10 N/um", "noise.distance": "1 m"},
+            {"noise.mount.stiffness": "20 N/um", "noise.distance": "2 m"},
+        ]
+        name = "noise.sound_exposure_level_weighted"
+        asked = ask(loaded.checked, loaded.tree, points, [name], None)
+        assert [group.places for group in groups_of(asked, range(2))] == [(0, 1)]
+        assert asked.kind.makes_bodies(asked.case, ("noise", "surfaces"))
 
     def test_clicks_of_a_front_are_those_of_their_strokes(self, tmp_path):
         """Truth: the sound of klack noise for the case of the point."""

@@ -43,8 +43,10 @@ __all__ = ["STROKES"]
 
 _AROUND = 50e6  # [byte] of a run beside its records
 _FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
-_ASIDE = ("run", "lumped", "measurement", "calibration", "title", "description")
-"""Sections that bodies, contact laws and their stops do not depend on."""
+_ASIDE = ("run", "lumped", "noise", "study", "measurement", "calibration", "title", "description")
+"""Sections that bodies, contact laws and their stops do not depend on,"""
+_RADIATING = ("noise", "surfaces")
+"""but for these surfaces of bodies."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,7 +116,7 @@ class _Strokes:
         They do from the damping of a body: the port pattern of a stop is that of an impact.
         """
         if place[0] != "network":
-            return place[0] not in _ASIDE
+            return place[0] not in _ASIDE or place[:2] == _RADIATING
         if place[1:2] != ("components",):
             return False
         if len(place) < 4 or place[3] == "type":
