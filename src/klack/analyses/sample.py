@@ -1,34 +1,114 @@
 """What a sample of numbers is told by: mean, standard deviation, quantiles."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["moments", "rank_correlation"]
+__all__ = ["STATISTICS", "Statistic", "moments", "quantile", "rank_correlation"]
 
 _FEWEST = 5
 """Values from which a rank correlation means something."""
 
 
-def moments(values: NDArray[np.float64], shares: Iterable[float]) -> dict[str, float | None]:
-    """Mean, standard deviation and quantiles of the values that are known, as JSON has them.
+@dataclass(frozen=True, slots=True)
+class Statistic:
+    """A number that describes a sample.
+
+    Parameters
+    ----------
+    key : str
+        In the name of a measure.
+    name : str
+        In words.
+    json_key : str
+    definition : str
+        Of the values of the sample.
+    of : callable
+        Of values, shape (n,), n > 0; not a number where one of them is none.
+    fewest : int
+        Values that it takes to tell more than their ends.
+    """
+
+    key: str
+    name: str
+    json_key: str
+    definition: str
+    of: Callable[[NDArray[np.float64]], float]
+    fewest: int = 1
+
+
+def quantile(share: float, key: str = "", name: str = "") -> Statistic:
+    """Value that a share of the sample stays below, linear between its values in rising order.
+
+    With fewer than 1/share values, or 1/(1 - share), it lies between the last two at that end:
+    what it should tell lies beyond all of them.
+    """
+    short = min(share, 1.0 - share)
+    return Statistic(
+        key=key or f"q{100.0 * share:02g}",
+        name=name or f"{100.0 * share:g} % quantile",
+        json_key=f"quantile_{share:g}",
+        definition=f"{100.0 * share:g} % of the values stay below it",
+        of=lambda values: float(np.quantile(values, share)),
+        fewest=int(np.ceil(1.0 / short - 1e-9)) if short > 0.0 else 1,
+    )
+
+
+def _standard_error(values: NDArray[np.float64]) -> float:
+    if values.size < 2:
+        return float("nan")
+    return float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
+
+
+_MEAN = Statistic("mean", "mean", "mean", "Their mean", lambda values: float(np.mean(values)))
+_DEVIATION = Statistic(
+    "sd",
+    "standard deviation",
+    "standard_deviation",
+    "Root mean square of their deviations from the mean",
+    lambda values: float(np.std(values)),
+)
+_ERROR = Statistic(
+    "standard_error",
+    "standard error of the mean",
+    "standard_error",
+    "Standard deviation of the mean of so many independent values, s/sqrt(n) with n - 1 degrees of "
+    "freedom in s",
+    _standard_error,
+    fewest=2,
+)
+
+STATISTICS = (
+    _MEAN,
+    _DEVIATION,
+    _ERROR,
+    quantile(0.0, "lowest", "lowest"),
+    quantile(0.05),
+    quantile(0.25),
+    quantile(0.5, "median", "median"),
+    quantile(0.75),
+    quantile(0.95),
+    quantile(1.0, "highest", "highest"),
+)
+"""All that a sample is told by, in their order."""
+
+
+def moments(
+    values: NDArray[np.float64], statistics: Iterable[Statistic] = STATISTICS
+) -> dict[str, float | None]:
+    """Statistics of the values that are known, as JSON has them; None where there is none.
 
     Parameters
     ----------
     values : array, shape (n,)
         Nan where there is none.
-    shares : iterable of float
-        Of the values that stay below each quantile.
+    statistics : iterable of Statistic
     """
     known = values[np.isfinite(values)]
-    if not known.size:
-        return dict.fromkeys(("mean", "standard_deviation"))
-    return {
-        "mean": float(np.mean(known)),
-        "standard_deviation": float(np.std(known)),
-        **{f"quantile_{share:g}": float(np.quantile(known, share)) for share in shares},
-    }
+    found = {item.json_key: item.of(known) if known.size else np.nan for item in statistics}
+    return {key: value if np.isfinite(value) else None for key, value in found.items()}
 
 
 def rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

@@ -34,10 +34,12 @@ DROP_COLUMNS = ("measure", "", "median", "5 %", "95 %", "highest rebound", "shot
 _KEYS = {"restitution": "restitution", "rebound height": "rebound_height_m"}
 
 
-_SHARES = (0.05, 0.5, 0.95)
-
 _Sample = Annotated[
-    dict[str, Real], Field(description="count, mean, standard_deviation, quantiles, highest.")
+    dict[str, Real],
+    Field(
+        description="count, mean, standard_deviation, standard_error (of the mean), quantiles, "
+        "highest."
+    ),
 ]
 
 
@@ -165,7 +167,7 @@ def _distribution(d: MeasuredDistribution) -> dict[str, Any]:
 
 def _moments(values: np.ndarray, highest: float) -> dict[str, float | None]:
     known = {"count": int(np.isfinite(values).sum()), "highest": number_or_none(highest)}
-    return moments(values, _SHARES) | known
+    return moments(values) | known
 
 
 def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) -> str:

@@ -4,7 +4,7 @@
 """
 
 from klack.analyses.analysis import StoredAnalysis
-from klack.analyses.shots.measures import SHOT_MEASURES
+from klack.analyses.shots.measures import RULE_MEASURES, SHOT_MEASURES
 from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.shots.summary import ShotsJson, shots_measured, shots_to_json, shots_told
 from klack.analyses.store import RecordFormat
@@ -32,6 +32,6 @@ SHOTS = StoredAnalysis(
     json=ShotsJson,
     to_json=shots_to_json,
     told=shots_told,
-    measures={"shot": SHOT_MEASURES},
+    measures={"shot": SHOT_MEASURES, "highest rebound": RULE_MEASURES},
     measured=shots_measured,
 )

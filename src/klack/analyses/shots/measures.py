@@ -3,8 +3,17 @@
 from collections.abc import Mapping
 
 from klack.analyses.measures import Measure, described_in
+from klack.analyses.shots.record import RuleVerdict
 
-__all__ = ["DRAWN", "FIRST_IMPACT", "ROCKING", "SHOT_MEASURES", "Shot"]
+__all__ = [
+    "DRAWN",
+    "FIRST_IMPACT",
+    "RESULTS",
+    "ROCKING",
+    "RULE_MEASURES",
+    "SHOT_MEASURES",
+    "Shot",
+]
 
 Shot = Mapping[str, float]
 """Numbers of one shot by the name of their column; see :class:`ShotColumns`."""
@@ -146,3 +155,47 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
     ),
 )
 """All columns of a shot, in their order."""
+
+RESULTS = tuple(item for item in SHOT_MEASURES if item not in DRAWN)
+"""What a shot ends with."""
+
+RULE_MEASURES: tuple[Measure[RuleVerdict], ...] = described_in(
+    "theory/measurement",
+    Measure(
+        key="restitution_bias",
+        symbol="e_h - e_0",
+        definition="Restitution of the shot with the highest rebound minus that of the centred "
+        "shot.",
+        form="signed",
+    ),
+    Measure(
+        key="rebound_height_bias",
+        symbol="h_h - h_0",
+        unit="m",
+        definition="Highest rebound minus that of the centred shot.",
+        json_name="rebound_height_bias",
+    ),
+    Measure(
+        key="relative_restitution_bias",
+        symbol="e_h/e_0 - 1",
+        definition="Restitution of the shot with the highest rebound over that of the centred "
+        "shot, minus 1.",
+        form="signed share",
+        digits=2,
+    ),
+    Measure(
+        key="relative_rebound_height_bias",
+        symbol="h_h/h_0 - 1",
+        definition="Highest rebound over that of the centred shot, minus 1.",
+        form="signed share",
+        digits=2,
+    ),
+    Measure(
+        key="rank",
+        symbol="n_h",
+        definition="Shots that rebound at least as high as the centred one.",
+        kind="whole",
+        json_name="shots_at_least_as_high_as_centric",
+    ),
+)
+"""Of the rule that takes the highest rebound of all shots for the centred one."""

@@ -1,16 +1,21 @@
-"""The model that all shots of a valve share: built once, centred, in first touch."""
+"""The model that all shots of a valve share: built once, centred, in first touch.
 
-from dataclasses import dataclass
+Its bodies with their modes follow from shapes, materials and supports alone; contact points, guide
+and flight also from speed, forces and distributions.  Designs that differ in the latter only share
+the bodies.
+"""
+
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
+from klack.analyses.impact.run import ImpactBodies, impact_bodies
 from klack.analyses.shots.draw import extreme_placements, shots_of
 from klack.analyses.shots.one_shot import ShotSetup, rigid_placement
-from klack.assembling.modes import mode_pools
-from klack.assembling.problem import ContactProblem, build_problem
+from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.placement import Placement
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
@@ -18,9 +23,10 @@ from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import extended_compliance
 from klack.mesh.mesh import Mesh, Surface
 from klack.progress import Progress
+from klack.stages import collected_warnings
 from klack.transient.interface_model import InterfaceModel
 
-__all__ = ["ShotModel", "build_shots", "centred_case"]
+__all__ = ["ShotModel", "build_shots", "centred_case", "shot_bodies", "shot_model"]
 
 # An eccentric contact carries on a part of the ring only, and yields more.
 _SOFTER = 1.6
@@ -32,44 +38,82 @@ _SPAN_OVER_CONTACT = 3.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShotModel:
-    """Result of :func:`build_shots`.
+    """Result of :func:`shot_model`.
 
     Parameters
     ----------
     setup : ShotSetup
-    problem : ContactProblem
-        Centred; its factorisations are closed.
     touch_height : float [m]
         z of first touch in the drawing of the moving body.
     modes : tuple of int
         Kept elastic modes of both bodies.
+    notes : tuple of str
+        Doubts about bodies and contact.
     """
 
     setup: ShotSetup
-    problem: ContactProblem
     touch_height: float
     modes: tuple[int, ...]
+    notes: tuple[str, ...]
 
 
 def centred_case(case: Case) -> Case:
-    """Return the case with the moving body centred, upright and in first touch."""
+    """Return the case with the moving body centred, upright and in first touch.
+
+    Transfer functions, which take more modes, are left to ``klack impact``.
+    """
     motion = case.motion.model_copy(update={"placement": Placement()})
     contact = case.contact.model_copy(update={"gap": 0.0})
     opposite = case.opposite
     if opposite is not None:  # its way counts from the start
         way = opposite.gap + (case.contact.gap or 0.0)
         opposite = opposite.model_copy(update={"gap": way})
-    return case.model_copy(update={"motion": motion, "contact": contact, "opposite": opposite})
+    run = case.run.model_copy(update={"transfer": None})
+    return case.model_copy(
+        update={"motion": motion, "contact": contact, "opposite": opposite, "run": run}
+    )
 
 
 def build_shots(case: Case, progress: Progress, *, threads: int | None = None) -> ShotModel:
-    """Mesh, factorise and reduce a case for many shots.
+    """Mesh, factorise and reduce a case for many shots; see :func:`shot_model`."""
+    with shot_bodies(case, progress, threads=threads) as bodies:
+        return shot_model(case, bodies, progress)
+
+
+def shot_bodies(case: Case, progress: Progress, *, threads: int | None = None) -> ImpactBodies:
+    """Bodies of all shots with their modes, centred and in first touch.
+
+    They follow from neither speed, forces, guide, damping nor the section ``shots``; with an upper
+    stop from speed and forces.
+    """
+    return impact_bodies(
+        centred_case(case), levels=(), certify=False, progress=progress, threads=threads
+    )
+
+
+def shot_model(case: Case, bodies: ImpactBodies, progress: Progress) -> ShotModel:
+    """Model of the shots of a case.
 
     The contact points are all those that any placement allowed by the distributions can close.
+
+    Parameters
+    ----------
+    case : Case
+        With a section ``shots``.
+    bodies : ImpactBodies
+        From :func:`shot_bodies` of this case, or of one with the same bodies; they stay open.
+    progress : callable
     """
+    with collected_warnings() as notes:
+        problem = contact_problem(centred_case(case), bodies.placed, progress)
+        model = _model(case, problem, bodies, progress)
+    return replace(model, notes=tuple(dict.fromkeys([*bodies.notes, *notes])))
+
+
+def _model(
+    case: Case, problem: ContactProblem, bodies: ImpactBodies, progress: Progress
+) -> ShotModel:
     shots = shots_of(case)
-    problem = build_problem(centred_case(case), progress, threads=threads)
-    pools = mode_pools(problem, at_least=1, progress=progress)
     progress("interface", 0.0)
     pair, height = problem.pair, _touch_height(problem.space)
     drawn_height = height - pair.shift
@@ -79,10 +123,9 @@ def build_shots(case: Case, progress: Progress, *, threads: int | None = None) -
         space, problem.static, problem.flexibility_upper, problem.flexibility_lower
     )
     progress("interface", 0.8)
-    model = build_interface(problem, pools, space=space, compliance=compliance)
-    guide = build_guide(problem, model, pools)
+    model = build_interface(problem, bodies.pools, space=space, compliance=compliance)
+    guide = build_guide(problem, model, bodies.pools)
     progress("interface", 1.0)
-    problem.close()
     speed, gap, spring = case.motion.speed, case.contact.gap or 0.0, case.motion.spring
     around = pair.upper.mesh.points[:, :2]
     distance = np.maximum(np.linalg.norm(around, axis=1, keepdims=True), 1e-12)
@@ -108,7 +151,7 @@ def build_shots(case: Case, progress: Progress, *, threads: int | None = None) -
     )
     elastic = model.omega > 0
     modes = tuple(int(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies)))
-    return ShotModel(setup=setup, problem=problem, touch_height=drawn_height, modes=modes)
+    return ShotModel(setup=setup, touch_height=drawn_height, modes=modes, notes=())
 
 
 def _touch_height(space: ContactSpace) -> float:

@@ -1,5 +1,6 @@
 """One drop of a valve at the interface level, from a draw to its numbers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -233,7 +234,7 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
     )
 
 
-def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
+def columns_of(outcomes: Sequence[ShotOutcome]) -> ShotColumns:
     """Numbers of several shots as columns."""
     return ShotColumns(
         **{
@@ -243,7 +244,7 @@ def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
     )
 
 
-def traces_of(setup: ShotSetup, outcomes: list[ShotOutcome]) -> ShotTraces:
+def traces_of(setup: ShotSetup, outcomes: Sequence[ShotOutcome]) -> ShotTraces:
     """Motion and force of several shots in rows."""
     return ShotTraces(
         time=setup.trace_time,

@@ -1,6 +1,8 @@
 """``klack shots``: many drops of one valve, each a little different, and the centred one."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
@@ -19,7 +21,14 @@ from klack.analyses.shots.draw import (
 )
 from klack.analyses.shots.log import ShotLog, shot_log, shots_mark
 from klack.analyses.shots.model import ShotModel, build_shots
-from klack.analyses.shots.one_shot import ShotSetup, columns_of, run_shot, simulate_shot, traces_of
+from klack.analyses.shots.one_shot import (
+    ShotOutcome,
+    ShotSetup,
+    columns_of,
+    run_shot,
+    simulate_shot,
+    traces_of,
+)
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
@@ -30,7 +39,15 @@ from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
-__all__ = ["judge_rule", "run_shots", "run_shots_on"]
+__all__ = [
+    "DroppedShots",
+    "drop_shots",
+    "highest_of",
+    "judge_rule",
+    "residual_notes",
+    "run_shots",
+    "run_shots_on",
+]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
@@ -85,18 +102,22 @@ def run_shots(
     mark = shots_mark(case, seed, threads)
     with shot_log(folder, mark) as log, collected_warnings() as notes:
         model = build_shots(case, clock, threads=threads)
-        draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
-        resumed = sum(draw.index in log.done for draw in draws)
-        clock("shots", 0.0)
-        centred = centric_draw(case)
-        centric = run_shot(model.setup, centred)
-        run_shots_on(workers, model.setup, draws, log, clock)
-        outcomes = [log.done[draw.index] for draw in draws]
-        shots = columns_of(outcomes)
-        alone = columns_of([centric])
-        highest = _highest(shots)
+        resumed = sum(index in log.done for index in range(count))
+        dropped = drop_shots(case, model, count, seed, workers, log, clock)
+        outcomes, shots = dropped.outcomes, dropped.shots
+        highest = highest_of(shots)
+        if highest is None:
+            raise ConvergenceError(
+                "shots: no shot reached the top of a rebound after a clear separation.\n"
+                "Try: a longer shots.duration, or another closing force: rebounds of less than "
+                "50 us belong to one impact."
+            )
         lowest = int(np.nanargmin(shots.restitution))
-        pictured = {"centric": centred, "highest": draws[highest], "lowest": draws[lowest]}
+        pictured = {
+            "centric": centric_draw(case),
+            "highest": dropped.draws[highest],
+            "lowest": dropped.draws[lowest],
+        }
         pressures = _pressures(model.setup, pictured)
         clock("shots", 1.0)
     return ShotsStudy(
@@ -115,15 +136,72 @@ def run_shots(
         mass=model.setup.model.mass,
         modes=model.modes,
         points=model.setup.model.count,
-        approach=max(outcome.approach for outcome in (*outcomes, centric)),
+        approach=max(outcome.approach for outcome in (*outcomes, dropped.alone)),
         shots=shots,
-        centric=alone,
+        centric=dropped.centric,
         shot_traces=traces_of(model.setup, outcomes),
-        centric_traces=traces_of(model.setup, [centric]),
+        centric_traces=traces_of(model.setup, [dropped.alone]),
         highest=highest,
-        rule=judge_rule(shots, alone, highest),
+        rule=judge_rule(shots, dropped.centric, highest),
         pressures=pressures,
-        warnings=(*notes, *_notes(model, shots)),
+        warnings=(
+            *dict.fromkeys([*model.notes, *notes]),
+            *_unfinished(shots),
+            *residual_notes(shots),
+        ),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DroppedShots:
+    """Computed shots of a model, and the centred one.
+
+    Parameters
+    ----------
+    draws : tuple of ShotDraw
+    outcomes : tuple of ShotOutcome
+        Of the draws, in their order.
+    alone : ShotOutcome
+        The centred shot.
+    """
+
+    draws: tuple[ShotDraw, ...]
+    outcomes: tuple[ShotOutcome, ...]
+    alone: ShotOutcome
+
+    @cached_property
+    def shots(self) -> ShotColumns:
+        """Numbers of the shots as columns."""
+        return columns_of(self.outcomes)
+
+    @cached_property
+    def centric(self) -> ShotColumns:
+        """Numbers of the centred shot as columns of one row."""
+        return columns_of([self.alone])
+
+
+def drop_shots(
+    case: Case,
+    model: ShotModel,
+    count: int,
+    seed: int,
+    workers: int,
+    log: ShotLog,
+    progress: Progress,
+) -> DroppedShots:
+    """Draw so many shots of a case, compute those that the log does not have, and the centred one.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        Of the first shot that fails; it is named.
+    """
+    draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
+    progress("shots", 0.0)
+    alone = run_shot(model.setup, centric_draw(case))
+    run_shots_on(workers, model.setup, draws, log, progress)
+    return DroppedShots(
+        draws=tuple(draws), outcomes=tuple(log.done[draw.index] for draw in draws), alone=alone
     )
 
 
@@ -176,15 +254,11 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
     )
 
 
-def _highest(shots: ShotColumns) -> int:
-    """Row with the highest rebound."""
+def highest_of(shots: ShotColumns) -> int | None:
+    """Row with the highest rebound; None where no shot reached the top of its rebound."""
     complete = np.isfinite(shots.rebound_height) & np.isfinite(shots.restitution)
     if not np.any(complete):
-        raise ConvergenceError(
-            "shots: no shot reached the top of a rebound after a clear separation.\n"
-            "Try: a longer shots.duration, or another closing force: rebounds of less than 50 us "
-            "belong to one impact."
-        )
+        return None
     return int(np.argmax(np.where(complete, shots.rebound_height, -np.inf)))
 
 
@@ -239,18 +313,20 @@ def _guide_in_words(guide: CaseGuide | None) -> str:
     return text
 
 
-def _notes(model: ShotModel, shots: ShotColumns) -> tuple[str, ...]:
-    """Notes on the results."""
-    notes = []
+def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
+    """Note on shots without a rebound."""
     unfinished = int(np.sum(~np.isfinite(shots.rebound_height)))
-    if unfinished:
-        notes.append(
-            f"{unfinished} of {shots.count} shots ended before the top of their rebound and have "
-            "no rebound height. Try: a longer shots.duration."
-        )
+    if not unfinished:
+        return ()
+    return (
+        f"{unfinished} of {shots.count} shots ended before the top of their rebound and have "
+        "no rebound height. Try: a longer shots.duration.",
+    )
+
+
+def residual_notes(shots: ShotColumns) -> tuple[str, ...]:
+    """Note on an energy balance that does not close."""
     residual = float(np.max(np.abs(shots.energy_residual)))
-    if residual > _LARGE_RESIDUAL:
-        notes.append(
-            f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step."
-        )
-    return tuple(notes)
+    if residual <= _LARGE_RESIDUAL:
+        return ()
+    return (f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step.",)

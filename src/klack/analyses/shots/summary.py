@@ -10,15 +10,14 @@ from typing_extensions import TypedDict
 from klack.analyses.analysis import Measured
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
-from klack.analyses.sample import moments
-from klack.analyses.shots.measures import FIRST_IMPACT, SHOT_MEASURES
-from klack.analyses.shots.record import ShotColumns, ShotsStudy
+from klack.analyses.sample import STATISTICS, moments
+from klack.analyses.shots.measures import FIRST_IMPACT, RULE_MEASURES, SHOT_MEASURES
+from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
     "DISTRIBUTION_COLUMNS",
-    "QUANTILES",
     "ShotsJson",
     "distribution_rows",
     "shots_measured",
@@ -26,19 +25,15 @@ __all__ = [
     "shots_told",
 ]
 
+_TOLD = tuple(
+    item for item in STATISTICS if item.key in ("mean", "sd", "lowest", "median", "highest")
+)
 DISTRIBUTION_COLUMNS = (
     "measure",
     "centred",
     "highest rebound",
-    "mean",
-    "standard deviation",
-    "lowest",
-    "median",
-    "highest",
+    *(item.name for item in _TOLD),
 )
-
-QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Shares of the shots that stay below."""
 
 
 @with_measures(SHOT_MEASURES)
@@ -46,15 +41,11 @@ class ShotJson(TypedDict):
     """One shot."""
 
 
+@with_measures(RULE_MEASURES)
 class HighestRuleJson(TypedDict):
     """Highest rebound against the centred shot."""
 
     holds: bool
-    restitution_bias: Real
-    rebound_height_bias: Real
-    relative_restitution_bias: Real
-    relative_rebound_height_bias: Real
-    shots_at_least_as_high_as_centric: int
     sentence: str
 
 
@@ -70,7 +61,10 @@ class ShotsJson(TypedDict):
     highest: Annotated[int, Field(description="Index of the highest rebound.")]
     distribution: Annotated[
         dict[str, dict[str, Real]],
-        Field(description="By measure: mean, standard_deviation, quantile_0 to quantile_1."),
+        Field(
+            description="By measure: mean, standard_deviation, standard_error (of the mean), "
+            "quantile_0 to quantile_1."
+        ),
     ]
     rule: HighestRuleJson
     wall_time_s: Real
@@ -90,7 +84,6 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         standard deviation and quantiles; ``rule``: highest rebound minus centred shot.  Numbers
         that do not exist (nan) are None.
     """
-    rule = study.rule
     return {
         "schema": "klack-shots/1",
         "case": study.case,
@@ -100,18 +93,9 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         "shots": [_row(study.shots, i) for i in range(study.shots.count)],
         "highest": study.highest,
         "distribution": {
-            measure.json_key: moments(getattr(study.shots, measure.key), QUANTILES)
-            for measure in FIRST_IMPACT
+            measure.json_key: moments(getattr(study.shots, measure.key)) for measure in FIRST_IMPACT
         },
-        "rule": {
-            "holds": rule.holds,
-            "restitution_bias": number_or_none(rule.restitution_bias),
-            "rebound_height_bias": number_or_none(rule.rebound_height_bias),
-            "relative_restitution_bias": number_or_none(rule.relative_restitution_bias),
-            "relative_rebound_height_bias": number_or_none(rule.relative_rebound_height_bias),
-            "shots_at_least_as_high_as_centric": rule.rank,
-            "sentence": rule.sentence,
-        },
+        "rule": _rule(study.rule),
         "wall_time_s": number_or_none(study.wall_time),
         "shot_time_s": number_or_none(study.shot_time),
         "workers": study.workers,
@@ -127,10 +111,11 @@ def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
 
 
 def shots_measured(study: ShotsStudy) -> Iterator[Measured]:
-    """The centred shot and every other with its measures."""
+    """The centred shot, every other, and the rule of the highest rebound with their measures."""
     yield "centred", study.centric.row(0), SHOT_MEASURES
     for index in range(study.shots.count):
         yield f"shot {index}", study.shots.row(index), SHOT_MEASURES
+    yield "rule", study.rule, RULE_MEASURES
 
 
 def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
@@ -138,7 +123,7 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
     rows = []
     for measure in FIRST_IMPACT:
         values = getattr(study.shots, measure.key)
-        found = moments(values, (0.0, 0.5, 1.0))
+        found = moments(values, _TOLD)
         numbers = (
             float(getattr(study.centric, measure.key)[0]),
             float(values[study.highest]),
@@ -146,6 +131,10 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
         )
         rows.append((measure.name, *(_text(number, measure.unit) for number in numbers)))
     return tuple(rows)
+
+
+def _rule(rule: RuleVerdict) -> Any:
+    return {"holds": rule.holds, **json_of(RULE_MEASURES, rule), "sentence": rule.sentence}
 
 
 def _row(columns: ShotColumns, index: int) -> Any:
