@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import klack
 from klack.case import load_case, read_case
 from klack.case.distribution import Distribution
+from klack.case.key_path import quantity_at, split_path
 from klack.errors import InputError
+from klack.input.problem import CaseProblem
 
 DATA = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 TEXT = DATA.read_text(encoding="utf-8")
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 GUIDE = "guide: {surface: shaft, heights: [6 mm, 13 mm], clearance: 4 um}\n"
 SHOTS = "shots: {count: 20, seed: 7}\n"
 
@@ -181,3 +185,16 @@ def test_half_sections_cannot_leave_their_axis(more, key):
 
     assert caught.value.where.endswith(key)
     assert "model: swept" in caught.value.hint
+
+
+def test_numbers_of_distributions_have_paths():
+    """As the file has them: one number, or the entries of its distribution."""
+    case = klack.load_case(HOW_TO / "guided_needle.yaml")
+    assert case.value("shots.force") == {"uniform": (0.8, 1.2)}
+    assert case.with_value("shots.force.uniform.1", "1.4 N").value("shots.force.uniform.1") == 1.4
+    assert quantity_at(case.checked, split_path("shots.waviness.rms")).parse("0.3 um") == 3e-7
+    with pytest.raises(InputError, match="expected 0 or more"):
+        quantity_at(case.checked, split_path("shots.waviness.rms")).parse("-1 um")
+    with pytest.raises(CaseProblem) as problem:
+        quantity_at(case.checked, split_path("shots.force"))
+    assert problem.value.hint.endswith("such as shots.force.uniform.0.")

@@ -77,6 +77,14 @@ class Distribution:
         """True if every draw gives the same."""
         return self.kind == "fixed" or (self.kind == "uniform" and self.first == self.second)
 
+    @property
+    def written(self) -> float | dict[str, float | tuple[float, float]]:
+        """What a case file has for it [SI]: a number, or one key with its numbers."""
+        if self.kind == "fixed":
+            return self.first
+        both = (self.first, self.second)
+        return {self.kind: both if _NUMBERS[self.kind] == 2 else self.first}
+
     def text(self, unit: str) -> str:
         """Describe it as people do: ``uniform between 1 um and 3 um``."""
         first, second = format_si(self.first, unit), format_si(self.second, unit)

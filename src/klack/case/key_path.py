@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, get_args
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from klack.case.distribution import Distribution
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
@@ -44,7 +45,8 @@ class Quantity:
         kind: Any = info.annotation
         adapter = TypeAdapter[Any](Annotated[kind, *info.metadata] if info.metadata else kind)
         try:
-            return float(adapter.validate_python(text, context={}))
+            value = adapter.validate_python(text, context={})
+            return float(value.first if isinstance(value, Distribution) else value)
         except ValidationError as error:
             details = error.errors(include_url=False)[0]
             own = details.get("ctx", {}).get("error")
@@ -84,6 +86,8 @@ def split_path(text: str) -> Key:
 def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
     """Find the value at a key of a checked case, and the field that describes it.
 
+    A distribution is what the case file has there: one number, or ``{"uniform": (low, high)}``.
+
     Raises
     ------
     CaseProblem
@@ -104,6 +108,8 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
         if isinstance(node, Section):
             field = _fields(node)[str(part)]
         node = found[part]
+        if isinstance(node, Distribution):
+            node = node.written
     return node, field
 
 
@@ -131,11 +137,20 @@ def quantity_at(case: Section, key: Key) -> Quantity:
             (),
             got=f"'{'.'.join(map(str, key))}', which holds {got}",
             expected="a key with one number and unit, such as a force or a share",
-            hint="write a start value there, or name another key."
-            if node is None
-            else "klack schema describes each key.",
+            hint=_advice(key, node),
         )
     return Quantity(key, kind, float(node), field)
+
+
+def _advice(key: Key, node: Any) -> str:
+    if node is None:
+        return "write a start value there, or name another key."
+    place = ".".join(map(str, key))
+    below = next(iter(node.items())) if isinstance(node, Mapping) and node else (None, None)
+    if isinstance(below[1], float | tuple):  # a distribution
+        name = f"{below[0]}.0" if isinstance(below[1], tuple) else below[0]
+        return f"name one of the numbers below it, such as {place}.{name}."
+    return "klack schema describes each key."
 
 
 def written_at(data: Any, key: Key) -> Any:
@@ -172,7 +187,8 @@ def _fields(node: Section) -> dict[str, FieldInfo]:
 def kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
     """Kind of quantity that a type takes, wherever it is nested."""
     for item in metadata:
-        if isinstance(item, BeforeValidator) and isinstance(item.func, partial):
+        reads = isinstance(item, BeforeValidator | PlainValidator)
+        if reads and isinstance(item.func, partial):
             kind = item.func.keywords.get("kind")
             if isinstance(kind, Kind):
                 return kind
