@@ -393,4 +393,8 @@ def _rows_of_file(
 
 
 def _cell(where: str, text: str, item: Parameter) -> float | str:
-    return text if item.kind is None else parse_quantity(text, item.kind, where)
+    """A quantity, a whole number where the case has one, or a word."""
+    if item.kind is not None:
+        return parse_quantity(text, item.kind, where)
+    is_whole = isinstance(item.today, int) and text.isascii() and text.isdecimal()
+    return int(text) if is_whole else text
