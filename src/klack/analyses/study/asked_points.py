@@ -35,7 +35,7 @@ Taken = Callable[[], Sequence[warnings.WarningMessage]]
 
 
 class PointKind(Protocol[CaseT, Built]):
-    """What a study computes at its points: strokes of a valve, impacts of two bodies.
+    """What a study computes at its points: strokes of a valve, impacts and shots of two bodies.
 
     Points are computed one by one, each by the functions of a single run, so that a row depends
     neither on who computes it nor on the other points.  Those with the same bodies share what is
@@ -54,8 +54,21 @@ class PointKind(Protocol[CaseT, Built]):
             For a key of the study that this kind of case does not have; ``where`` is that key.
         """
 
-    def variant(self, case: CaseT, name: str | None) -> str:
+    def variant(self, case: CaseT, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
         """Check that a case can run a variant, or level; its own one by default.
+
+        Parameters
+        ----------
+        case : Case or ValveCase
+        name : str or None
+        chosen : sequence of ChosenMeasure
+            What the points are computed for.
+
+        Returns
+        -------
+        str
+            What is computed at the points: with equal values of its keys a point is the same if
+            this is.
 
         Raises
         ------
@@ -171,7 +184,7 @@ class AskedPoints(Generic[CaseT]):
     points : Points
     chosen : tuple of ChosenMeasure
     variant : str
-        Of the stroke; of an impact its level.
+        Of the stroke; of an impact its level, ``"shots"``, or both.
     """
 
     kind: PointKind[CaseT, Any] = field(compare=False)

@@ -90,14 +90,14 @@ class ChosenMeasure:
     measure : Measure
     of : str
         What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
-        an impact, a ``"click"`` or the noise ``"design"``.
+        an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
     part : callable
         Of a run, what the measure is read from; None where the run does not have it.
     """
 
     name: str
     measure: Measure[Any]
-    of: Literal["variant", "impact", "level", "click", "design"]
+    of: Literal["variant", "impact", "level", "shots", "click", "design"]
     part: Callable[[Any], Any]
 
     @property

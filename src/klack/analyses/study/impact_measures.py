@@ -1,4 +1,4 @@
-"""Measures of an impact by their names: of its level, and of its noise."""
+"""Measures of an impact by their names: of its level, of its noise, and of its shots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from operator import attrgetter
 
 from klack.analyses.impact.measures import LEVEL_MEASURES
 from klack.analyses.impact.record import LevelResult
+from klack.analyses.shots.run import DroppedShots
 from klack.analyses.study.chosen_measures import (
     NOISE_NAMES,
     NOISE_WORDS,
@@ -14,6 +15,7 @@ from klack.analyses.study.chosen_measures import (
     choose_measures,
     noise_measure,
 )
+from klack.analyses.study.shot_measures import SHOT_NAMES, SHOT_WORDS, SHOTS, shot_measure
 from klack.case.schema import Case
 from klack.errors import InputError
 from klack.input.problem import one_of
@@ -27,29 +29,37 @@ _OF_LEVELS = {item.key: item for item in LEVEL_MEASURES if item.key not in _OF_T
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImpactOfPoint:
-    """Impact of a point at one level, and its noise.
+    """What the measures of a point are read from, as far as they ask for it.
 
     Parameters
     ----------
-    level : LevelResult
-    noise : PointNoise
+    level : LevelResult, optional
+        Of the impact.
+    noise : PointNoise, optional
+        Of that impact.
+    shots : DroppedShots, optional
     """
 
-    level: LevelResult
-    noise: PointNoise
+    level: LevelResult | None = None
+    noise: PointNoise | None = None
+    shots: DroppedShots | None = None
 
 
 def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-    """Find measures of an impact by their names, each once: ``"peak_force"``, ``"restitution"``.
+    """Find measures of an impact by their names, each once.
+
+    ``"peak_force"`` of the level; ``"noise.radiated_energy"``; ``"shots.restitution.mean"``.
 
     Raises
     ------
     InputError
         For a name that an impact does not have, with the nearest one; for none at all; for noise
-        of bodies without surfaces.
+        of bodies without surfaces, and shots of a case without them.
     """
-    words = f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
-    chosen = choose_measures(names, _found, [*_OF_LEVELS, *NOISE_NAMES], words, "peak_force")
+    known, words = [*_OF_LEVELS, *NOISE_NAMES], f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
+    if case.shots is not None:
+        known, words = [*known, *SHOT_NAMES], f"{words}; {SHOT_WORDS}"
+    chosen = choose_measures(names, lambda name: _found(case, name), known, words, "peak_force")
     for item in chosen:
         if item.is_noise and not case.has_surfaces:
             raise InputError(
@@ -61,9 +71,19 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
     return chosen
 
 
-def _found(name: str) -> ChosenMeasure | None:
+def _found(case: Case, name: str) -> ChosenMeasure | None:
     if name in _OF_LEVELS:
         return ChosenMeasure(name, _OF_LEVELS[name], "level", attrgetter("level"))
+    if name.partition(".")[0] == SHOTS:
+        if case.shots is None:
+            raise InputError(
+                "measures",
+                got=f"'{name}', of a case without the section 'shots'",
+                expected=f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}",
+                hint="add 'shots: {count: 50}' to the case, and a 'guide', or 'eccentricity' and "
+                "'tilt'.",
+            )
+        return shot_measure(name)
     noise = noise_measure(name)
     own = name.rpartition(".")[2]
     if noise is None and own in _OF_LEVELS:

@@ -1,9 +1,14 @@
-"""Impacts of two bodies as points of a study.
+"""Impacts and shots of two bodies as points of a study.
 
-Most of an impact holds the interpreter, so that threads compute one point at a time.
+What the measures ask for is computed: one impact at the level of the study, many shots at the
+interface level, or both.  Every point draws its shots from the same random numbers, that is of the
+seed of the case, so that two designs differ by what they are and not by their luck.
+
+Most of it holds the interpreter, so that threads compute one point at a time.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from klack.analyses.contact_doubts import contact_doubt
@@ -13,10 +18,15 @@ from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bod
 from klack.analyses.impact.summary import no_estimate
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import impact_sources
+from klack.analyses.shots.draw import shots_of
+from klack.analyses.shots.log import shot_log
+from klack.analyses.shots.model import shot_bodies, shot_model
+from klack.analyses.shots.run import drop_shots, residual_notes
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.impact_measures import ImpactOfPoint, impact_measures
 from klack.analyses.study.point_row import PointRow, doubts_in, others_in
+from klack.analyses.study.shot_measures import SHOTS, shot_notes
 from klack.analyses.threads import Stopped, never_stopped
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at
@@ -29,7 +39,10 @@ from klack.signals import TimeSeries
 
 __all__ = ["IMPACTS"]
 
-_ASIDE = ("run", "lumped", "shots", "measurement", "noise", "study", "title", "description")
+_ASIDE = (
+    *("run", "lumped", "guide", "shots"),
+    *("measurement", "noise", "study", "title", "description"),
+)
 """Sections that bodies and modes do not depend on."""
 _OF_THE_IMPACT = (
     ("motion", "speed"),
@@ -44,9 +57,19 @@ _OF_THE_IMPACT = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Built:
-    """Bodies of a group; None where every impact builds its own: in full, and of given models."""
+    """Bodies of a group.
+
+    Parameters
+    ----------
+    bodies : ImpactBodies or None
+        Of the impact; None where every impact builds its own (in full, and of given models), and
+        where no measure takes one.
+    shots : ImpactBodies or None
+        Of the shots, which start centred and in first touch; None where no measure takes them.
+    """
 
     bodies: ImpactBodies | None
+    shots: ImpactBodies | None
 
 
 class _Impacts:
@@ -65,15 +88,16 @@ class _Impacts:
             )
         return study.level
 
-    def variant(self, case: Case, name: str | None) -> str:
-        """The level ``reduced`` by default."""
+    def variant(self, case: Case, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
+        """The level, ``reduced`` by default, as far as a measure takes an impact; and shots."""
         (level,) = case.require_levels([name or "reduced"])
         if not case.has_surfaces:
             require_given_levels(case, [level])
-        return level
+        of_shots = [item.of == SHOTS for item in chosen]
+        return _WITH.join([level] * (not all(of_shots)) + [SHOTS] * any(of_shots))
 
     def measures(self, case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-        """Of a level, and of its noise."""
+        """Of a level, of its noise, and of shots."""
         return impact_measures(case, names)
 
     def require_keys(self, keys: Iterable[PointKey]) -> None:
@@ -84,8 +108,9 @@ class _Impacts:
     def makes_bodies(self, case: Case, place: Key) -> bool:
         """Whether meshes, places or modes may follow from what stands there.
 
-        The static contact, the pressure pattern and the law follow from speed and forces, and are
-        those of each point.  An upper stop is built for the energy of one impact.
+        The static contact, the pressure pattern and the law follow from speed and forces, the
+        contact points of shots from their distributions, too; all of them are those of each point.
+        So is the guide.  An upper stop is built for the energy of one impact.
         """
         if place[0] in _ASIDE:
             return place[:2] == ("run", "transfer")  # takes more modes
@@ -106,17 +131,24 @@ class _Impacts:
         case: Case,
         progress: Progress,
     ) -> _Built:
-        """Bodies and modes."""
-        if asked.variant == "full" or not case.has_surfaces:
-            return _Built(None)
-        bodies = impact_bodies(case, levels=(asked.variant,), progress=progress, threads=1)
-        bodies.placed.keep_no_more()
-        return _Built(bodies)
+        """Bodies and modes, of an impact and of shots each their own."""
+        level = _level(asked)
+        with ExitStack() as opened:
+            bodies = shots = None
+            if level not in ("", "full") and case.has_surfaces:
+                bodies = impact_bodies(case, levels=(level,), progress=progress, threads=1)
+                opened.enter_context(bodies).placed.keep_no_more()
+            if _has_shots(asked):
+                shots = shot_bodies(case, progress, threads=1)
+                opened.enter_context(shots).placed.keep_no_more()
+            opened.pop_all()
+        return _Built(bodies, shots)
 
     def close(self, built: _Built) -> None:
         """Free the factorisations."""
-        if built.bodies is not None:
-            built.bodies.close()
+        for bodies in (built.bodies, built.shots):
+            if bodies is not None:
+                bodies.close()
 
     def crew(
         self,
@@ -138,47 +170,135 @@ class _Impacts:
     ) -> PointRow:
         """Compute one point."""
         try:
-            study, run = _impact(asked, built, place, check)
-            values = tuple(item.value(run) for item in asked.chosen)
+            found = _point(asked, built, place, check)
+            values = tuple(item.value(found.run) for item in asked.chosen)
         except Stopped:
             raise
         except Exception as error:  # one point less, as the caller says
             return replace(asked.failed(error), others=others_in(taken()))
         caught = taken()
-        notes = [*study.warnings, contact_doubt(study.contact), no_estimate(study)]
-        notes += [_other_answer(study, asked.variant), *run.noise.notes, *doubts_in(caught)]
+        notes = [*found.notes, *doubts_in(caught)]
+        if found.run.noise is not None:
+            notes += found.run.noise.notes
         return PointRow(
             values,
             notes=tuple(dict.fromkeys(filter(None, notes))),
             others=others_in(caught),
-            model=_model(study, asked.variant),
+            model=found.model,
         )
 
     def pressure(self, asked: AskedPoints[Case], built: _Built, place: int) -> TimeSeries | None:
         """Sound of a click."""
-        return _impact(asked, built, place, never_stopped)[1].noise.pressure
+        noise = _point(asked, built, place, never_stopped).run.noise
+        return None if noise is None else noise.pressure
 
 
 IMPACTS = _Impacts()
-"""Impacts of a case of two bodies."""
+"""Impacts and shots of a case of two bodies."""
+
+_WITH = " + "
+"""Between the level of an impact and its shots."""
 
 
-def _impact(
+def _level(asked: AskedPoints[Case]) -> str:
+    """Level of the impact; empty where there is none."""
+    return asked.variant.partition(_WITH)[0] if asked.variant != SHOTS else ""
+
+
+def _has_shots(asked: AskedPoints[Case]) -> bool:
+    return asked.variant.rpartition(_WITH)[2] == SHOTS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """What a point was computed to.
+
+    Parameters
+    ----------
+    run : ImpactOfPoint
+    notes : tuple of str
+        Doubts; an empty one is none.
+    models : tuple of str
+        Levels with their modes and laws.
+    meshes : tuple of (str, int)
+        Bodies and their nodes.
+    """
+
+    run: ImpactOfPoint
+    notes: tuple[str, ...]
+    models: tuple[str, ...]
+    meshes: tuple[tuple[str, int], ...]
+
+    @property
+    def model(self) -> str:
+        """What the numbers come from, in words."""
+        meshes = ", ".join(f"{name} {nodes} nodes" for name, nodes in self.meshes)
+        return "; ".join(filter(None, (*self.models, meshes)))
+
+    def with_shots(self, other: "_Point") -> "_Point":
+        """Both of an impact and of its shots."""
+        return _Point(
+            replace(self.run, shots=other.run.shots),
+            (*self.notes, *other.notes),
+            (*self.models, *other.models),
+            self.meshes,
+        )
+
+
+def _point(
     asked: AskedPoints[Case], built: _Built, place: int, check: Callable[[], None]
-) -> tuple[ImpactStudy, ImpactOfPoint]:
-    """Impact of a point."""
+) -> _Point:
+    """Impact and shots of a point, as far as its measures take them."""
     case = case_at(Case, asked.tree, asked.tree, asked.points.changes(place))
-    levels = case.require_levels((asked.variant,))
+    level = _level(asked)
 
     def progress(stage: str, fraction: float) -> None:
         check()
 
-    if built.bodies is None:
+    if built.shots is None:
+        return _impact(case, built.bodies, level, progress)
+    names = [item.name for item in asked.chosen if item.of == SHOTS]
+    if not level:
+        return _shots(case, built.shots, names, progress)
+    impact = _impact(case, built.bodies, level, progress)
+    return impact.with_shots(_shots(case, built.shots, names, progress))
+
+
+def _impact(case: Case, bodies: ImpactBodies | None, level: str, progress: Progress) -> _Point:
+    """Impact of a point."""
+    levels = case.require_levels((level,))
+    if bodies is None:
         study = run_impact(case, levels=levels, progress=progress, threads=1)
     else:
-        study = impact_of_bodies(case, built.bodies, levels=levels, progress=progress)
+        study = impact_of_bodies(case, bodies, levels=levels, progress=progress)
     noise = PointNoise(lambda: impact_sources(study, levels, case)[0], Transfers())
-    return study, ImpactOfPoint(study.levels[asked.variant], noise)
+    return _Point(
+        ImpactOfPoint(level=study.levels[level], noise=noise),
+        (
+            *study.warnings,
+            contact_doubt(study.contact),
+            no_estimate(study),
+            _other_answer(study, level),
+        ),
+        (study.levels[level].label,),
+        tuple((body.name, body.nodes) for body in study.bodies if body.nodes),
+    )
+
+
+def _shots(case: Case, bodies: ImpactBodies, names: list[str], progress: Progress) -> _Point:
+    """Shots of a point, one after another, as ``klack shots`` computes them."""
+    given, model = shots_of(case), shot_model(case, bodies, progress)
+    with shot_log(None, "") as log:
+        found = drop_shots(case, model, given.count, given.seed, 1, log, progress)
+    notes = (*model.notes, *residual_notes(found.shots), *shot_notes(names, found))
+    pair = bodies.placed.pair
+    modes = " + ".join(map(str, model.modes))
+    return _Point(
+        ImpactOfPoint(shots=found),
+        notes,
+        (f"shots at the interface level, {modes} modes",),
+        tuple((body.name, body.mesh.node_count) for body in (pair.upper, pair.lower)),
+    )
 
 
 def _other_answer(study: ImpactStudy, level: str) -> str:
@@ -189,9 +309,3 @@ def _other_answer(study: ImpactStudy, level: str) -> str:
         f"the numbers of this point are those of level '{level}', the answer of a single impact "
         f"would be that of level '{study.reference}'. Try: level: {study.reference} in the study."
     )
-
-
-def _model(study: ImpactStudy, level: str) -> str:
-    """Level, modes and law, and the meshes of the bodies."""
-    meshes = (f"{body.name} {body.nodes} nodes" for body in study.bodies if body.nodes)
-    return "; ".join(filter(None, (study.levels[level].label, ", ".join(meshes))))

@@ -15,7 +15,7 @@ __all__ = ["ask", "kind_of"]
 
 
 def kind_of(case: AnyCase) -> PointKind[Any, Any]:
-    """Impacts of two bodies, or strokes of a whole valve."""
+    """Impacts and shots of two bodies, or strokes of a whole valve."""
     return IMPACTS if isinstance(case, Case) else STROKES
 
 
@@ -53,5 +53,5 @@ def ask(
         tree=tree,
         points=asked,
         chosen=chosen,
-        variant=kind.variant(case, variant),
+        variant=kind.variant(case, variant, chosen),
     )

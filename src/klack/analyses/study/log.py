@@ -52,9 +52,10 @@ class KeptPoint:
         return PointRow(values, "", self.notes, model=self.model)
 
     def with_row(self, measures: tuple[str, ...], row: PointRow) -> "KeptPoint":
-        """The same with what was computed now."""
+        """The same with what was computed now; doubts of what was there before stay."""
         values = dict(self.values) | dict(zip(measures, row.values, strict=True))
-        return KeptPoint(values=values, failure=row.failure, notes=row.notes, model=row.model)
+        notes = tuple(dict.fromkeys((*self.notes, *row.notes)))
+        return KeptPoint(values=values, failure=row.failure, notes=notes, model=row.model)
 
 
 PointLog = UnfinishedLog[str, KeptPoint]

@@ -33,6 +33,7 @@ from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
+from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
@@ -94,6 +95,7 @@ def run_optimisation(
     begin = perf_counter()
     space = space_of(case, source)
     require_varied(source, space.varied)
+    _require_same_draws(source)
     study = source.study
     names = dict.fromkeys((*study.measures, *study.objectives, *study.constraints))
     asked = asked_of(case, tree, source, [{}], names)
@@ -147,6 +149,28 @@ def run_optimisation(
         ended = _polish(source, work, front, slopes, clock) if slopes is not None else []
         sounds = _sounds(work, front, clock)
     return record(sounds, (*ended, *notes))
+
+
+_DRAWS = ("shots.seed", "shots.count")
+"""Keys that decide which shots are drawn, and nothing about the valve."""
+
+
+def _require_same_draws(source: StudySource) -> None:
+    """Refuse a search among draws of shots: it would find the luckiest of them.
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    for name in _DRAWS:
+        if name in source.study.parameters:
+            raise InputError(
+                source.where(("parameters", name)),
+                got=f"'{name}' as a parameter of a search, which would find the luckiest draw",
+                expected="the same shots for all points",
+                hint="remove it here; klack study compares seeds.",
+            )
 
 
 class _Work:

@@ -283,7 +283,7 @@ class StudyRecord(CaseRecord):
     study_text : str
         Of the file of the study; empty if it stands in the case.
     variant : str
-        Of the stroke; of an impact its level.
+        Of the stroke; of an impact its level, ``"shots"``, or both.
     design : str
         Where the points lie, in words.
     threads : int

@@ -15,8 +15,10 @@ from klack.analyses.study.chosen_measures import (
     choose_measures,
     noise_measure,
 )
+from klack.analyses.study.shot_measures import SHOTS
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
+from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.simulation.network_result import ImpactEvent
 
@@ -73,6 +75,13 @@ def _found(name: str, stops: list[str]) -> ChosenMeasure | None:
             return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, 0))
         if number[0].isascii() and number[0].isdecimal() and int(number[0]) > 0:
             return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, int(number[0])))
+    if stop == SHOTS and stop not in stops:
+        raise InputError(
+            "measures",
+            got=f"'{name}' in the study of a whole valve",
+            expected=_known_words(stops),
+            hint="shots are drops of two bodies: study a case of an impact with a section 'shots'.",
+        )
     return noise_measure(name)
 
 

@@ -97,7 +97,7 @@ class _Strokes:
             )
         return study.variant
 
-    def variant(self, case: ValveCase, name: str | None) -> str:
+    def variant(self, case: ValveCase, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
         """The first one of the case by default."""
         return case.one_variant(name)
 

@@ -129,8 +129,10 @@ class StudyJson(TypedDict):
     schema: Literal["klack-study/1"]
     case: str
     klack: Version
-    variant: Annotated[str, Field(description="Of the stroke; of an impact its level.")]
-    model: Annotated[str, Field(description="Of an impact: its modes, law and meshes.")]
+    variant: Annotated[
+        str, Field(description="Of the stroke; of an impact its level, 'shots', or both.")
+    ]
+    model: Annotated[str, Field(description="Of impact and shots: modes, law and meshes.")]
     design: str
     points: int
     failed: int

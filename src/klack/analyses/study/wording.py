@@ -83,8 +83,13 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
 
 
 def variant_words(record: StudyRecord) -> str:
-    """Variant of a stroke, or level of an impact."""
-    return f"level '{record.variant}'" if record.model else record.variant
+    """Variant of a stroke; level of an impact, its shots, or both."""
+    if not record.model:
+        return record.variant
+    level, _, shots = record.variant.partition(" + ")
+    if level == "shots":
+        return level
+    return f"level '{level}' and {shots}" if shots else f"level '{level}'"
 
 
 EFFECT_COLUMNS = ("parameter", "size", "standard error", "mean", "scatter", "effects")
