@@ -1,5 +1,6 @@
 """Many shots; truth = a ball thrown upwards, energy, and the same shots computed otherwise."""
 
+import warnings
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from energy_ledger import allowed
 
+from klack.analyses.shots import one_shot
 from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.log import SHOT_LOG, shot_log, shots_mark
@@ -14,7 +16,7 @@ from klack.analyses.shots.measures import FIRST_IMPACT
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
 from klack.analyses.shots.record import ShotColumns
-from klack.analyses.shots.run import judge_rule, run_shots, run_shots_on
+from klack.analyses.shots.run import DroppedShots, judge_rule, run_shots, run_shots_on, shot_doubts
 from klack.analyses.shots.summary import (
     DISTRIBUTION_COLUMNS,
     distribution_rows,
@@ -23,7 +25,7 @@ from klack.analyses.shots.summary import (
 from klack.analyses.store import stored_format
 from klack.api import Result
 from klack.case import load_case
-from klack.errors import ConvergenceError, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.progress import silent
 
 CASE = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
@@ -282,3 +284,21 @@ def test_shots_as_a_dataset(study):
     assert data.peak_force.attrs["units"] == "N"
     with pytest.raises(InputError, match="one of: shots"):
         Result(study, SHOTS).to_xarray("1")
+
+
+def test_doubts_of_a_shot_stay_with_it_in_the_log(model, draws, alone, tmp_path, monkeypatch):
+    """Also those of a worker process, and of a run that was interrupted."""
+
+    def doubtful(*given, **named):
+        warnings.warn("it is off by 2e-3", AccuracyWarning, stacklevel=1)
+        return real(*given, **named)
+
+    real = one_shot.simulate_shot
+    monkeypatch.setattr(one_shot, "simulate_shot", doubtful)
+    with shot_log(tmp_path, "mark") as log:
+        run_shots_on(1, model.setup, draws[:2], log, silent)
+    with shot_log(tmp_path, "mark") as again:
+        assert [again.done[index].doubts for index in (0, 1)] == [("it is off by 2e-3",)] * 2
+        outcomes = (*(again.done[index] for index in (0, 1)), alone[2])
+    dropped = DroppedShots(draws=(), outcomes=outcomes, alone=alone[3])
+    assert shot_doubts(dropped) == ("2 of 3 shots, first shot 0: it is off by 2e-3",)

@@ -27,7 +27,7 @@ def _data(index: int, outcome: ShotOutcome) -> Mapping[str, Any]:
         "height": outcome.height.tolist(),
         "force": outcome.force.tolist(),
         "approach": outcome.approach,
-    }
+    } | ({"doubts": list(outcome.doubts)} if outcome.doubts else {})
 
 
 def _outcome(data: Mapping[str, Any]) -> tuple[int, ShotOutcome]:
@@ -37,6 +37,7 @@ def _outcome(data: Mapping[str, Any]) -> tuple[int, ShotOutcome]:
         height=np.array(data["height"], dtype=np.float32),
         force=np.array(data["force"], dtype=np.float32),
         approach=float(data["approach"]),
+        doubts=tuple(map(str, data.get("doubts", ()))),
     )
     return outcome.index, outcome
 

@@ -11,6 +11,7 @@ from klack.analyses.shots.record import ShotColumns, ShotTraces
 from klack.contact.gap_update import RigidGaps
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.mesh.rigid import Pose
+from klack.stages import collected_warnings
 from klack.transient.guide import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
@@ -147,6 +148,8 @@ class ShotOutcome:
         On the grids of the setup.
     approach : float [m]
         Largest way of the moving body after first touch.
+    doubts : tuple of str
+        Accuracy warnings of its run, in whichever process.
     """
 
     index: int
@@ -154,6 +157,7 @@ class ShotOutcome:
     height: NDArray[np.float32]
     force: NDArray[np.float32]
     approach: float
+    doubts: tuple[str, ...] = ()
 
 
 def simulate_shot(
@@ -190,7 +194,8 @@ def simulate_shot(
 
 def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
     """Simulate one shot and measure its first impact and its rebound."""
-    result = simulate_shot(setup, draw)
+    with collected_warnings() as doubts:
+        result = simulate_shot(setup, draw)
     first = measure_impact(result.impacts[0].history)
     second = np.nan
     if len(result.impacts) > 1:
@@ -231,6 +236,7 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
         height=trace.astype(np.float32),
         force=force.astype(np.float32),
         approach=result.approach,
+        doubts=tuple(doubts),
     )
 
 

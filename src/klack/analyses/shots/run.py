@@ -1,5 +1,6 @@
 """``klack shots``: many drops of one valve, each a little different, and the centred one."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,7 +37,7 @@ from klack.case.schema import Case
 from klack.cores import available_cores
 from klack.errors import ConvergenceError, require_positive
 from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
 __all__ = [
@@ -44,13 +45,14 @@ __all__ = [
     "drop_shots",
     "highest_of",
     "judge_rule",
-    "residual_notes",
     "run_shots",
     "run_shots_on",
+    "shot_doubts",
 ]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def run_shots(
@@ -118,7 +120,8 @@ def run_shots(
             "highest": dropped.draws[highest],
             "lowest": dropped.draws[lowest],
         }
-        pressures = _pressures(model.setup, pictured)
+        with trial():  # once more what has told its doubts
+            pressures = _pressures(model.setup, pictured)
         clock("shots", 1.0)
     return ShotsStudy(
         **case_fields(case),
@@ -147,7 +150,7 @@ def run_shots(
         warnings=(
             *dict.fromkeys([*model.notes, *notes]),
             *_unfinished(shots),
-            *residual_notes(shots),
+            *shot_doubts(dropped),
         ),
     )
 
@@ -324,9 +327,19 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
     )
 
 
-def residual_notes(shots: ShotColumns) -> tuple[str, ...]:
-    """Note on an energy balance that does not close."""
-    residual = float(np.max(np.abs(shots.energy_residual)))
-    if residual <= _LARGE_RESIDUAL:
-        return ()
-    return (f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step.",)
+def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
+    """Doubts of single shots, those that differ in numbers only as one; and energy from nowhere."""
+    notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
+    alike: dict[str, list[tuple[int, str]]] = {}
+    for outcome in dropped.outcomes:
+        for doubt in outcome.doubts:
+            alike.setdefault(_NUMBER.sub("#", doubt), []).append((outcome.index, doubt))
+    for found in alike.values():
+        index, doubt = found[0]
+        notes.append(f"{len(found)} of {len(dropped.outcomes)} shots, first shot {index}: {doubt}")
+    residual = float(np.max(np.abs(dropped.shots.energy_residual)))
+    if residual > _LARGE_RESIDUAL:
+        notes.append(
+            f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step."
+        )
+    return tuple(notes)

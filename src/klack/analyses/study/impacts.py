@@ -21,7 +21,7 @@ from klack.analyses.noise.source import impact_sources
 from klack.analyses.shots.draw import shots_of
 from klack.analyses.shots.log import shot_log
 from klack.analyses.shots.model import shot_bodies, shot_model
-from klack.analyses.shots.run import drop_shots, residual_notes
+from klack.analyses.shots.run import drop_shots, shot_doubts
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
 from klack.analyses.study.impact_measures import ImpactOfPoint, impact_measures
@@ -290,7 +290,7 @@ def _shots(case: Case, bodies: ImpactBodies, names: list[str], progress: Progres
     given, model = shots_of(case), shot_model(case, bodies, progress)
     with shot_log(None, "") as log:
         found = drop_shots(case, model, given.count, given.seed, 1, log, progress)
-    notes = (*model.notes, *residual_notes(found.shots), *shot_notes(names, found))
+    notes = (*model.notes, *shot_doubts(found), *shot_notes(names, found))
     pair = bodies.placed.pair
     modes = " + ".join(map(str, model.modes))
     return _Point(
