@@ -11,9 +11,11 @@ import pytest
 import yaml
 
 import klack
+from klack.analyses.shots.log import shot_log
 from klack.analyses.shots.measures import RESULTS
+from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.record import ShotColumns
-from klack.analyses.shots.run import DroppedShots, run_shots
+from klack.analyses.shots.run import DroppedShots, drop_shots, run_shots
 from klack.analyses.shots.summary import shots_to_json
 from klack.analyses.study import impacts
 from klack.analyses.study.asked_points import groups_of
@@ -21,6 +23,7 @@ from klack.analyses.study.evaluation import asked_of
 from klack.analyses.study.shot_measures import SHOT_NAMES, shot_measure, shot_notes
 from klack.case.study_source import study_of
 from klack.cli.main import main
+from klack.progress import silent
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 NEEDLE = (HOW_TO / "guided_needle.yaml").read_text().replace("  count: 6\n", "  count: 2\n")
@@ -173,15 +176,16 @@ def test_impact_and_shots_of_the_same_points(needle, tmp_path):
         STUDY.replace("[shots", "[peak_force, noise.radiated_energy, shots")
         + "  level: interface\n"
     )
+    text = text.replace("3 um", "2.5 um")
     out = tmp_path / "out"
     record = klack.run_study(needle, write(tmp_path, text), folder=out).record
     assert record.variant == "interface + shots"
-    case = needle.with_value(CLEARANCE, "2 um")
+    case = needle.with_value(CLEARANCE, "2.5 um")  # the second point, with bodies of the first
     impact = klack.run_impact(case, ["interface"])
-    assert columns(record)["peak_force"][0] == float(impact.measures["interface"]["peak_force"])
+    assert columns(record)["peak_force"][1] == float(impact.measures["interface"]["peak_force"])
     single = run_shots(case.checked, workers=1)
     for name in ("shots.restitution.mean", "shots.centric.peak_force"):
-        assert columns(record)[name][0] == by_hand(single, name)
+        assert columns(record)[name][1] == by_hand(single, name)
     assert record.model.count("needle ") == 1
     assert "; shots at the interface level, 6 + 6 modes; " in record.model
     assert klack.run_study(needle, tmp_path / "study.yaml", folder=out).record.computed == 0
@@ -400,3 +404,30 @@ def test_valves_made_after_the_case_scatter_by_their_clearance_alone(needle, tmp
     rocking = columns(record)["shots.rocking.mean"]
     assert (np.argsort(clearance) == np.argsort(rocking)).all()
     assert record.missed[0].points == 4
+
+
+@pytest.mark.slow
+def test_a_search_finds_the_smallest_clearance_and_exports_it(needle, tmp_path, capsys):
+    """Truth: on the same draws a needle rocks the less the smaller its clearance."""
+    text = """
+  parameters: {guide.clearance: {from: 2 um, to: 3 um}, shots.duration: 0.1 ms}
+  measures: [shots.restitution.mean]
+  objectives: {shots.rocking.mean: minimise}
+  search: {population: 20, generations: 1, refinements: 0}
+"""
+    out, file = tmp_path / "out", write(tmp_path, text)
+    command = ["optimise", str(needle.tree.path), "--study", str(file), "--no-report"]
+    assert main([*command, "--threads", "1", "--out", str(out)]) == 0
+    assert "the best one suits these draws" in " ".join(capsys.readouterr().out.split())
+    record = klack.load_result(out).record
+    best = record.optimum.best
+    clearance = next(item.values for item in record.parameters if item.name == CLEARANCE)
+    assert best == np.argmin(clearance)
+    made = tmp_path / "made"
+    assert main(["export", str(out), "--to", "case", "--point", str(best), "--out", str(made)]) == 0
+    (file,) = made.glob("*.yaml")
+    case = klack.load_case(file).checked
+    model = build_shots(case, silent, threads=1)
+    found = drop_shots(case, model, 2, 1, 1, shot_log(None, ""), silent)
+    for name, values in columns(record).items():
+        assert values[best] == by_hand(found, name)

@@ -19,8 +19,9 @@ QUOTED = [block for kind, block in BLOCKS if not kind and "klack " not in block]
 
 def test_the_study_of_the_page_is_the_file_beside_it():
     """All but what the last step of the page adds."""
-    shown, _, added, robust, impact = (block for kind, block in BLOCKS if kind == "yaml")
+    shown, _, added, robust, impact, shots = (block for kind, block in BLOCKS if kind == "yaml")
     assert impact == FILE.with_name("impact_study.yaml").read_text(encoding="utf-8")
+    assert shots == FILE.with_name("shots_study.yaml").read_text(encoding="utf-8")
     assert robust in ROBUST.read_text(encoding="utf-8")
     left = FILE.read_text(encoding="utf-8")
     for line in (shown + added).splitlines():
@@ -77,6 +78,14 @@ def test_a_study_of_impacts_prints_what_the_page_shows(tmp_path, capsys, monkeyp
     study = ["--study", "docs/how-to/impact_study.yaml", "--no-report", "--out", str(tmp_path)]
     assert main(["study", "demo-valve-axisymmetric", *study]) == 0
     compare(QUOTED[7], capsys.readouterr().out, "studies.md, impacts")
+
+
+@pytest.mark.slow
+def test_a_study_of_shots_prints_what_the_page_shows(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    study = ["--study", "docs/how-to/shots_study.yaml", "--no-report", "--out", str(tmp_path)]
+    assert main(["study", "docs/how-to/guided_needle.yaml", *study]) == 0
+    compare(QUOTED[8], capsys.readouterr().out, "studies.md, shots")
 
 
 @pytest.mark.slow

@@ -133,7 +133,7 @@ def run_optimisation(
                 measures=columns,
                 optimum=optimum,
                 sounds=sounds,
-                warnings=(*_doubts(optimum), *warnings, *of_rows),
+                warnings=(*_doubts(optimum), *_lucky_draws(asked, source), *warnings, *of_rows),
             )
 
         if seen is not None:
@@ -435,4 +435,16 @@ def _doubts(optimum: Optimum) -> tuple[str, ...]:
     return (
         "No point keeps all bounds; the points shown miss them least. Try: wider ranges, or other "
         "bounds.",
+    )
+
+
+def _lucky_draws(asked: AskedPoints, source: StudySource) -> tuple[str, ...]:
+    """The best of many points on the same draws owes a part of its lead to these."""
+    sought = {*source.study.objectives, *source.study.constraints}
+    if not any(item.of == "shots" and item.name in sought for item in asked.chosen):
+        return ()
+    return (
+        "All points were compared by the same draws of shots, so that the best one suits these "
+        "draws. Try: klack export --to case --point, and klack shots --seed with other seeds for "
+        "that case and for today's.",
     )
