@@ -31,6 +31,9 @@ __all__ = ["Guide", "guide_of_shaft"]
 _ROUND = 1e-2
 """Largest deviation of a guided surface from a round one, over its width."""
 
+_AT_HEIGHT = 1e-7
+"""Nodes so near are at the height itself [m]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Guide:
@@ -98,8 +101,8 @@ def guide_of_shaft(
     surface : str
         Cylindrical surface of the shaft.
     heights : sequence of float [m]
-        z at the placement; each takes the ring of nodes of the surface that is nearest (on an
-        unstructured mesh as many near it as surround the axis).
+        z at the placement; each takes the ring of nodes of the surface that is there, or the two
+        around it (on an unstructured mesh as many near it as surround the axis).
     clearance : float [m]
         Radial.
     stiffness : float, optional [N/m]
@@ -160,10 +163,11 @@ def guide_of_shaft(
 def _section(
     body: ElasticBody, surface: str, height: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights of a ring of nodes near a height, shape (n_dof, 3), and the axis there, shape (3,).
+    """Weights of nodes around a height, shape (n_dof, 3), and the axis there, shape (3,).
 
-    The weights are as equal as can be while their mean place is the axis: any rigid motion then
-    moves the section as it moves the axis, on unstructured meshes as well.
+    Of the ring of nodes at the height, or of those next above and below.  The weights are as equal
+    as can be while their mean place is the axis there: any rigid motion then moves the section as
+    it moves the axis, on unstructured meshes as well.
     """
     nodes = body.mesh.surface(surface).nodes
     z = body.mesh.points[nodes, 2]
@@ -175,16 +179,19 @@ def _section(
             f"'{surface}' is",
             hint="heights are those of the placed body.",
         )
-    at = float(z[np.argmin(np.abs(z - height))])
+    at = min(max(height, float(z.min())), float(z.max()))
     places = body.mesh.points[nodes] - [0.0, 0.0, at]
     centre = _axis(f"guide of body '{body.name}': surface '{surface}'", places)
     places[:, :2] -= centre
     size = float(np.ptp(places[:, :2]))
+    along = places[:, 2]
+    low = float(np.max(along[along <= _AT_HEIGHT]))
+    high = float(np.min(along[along >= -_AT_HEIGHT]))
     width = max(1e-6, 0.02 * size)
-    near = np.abs(places[:, 2]) <= width
+    near = (along >= low - width) & (along <= high + width)
     while not _supports(places[near], size) and width < 0.5 * size:
         width *= 1.3
-        near = np.abs(places[:, 2]) <= width
+        near = (along >= low - width) & (along <= high + width)
     weights = _weights(places[near], size)
     load = np.zeros((body.dof_count, 3))
     for c in range(3):

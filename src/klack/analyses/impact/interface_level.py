@@ -21,6 +21,7 @@ from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
+from klack.errors import InputError
 from klack.mesh.rigid import rotation_matrix
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
@@ -33,6 +34,7 @@ from klack.transient.interface_model import (
 )
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
+from klack.units import format_si
 
 __all__ = [
     "CONTACT",
@@ -53,6 +55,7 @@ CONTACT, OPPOSITE = "contact", "opposite"
 """Names of the contact of a case and of that with the upper stop."""
 
 _FEWEST = 30
+_IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
 
@@ -267,6 +270,11 @@ def build_guide(
         As given to :func:`build_interface`.
     model : InterfaceModel
         What that returned.
+
+    Raises
+    ------
+    InputError
+        For a body that is placed inside the wall of its bore, which would throw it out.
     """
     asked: CaseGuide | None = problem.case.guide
     if asked is None:
@@ -274,7 +282,7 @@ def build_guide(
     body = problem.pair.upper
     modes = _kept(problem, body, pools[body.name], ports, count)
     law = asked.law
-    return guide_of_shaft(
+    guide = guide_of_shaft(
         model,
         body,
         np.hstack([body.rigid_modes, modes.shapes]),
@@ -287,6 +295,17 @@ def build_guide(
         friction=asked.friction,
         viscous=asked.viscous,
     )
+    aside = np.linalg.norm(guide.offset, axis=1)
+    k = int(np.argmax(aside))
+    if aside[k] > asked.clearance * (1.0 + _IN_THE_WALL):
+        raise InputError(
+            f"{problem.case.path or 'case'}: guide",
+            got=f"a body placed {format_si(float(aside[k]), 'm')} off the axis of its bore at z = "
+            f"{format_si(float(guide.heights[k]), 'm')}",
+            expected=f"at most the clearance, {format_si(asked.clearance, 'm')}",
+            hint="reduce motion.placement, or enlarge guide.clearance.",
+        )
+    return guide
 
 
 def simulate_case(
