@@ -372,30 +372,33 @@ def run_many(
     measures: Sequence[str],
     *,
     variant: str | None = None,
+    level: str | None = None,
     threads: int | None = None,
     workers: int | None = None,
     dask: "str | Client | None" = None,
     progress: Progress = silent,
 ) -> PointTable:
-    """Compute measures of a stroke at many points of the parameter space of a case.
+    """Compute measures of a stroke or an impact at many points of the parameter space of a case.
 
-    Every number is that of :func:`run_stroke` of the changed case, to the last bit, whatever the
-    number of threads and the order of the points.  A point that cannot be computed is a row with
-    its error.
+    Every number is that of :func:`run_stroke`, :func:`run_impact` or :func:`run_shots` of the
+    changed case, to the last bit, whatever the number of threads and the order of the points.  A
+    point that cannot be computed is a row with its error.
 
     Parameters
     ----------
     case : str, Path or CaseOnHand
-        Of a whole valve.
     points : sequence of mappings, or mapping of sequences
         Keys of the case to values with their units, for each point; or lists of values by key.
     measures : sequence of str
         ``"opening_time"``; of the first impact on the stop ``seat`` ``"seat.peak_force"``, of the
-        second one ``"seat.2.peak_force"``.
+        second one ``"seat.2.peak_force"``; of an impact of two bodies ``"peak_force"``.
     variant : str, optional
-        The first one of the case by default.
+        Of a stroke; the first one of the case by default.
+    level : str, optional
+        Of an impact; ``"reduced"`` by default.
     threads : int, optional
-        All available cores by default; always 1 with components in Python and FMUs.
+        All available cores by default; always 1 with components in Python and FMUs, and for
+        impacts.
     workers : int, optional
         Processes in place of threads; in a script, the call stands under
         ``if __name__ == "__main__":``.
@@ -417,15 +420,39 @@ def run_many(
     demo-stroke, wet: 0 points
     opening_time [s]
     """
-    from klack.analyses.study.run_strokes import run_strokes
+    from klack.analyses.study.run_points import run_points
     from klack.analyses.study.where import Where
 
     where = Where(threads=threads, workers=workers, dask=dask)
     given = case if isinstance(case, CaseOnHand) else load_case(case)
-    checked = _of_kind(given, ValveCase, "a whole valve")
-    return run_strokes(
-        checked, given.tree, points, measures, variant=variant, where=where, progress=progress
+    _require_way(given.checked, variant, level)
+    return run_points(
+        given.checked,
+        given.tree,
+        points,
+        measures,
+        variant=level or variant,
+        where=where,
+        progress=progress,
     )
+
+
+def _require_way(case: Case | ValveCase, variant: str | None, level: str | None) -> None:
+    """Refuse a level of a stroke, and a variant of an impact."""
+    if variant is not None and isinstance(case, Case):
+        raise InputError(
+            "variant",
+            got=f"'{variant}', for an impact of two bodies",
+            expected="a level; variants are of strokes",
+            hint='write level="interface", or leave it out.',
+        )
+    if level is not None and isinstance(case, ValveCase):
+        raise InputError(
+            "level",
+            got=f"'{level}', for a stroke of a whole valve",
+            expected="a variant; levels are of impacts",
+            hint='write variant="dry", or leave it out.',
+        )
 
 
 def run_study(

@@ -143,6 +143,16 @@ def test_any_key_and_any_level(ball, tmp_path, key, value, level):
         assert float(found[name]) == values[1]
 
 
+def test_many_points_of_your_own_program(ball):
+    speeds = ["0.4 m/s", "0.5 m/s"]
+    table = klack.run_many(ball, {SPEED: speeds}, ["peak_force", "restitution"], level="reduced")
+    assert table.variant == "reduced"
+    for i, speed in enumerate(speeds):
+        single = klack.run_impact(ball.with_value(SPEED, speed), ["reduced"]).measures["reduced"]
+        assert table["peak_force"][i] == float(single["peak_force"])
+        assert table["restitution"][i] == float(single["restitution"])
+
+
 def test_points_of_the_same_bodies_build_them_once(ball, tmp_path, monkeypatch):
     """Speed, forces and damping leave meshes and modes; a modulus does not."""
     built = []

@@ -284,8 +284,10 @@ class TestFailures:
     def test_a_variant_or_a_case_that_is_not_there_is_refused(self, small: klack.CaseOnHand):
         with pytest.raises(InputError, match="one of: wet"):
             klack.run_many(small, [], ["impacts"], variant="we")
-        with pytest.raises(InputError, match="a case of a whole valve"):
-            klack.run_many("two-rods", [], ["impacts"])
+        with pytest.raises(InputError, match="levels are of impacts"):
+            klack.run_many(small, [], ["impacts"], level="reduced")
+        with pytest.raises(InputError, match="variants are of strokes"):
+            klack.run_many("two-rods", [], ["peak_force"], variant="dry")
         for threads in (0, True):
             with pytest.raises(InputError, match="1 or more"):
                 klack.run_many(small, [], ["impacts"], threads=threads)

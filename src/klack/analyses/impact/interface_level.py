@@ -300,7 +300,7 @@ def build_guide(
     if aside[k] > asked.clearance * (1.0 + _IN_THE_WALL):
         raise InputError(
             f"{problem.case.path or 'case'}: guide",
-            got=f"a body placed {format_si(float(aside[k]), 'm')} off the axis of its bore at z = "
+            got=f"a shaft {format_si(float(aside[k]), 'm')} off-axis in its bore at z = "
             f"{format_si(float(guide.heights[k]), 'm')}",
             expected=f"at most the clearance, {format_si(asked.clearance, 'm')}",
             hint="reduce motion.placement, or enlarge guide.clearance.",

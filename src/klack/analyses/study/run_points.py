@@ -1,4 +1,4 @@
-"""One variant of a stroke at many points, as a table."""
+"""One variant of a stroke, or one level of an impact, at many points, as a table."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,16 +7,16 @@ from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.where import HERE, Where
+from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints
-from klack.case.valve import ValveCase
 from klack.progress import Progress, silent
 
-__all__ = ["run_strokes"]
+__all__ = ["run_points"]
 
 
-def run_strokes(
-    case: ValveCase,
+def run_points(
+    case: AnyCase,
     tree: CaseTree,
     points: GivenPoints,
     measures: Iterable[str],
@@ -25,19 +25,20 @@ def run_strokes(
     where: Where = HERE,
     progress: Progress = silent,
 ) -> PointTable:
-    """Compute one variant of a stroke at many points.
+    """Compute one variant of a stroke, or one level of an impact, at many points.
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     points : sequence of mappings, or mapping of sequences
         Key of the case to a value with its unit, for every point; or a list of values by key.
     measures : iterable of str
-        See :func:`~klack.analyses.study.stroke_measures.stroke_measures`.
+        See :func:`~klack.analyses.study.stroke_measures.stroke_measures` and
+        :func:`~klack.analyses.study.impact_measures.impact_measures`.
     variant : str, optional
-        The first one of the case by default.
+        The first one of the case by default; of an impact its level, ``reduced`` by default.
     where : Where
         Points are computed; one thread for a case whose components call Python or an FMU, which
         need not bear several calls at a time.
