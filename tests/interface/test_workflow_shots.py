@@ -2,12 +2,14 @@
 
 import warnings
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from energy_ledger import allowed
 
+from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.shots import one_shot
 from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.draw import centric_draw, draw_shot
@@ -24,7 +26,10 @@ from klack.analyses.shots.summary import (
 )
 from klack.analyses.store import stored_format
 from klack.api import Result
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
 from klack.case import load_case
+from klack.case.placement import Placement
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.progress import silent
 
@@ -302,3 +307,31 @@ def test_doubts_of_a_shot_stay_with_it_in_the_log(model, draws, alone, tmp_path,
         outcomes = (*(again.done[index] for index in (0, 1)), alone[2])
     dropped = DroppedShots(draws=(), outcomes=outcomes, alone=alone[3])
     assert shot_doubts(dropped) == ("2 of 3 shots, first shot 0: it is off by 2e-3",)
+
+
+def test_no_shot_begins_inside_the_wall(model):
+    """Truth: energy; sections between rings of nodes once threw some needles out of the bore."""
+    setup = model.setup
+    for index in range(24):
+        draw = draw_shot(CASE, 3, index, model.touch_height)
+        coordinates, *_ = np.linalg.lstsq(setup.model.rigid, setup.placement(draw), rcond=1e-12)
+        aside = np.linalg.norm(setup.guide.offset + setup.guide.traces @ coordinates, axis=1)
+        assert aside.max() < CASE.guide.clearance * (1.0 + 1e-6)
+        shot = run_shot(setup, draw)
+        assert shot.doubts == ()
+        assert shot.numbers["rocking"] < 1.0
+
+
+@pytest.mark.parametrize(("tilt", "fits"), [(0.00035, True), (0.00045, False)])
+def test_a_placement_inside_the_wall_is_refused(tilt, fits):
+    """The upper height is 7.4 mm above first touch, the clearance 3 um."""
+    motion = CASE.motion.model_copy(update={"placement": Placement(eccentricity=0.0, tilt=tilt)})
+    case = CASE.model_copy(update={"motion": motion})
+    problem = build_problem(case, silent, threads=1)
+    pools = mode_pools(problem, at_least=1, progress=silent)
+    guided = partial(build_guide, problem, build_interface(problem, pools), pools)
+    if fits:
+        assert guided() is not None
+        return
+    with pytest.raises(InputError, match="at most the clearance, 3 um"):
+        guided()
