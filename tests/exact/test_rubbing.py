@@ -1,0 +1,150 @@
+"""Forces of contact points with Coulomb friction.
+
+Truth: the law itself on random problems, another way to solve it, its limits, and impacts on one
+point with events (tests/data/friction_one_point.csv).
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.transient.active_set import solve_active
+from klack.transient.interface_arrays import ActiveSet
+from klack.transient.rubbing import OPEN, SLIP, STICK, rub_in_turn, solve_rubbing
+
+TABLE = Path(__file__).parents[1] / "data" / "friction_one_point.csv"
+CASES = [row for row in csv.DictReader(line for line in TABLE.open() if not line.startswith("#"))]
+TOLERANCE = 1e-11
+
+
+def solved(A, q, mu, solve=solve_rubbing, guess=None):
+    lam = np.zeros(len(q)) if guess is None else guess.copy()
+    w, doing = np.zeros(len(q)), np.zeros(len(mu), dtype=np.int64)
+    rounds = solve(A, q, mu, lam, w, doing, TOLERANCE)
+    assert rounds != 0
+    return lam, w, doing, rounds
+
+
+def problem(seed, ways, coefficient=None):
+    """A random one: as stiff in one direction as in another, by a factor of some."""
+    rng = np.random.default_rng([seed, ways])
+    n = int(rng.integers(1, 20))
+    G = rng.normal(size=((ways + 1) * n, (ways + 1) * n + 3))
+    A = G @ G.T / len(G) + np.diag(rng.uniform(0.2, 2.0, len(G)))
+    mu = np.full(n, rng.choice([0.05, 0.1, 0.3, 0.6]) if coefficient is None else coefficient)
+    return A, rng.normal(size=len(G)), mu
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+@pytest.mark.parametrize("seed", range(40))
+def test_forces_obey_the_law(seed, ways):
+    A, q, mu = problem(seed, ways)
+    lam, w, doing, _ = solved(A, q, mu)
+    n = len(mu)
+    np.testing.assert_allclose(w, q + A @ lam, atol=1e-12)
+    normal, gap = lam[:n], w[:n]
+    across, slip = lam[n:].reshape(ways, n), w[n:].reshape(ways, n)
+    assert normal.min() >= 0.0
+    assert gap.min() > -1e-9
+    assert np.abs(normal * gap).max() < 1e-9
+    size = np.linalg.norm(across, axis=0)
+    assert np.all(size <= mu * normal + 1e-9)
+    assert np.abs(slip[:, doing == STICK]).max(initial=0.0) < 1e-9
+    assert size[doing == OPEN].max(initial=0.0) == 0.0
+    rubbing = doing == SLIP
+    way = slip[:, rubbing] / np.linalg.norm(slip[:, rubbing], axis=0)
+    np.testing.assert_allclose(across[:, rubbing], -(mu * normal)[rubbing] * way, atol=1e-7)
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+@pytest.mark.parametrize("seed", range(10))
+def test_taking_turns_gives_the_same(seed, ways):
+    A, q, mu = problem(seed, ways)
+    np.testing.assert_allclose(solved(A, q, mu)[0], solved(A, q, mu, rub_in_turn)[0], atol=1e-8)
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+def test_the_next_step_takes_few_rounds(ways):
+    """Two to four, as the projections of Alart and Curnier do; taking turns is never needed."""
+    counts = []
+    for seed in range(30):
+        A, q, mu = problem(seed, ways)
+        first = solved(A, q, mu)[0]
+        drift = 0.02 * np.random.default_rng(seed).normal(size=len(q))
+        counts.append(solved(A, q + drift, mu, guess=first)[3])
+    assert min(counts) > 0
+    assert np.mean(counts) < 4.0
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+def test_without_friction_it_is_the_smooth_contact(ways):
+    A, q, mu = problem(3, ways, 0.0)
+    n = len(mu)
+    lam, gap = np.zeros(n), np.zeros(n)
+    normal = np.ascontiguousarray(A[:n, :n])
+    solve_active(normal, q[:n], ActiveSet.none(n), lam, gap, 1e-13, 1.0)
+    found = solved(A, q, mu)[0]
+    np.testing.assert_allclose(found[:n], lam, atol=1e-9)
+    assert not found[n:].any()
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+def test_with_much_friction_what_is_closed_sticks(ways):
+    A, q, mu = problem(5, ways, 1e3)
+    n = len(mu)
+    A[:n, n:] *= 0.1  # strong coupling may leave no solution for so much friction
+    A[n:, :n] *= 0.1
+    _, w, doing, _ = solved(A, q, mu)
+    assert STICK in doing
+    assert SLIP not in doing
+    assert np.abs(w[n:].reshape(ways, -1)[:, doing == STICK]).max() < 1e-9
+
+
+def test_directions_of_the_frame_do_not_matter():
+    """Each point has its own two directions; forces turn with them."""
+    A, q, mu = problem(7, 2)
+    n = len(mu)
+    angle = np.random.default_rng(1).uniform(0.0, 6.0, n)
+    c, s = np.diag(np.cos(angle)), np.diag(np.sin(angle))
+    none = np.zeros((n, n))
+    turn = np.block([[np.eye(n), none, none], [none, c, s], [none, -s, c]])
+    lam = solved(A, q, mu)[0]
+    turned = solved(np.ascontiguousarray(turn @ A @ turn.T), turn @ q, mu)[0]
+    np.testing.assert_allclose(turned, turn @ lam, atol=1e-9)
+
+
+def impact(case, steps):
+    """Velocities after an impact in steps of constant mean force, as of the interface level."""
+    names = ("m11", "m12", "m22", "mu", "vt0", "vn0", "kn", "kt", "contact_time")
+    m11, m12, m22, mu, vt, vn, kn, kt, time = (float(case[name]) for name in names)
+    mobility, soft = np.array([[m22, m12], [m12, m11]]), np.diag([1.0 / kn, 1.0 / kt])
+    h = time / steps
+    A = soft + 0.25 * h * h * mobility
+    x, v, lam, offset = np.zeros(2), np.array([vn, vt]), np.zeros(2), 0.0
+    while True:
+        free = x + h * v + 0.25 * h * h * mobility @ lam
+        new = solved(A, free - [0.0, offset], np.array([mu]), guess=lam)[0]
+        mean = 0.5 * (lam + new)
+        x, v = x + h * v + 0.5 * h * h * mobility @ mean, v + h * mobility @ mean
+        lam, offset = new, x[1] + new[1] / kt
+        if lam[0] == 0.0 and v[0] > 0.0:
+            return v[::-1]
+
+
+def missed(case, steps):
+    vt, vn = impact(case, steps)
+    speed = np.hypot(float(case["vt0"]), float(case["vn0"]))
+    return max(abs(vt - float(case["vt1"])), abs(vn - float(case["vn1"]))) / speed
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case['case']}-{case['vt0']}")
+def test_impacts_on_one_point_stick_slip_reverse_and_jam(case):
+    """Truth: the same by events; 400 steps for each contact."""
+    assert missed(case, 400) < 1e-4
+
+
+def test_errors_fall_with_the_square_of_the_step():
+    coarse, fine = (np.median([missed(case, n) for case in CASES]) for n in (100, 400))
+    assert coarse / fine > 12.0
