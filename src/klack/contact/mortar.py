@@ -51,11 +51,18 @@ __all__ = [
     "HatQuadrature",
     "contact_space",
     "hat_quadrature",
+    "tangent_rows",
     "touching_shift",
 ]
 
 _POINTS_BY_COST = {2: 400, 3: 1000}
 """Number of contact points that an automatic reach aims at, by dimension."""
+
+_WALL = 0.9
+"""Cosine of the normal with the direction away from the axis, from which a face is a wall."""
+
+_CENTRAL = 3.0
+"""Element sizes from the axis up to which hats count as around it."""
 
 _LOWEST = 32
 """Hats that give the excess of the mean gap over a hat over the gap at its node."""
@@ -460,6 +467,104 @@ def hat_quadrature(space: ContactSpace, mesh: Mesh, surface: Surface) -> HatQuad
     )
 
 
+def tangent_rows(
+    space: ContactSpace, mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface
+) -> tuple[csr_array, csr_array]:
+    r"""Displacement of a past b at the contact points, with the hats and weights of their gaps.
+
+    .. math:: s_k = \frac{1}{A_k} \int \psi_k \, t \cdot (u_a - u_b) \, dA = T_a u_a + T_b u_b
+
+    so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies cancel.
+    Axisymmetric bodies have one direction *t*, along the meridian; solids two: away from the axis
+    of motion (along it on walls, along x where hats surround it), and round it.  Each is taken in
+    the tangential plane of every integration point.
+
+    Parameters
+    ----------
+    space : ContactSpace
+        Of these meshes.
+    mesh_a, surface_a, mesh_b, surface_b
+        As given to :func:`contact_space`.
+
+    Returns
+    -------
+    T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
+        All points in the first direction, then in the second one.
+    """
+    sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
+    other = "b" if space.slave == "a" else "a"
+    mesh, surface = sides[space.slave]
+    other_mesh, other_surface = sides[other]
+    sign = 1.0 if space.slave == "a" else -1.0
+    number = np.full(mesh.node_count, -1)
+    number[space.nodes] = np.arange(space.count)
+    central = np.linalg.norm(space.points[:, :-1], axis=1) < _CENTRAL * space.size
+    entries: dict[str, list[_Entries]] = {space.slave: [], other: []}
+    for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
+        for piece in _pieces(block.family):
+            at, hats, share = _shares(mesh, block, piece)
+            f, q, d = at.position.shape
+            normal = at.normal.reshape(f * q, d)
+            met = project_to_surface(
+                at.position.reshape(f * q, d), normal, other_mesh, other_surface
+            )
+            share = np.where(met.met.reshape(f, q, 1), share, 0.0)
+            N, _ = shape_functions(block.family, piece.xi)
+            rows = number[hats]
+            towards = _away_from_axis(at.position[:, :, None], central[rows][:, None])
+            for way, t in enumerate(_tangents(at.normal[:, :, None], towards)):
+                value = sign * np.einsum("fqk,qn,fqkd->fknd", share, N, t)
+                own = np.where(rows < 0, -1, rows + way * space.count)
+                _store(entries[space.slave], d, own[:, :, None], block.connectivity[:, None], value)
+                _store_master(
+                    entries[other],
+                    np.repeat(own, q, axis=0),
+                    -sign * share.reshape(f * q, -1),
+                    t.reshape(f * q, -1, d),
+                    met,
+                    other_surface,
+                )
+    area = np.tile(space.area, mesh.dimension - 1)
+    T_a, T_b = (_scaled(entries[side], area, sides[side][0].dof_count) for side in ("a", "b"))
+    return T_a, T_b
+
+
+def _away_from_axis(points: NDArray[np.float64], central: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Unit vectors away from the axis z, shape (..., d); along x for hats around the axis."""
+    shape = np.broadcast_shapes(points.shape[:-1], central.shape)
+    away = np.array(np.broadcast_to(points, (*shape, points.shape[-1])))
+    away[..., -1] = 0.0
+    size = np.linalg.norm(away, axis=-1)
+    along_x = np.broadcast_to(central, shape) | (size == 0.0)
+    away[along_x] = np.eye(points.shape[-1])[0]
+    size[along_x] = 1.0
+    return np.asarray(away / size[..., None])
+
+
+def _tangents(
+    normal: NDArray[np.float64], towards: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], ...]:
+    """Directions at right angles to normals, shape (..., d) each."""
+    if normal.shape[-1] == 2:
+        along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+        return (np.broadcast_to(along, np.broadcast_shapes(along.shape, towards.shape)),)
+    up = np.zeros(3)
+    up[2] = 1.0
+    is_wall = np.abs(np.sum(normal * towards, axis=-1, keepdims=True)) > _WALL
+    first = np.where(is_wall, up, towards)
+    first = first - np.sum(first * normal, axis=-1, keepdims=True) * normal
+    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    return first, np.cross(normal, first)
+
+
+def _scaled(parts: list[_Entries], area: NDArray[np.float64], columns: int) -> csr_array:
+    """Matrix of the entries, each row over the area of its hat; rows below zero are left out."""
+    row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+    kept = row >= 0
+    scaled = value[kept] / area[row[kept]]
+    return coo_array((scaled, (row[kept], column[kept])), shape=(len(area), columns)).tocsr()
+
+
 def _integrate_master(
     sums: _Sums,
     rows: NDArray[np.int64],
@@ -468,14 +573,27 @@ def _integrate_master(
     met: Projection,
     surface: Surface,
 ) -> None:
+    along = np.broadcast_to(normal[:, None], (*share.shape, normal.shape[1]))
+    _store_master(sums.master, rows, share, along, met, surface)
+
+
+def _store_master(
+    entries: list[_Entries],
+    rows: NDArray[np.int64],
+    share: NDArray[np.float64],
+    along: NDArray[np.float64],
+    met: Projection,
+    surface: Surface,
+) -> None:
+    """Shares of the hats along directions (points, hats, d), over the nodes that were met."""
     for number, block in enumerate(surface.blocks):
         point = np.flatnonzero(met.block == number)
         if not len(point):
             continue
         N, _ = shape_functions(block.family, met.xi[point])
-        value = np.einsum("pk,pn,pd->pknd", share[point], N, normal[point])
+        value = np.einsum("pk,pn,pkd->pknd", share[point], N, along[point])
         nodes = block.connectivity[met.face[point]]
-        _store(sums.master, sums.dimension, rows[point][:, :, None], nodes[:, None, :], value)
+        _store(entries, along.shape[-1], rows[point][:, :, None], nodes[:, None, :], value)
 
 
 def _store(
@@ -515,12 +633,8 @@ def _assemble(
     area = sums.covered[nodes]
     matrices = {}
     for side, parts in ((slave, sums.slave), ("b" if slave == "a" else "a", sums.master)):
-        row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
-        row = number[row]
-        kept = row >= 0
-        shape = (len(nodes), sides[side][0].dof_count)
-        scaled = value[kept] / area[row[kept]]
-        matrices[side] = coo_array((scaled, (row[kept], column[kept])), shape=shape).tocsr()
+        numbered = [(number[row], column, value) for row, column, value in parts]
+        matrices[side] = _scaled(numbered, area, sides[side][0].dof_count)
     left_out = facing & ~candidate & (gap > limit)
     axial = matrices["a"] @ np.tile(np.eye(mesh.dimension)[-1], sides["a"][0].node_count)
     return ContactSpace(
