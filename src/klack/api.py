@@ -420,12 +420,12 @@ def run_many(
     demo-stroke, wet: 0 points
     opening_time [s]
     """
-    from klack.analyses.study.run_points import run_points
+    from klack.analyses.study.run_points import require_way, run_points
     from klack.analyses.study.where import Where
 
     where = Where(threads=threads, workers=workers, dask=dask)
     given = case if isinstance(case, CaseOnHand) else load_case(case)
-    _require_way(given.checked, variant, level)
+    require_way(given.checked, variant, level)
     return run_points(
         given.checked,
         given.tree,
@@ -435,24 +435,6 @@ def run_many(
         where=where,
         progress=progress,
     )
-
-
-def _require_way(case: Case | ValveCase, variant: str | None, level: str | None) -> None:
-    """Refuse a level of a stroke, and a variant of an impact."""
-    if variant is not None and isinstance(case, Case):
-        raise InputError(
-            "variant",
-            got=f"'{variant}', for an impact of two bodies",
-            expected="a level; variants are of strokes",
-            hint='write level="interface", or leave it out.',
-        )
-    if level is not None and isinstance(case, ValveCase):
-        raise InputError(
-            "level",
-            got=f"'{level}', for a stroke of a whole valve",
-            expected="a variant; levels are of impacts",
-            hint='write variant="dry", or leave it out.',
-        )
 
 
 def run_study(
@@ -529,17 +511,18 @@ def sensitivities(
     parameters: Sequence[str] = (),
     measures: Sequence[str] = (),
     variant: str | None = None,
+    level: str | None = None,
     check: bool = True,
     progress: Progress = silent,
 ) -> SensitivityRecord:
-    """Differentiate times and impacts of a stroke with its parameters.
+    """Differentiate times, impacts and noise of a stroke, or measures of an impact.
 
-    As ``klack sensitivities`` does, by exact tangents of one run.
+    As ``klack sensitivities`` does: a stroke by exact tangents of one run, an impact by differences
+    of impacts with each parameter changed by 1 % and 2 %.
 
     Parameters
     ----------
     case : str, Path or CaseOnHand
-        Of a whole valve.
     study : path, optional
         File with a section ``study``, whose parameters and measures are meant; that of the case by
         default.
@@ -548,7 +531,9 @@ def sensitivities(
     measures : sequence of str, optional
         ``"closing_time"``, ``"seat.peak_force"``.
     variant : str, optional
-        Of the stroke.
+        Of a stroke.
+    level : str, optional
+        Of an impact; ``"reduced"`` by default.
     check : bool
         Whether further strokes, two of them with all parameters changed by 1 %, are compared.
     progress : callable
@@ -558,18 +543,18 @@ def sensitivities(
     InputError
         For a parameter or a measure that has no derivative.
     """
-    from klack.analyses.sensitivities.run import run_sensitivities
+    from klack.analyses.sensitivities.any_case import run_any_sensitivities
     from klack.case.study_source import study_if_any
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
-    checked = _of_kind(given, ValveCase, "a whole valve")
-    return run_sensitivities(
-        checked,
+    return run_any_sensitivities(
+        given.checked,
         given.tree,
-        study_if_any(checked, given.tree, None if study is None else Path(study)),
+        study_if_any(given.checked, given.tree, None if study is None else Path(study)),
         parameters=parameters,
         measures=measures,
         variant=variant,
+        level=level,
         check=check,
         progress=progress,
     )

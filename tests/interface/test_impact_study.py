@@ -3,6 +3,7 @@
 Truth: single impacts of the changed cases, bit for bit, as ``klack impact`` computes them.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -353,3 +354,61 @@ def test_the_section_of_the_case_serves_as_well(ball, tmp_path):
     case = tmp_path / "case.yaml"
     case.write_text(CASE + "study:" + STUDY.replace("points: 2", "kind: grid, levels: 1"))
     assert klack.run_study(case).record.count == 1
+
+
+class TestDerivatives:
+    """By differences; truth: dimensional analysis of elastic bodies, and impacts on both sides."""
+
+    def test_stiffer_bodies_hit_as_dimensions_say(self, ball):
+        """F / (E L^2) and t c / L depend on v / c alone, c^2 = E / rho, without forces."""
+        record = klack.sensitivities(
+            ball, parameters=[SPEED, YOUNG], measures=["peak_force", "contact_time", "impulse"]
+        )
+        force, time, push = (
+            [record.elasticity(name, key) for key in (SPEED, YOUNG)]
+            for name in ("peak_force", "contact_time", "impulse")
+        )
+        assert force[0] == pytest.approx(1.2, abs=0.1)  # 6/5 of Hertz, without waves in the rod
+        assert force[1] == pytest.approx(1.0 - 0.5 * force[0], abs=2e-3)
+        # 1 % are 70 ns, of which a step of 20 ns leaves some per cent open
+        assert time[1] == pytest.approx(-0.5 - 0.5 * time[0], abs=0.02)
+        assert push[1] == pytest.approx(0.5 - 0.5 * push[0], abs=2e-3)
+        assert record.by_differences
+        assert record.variant == "reduced"
+        assert all(item.deviation < 0.01 for item in record.measures)
+
+    def test_value_is_that_of_the_impact(self, ball):
+        record = klack.sensitivities(ball, parameters=[SPEED], check=False)
+        single = klack.run_impact(ball, ["reduced"]).measures["reduced"]
+        assert [item.name for item in record.measures] == [
+            "peak_force",
+            "contact_time",
+            "impulse",
+            "restitution",
+        ]
+        for item in record.measures:
+            assert item.value == float(single[item.name])
+            assert item.predicted is not None
+            assert item.secant is None
+
+    def test_jumps_are_told(self, ball):
+        """The number of contacts does not change smoothly, and here not at all."""
+        record = klack.sensitivities(ball, parameters=[SPEED], measures=["sub_contacts"])
+        assert record.measures[0].slopes == (0.0,)
+
+    def test_command(self, ball, tmp_path, capsys):
+        file = tmp_path / "ball.yaml"
+        file.write_text(CASE)
+        numbers = tmp_path / "numbers.json"
+        command = ["sensitivities", str(file), "--parameter", SPEED, "--json", str(numbers)]
+        assert main(command) == 0
+        assert "by differences of impacts" in " ".join(capsys.readouterr().out.split())
+        assert json.loads(numbers.read_text())["method"] == "differences"
+        for more, words in (
+            (["--variant", "dry"], "variants are of strokes"),
+            (["--parameter", "contact.gap"], "a value of zero"),
+            (["--measure", "seat.peak_force"], "write peak_force"),
+            (["--level", "reduce"], "reduced"),
+        ):
+            assert main([*command, *more, "-q"]) == 2
+            assert words in capsys.readouterr().err

@@ -32,6 +32,7 @@ _Measures = Annotated[
 _Variant = Annotated[
     str | None, Parameter(name="--variant", help="Of the stroke. [default: the first one]")
 ]
+_Level = Annotated[str | None, Parameter(name="--level", help="Of an impact. [default: reduced]")]
 _Check = Annotated[
     bool, Parameter(name="--check", help="Compare with strokes with all parameters changed by 1 %.")
 ]
@@ -45,31 +46,33 @@ def sensitivities(
     parameter: _Names = None,
     measure: _Measures = None,
     variant: _Variant = None,
+    level: _Level = None,
     check: _Check = True,
     component: Components = None,
     wanted: Wanted = WANTED,
 ) -> int:
-    """Derivatives of times and impacts of a stroke with its parameters, by exact tangents."""
+    """Derivatives with parameters: of a stroke by exact tangents, of an impact by differences."""
     if study is not None:
         require_files("--study", [study])
 
     with show_progress(wanted.quiet):
         from klack.analyses.sensitivities.analysis import SENSITIVITIES
-        from klack.analyses.sensitivities.run import run_sensitivities
+        from klack.analyses.sensitivities.any_case import run_any_sensitivities
         from klack.case.case_tree import read_case_tree
         from klack.case.shipped import find_case
         from klack.case.study_source import study_if_any
 
     tree = read_case_tree(find_case(case), imported(component))
-    checked = tree.case()
+    checked = tree.any_case()
     with show_progress(wanted.quiet) as progress:
-        record = run_sensitivities(
+        record = run_any_sensitivities(
             checked,
             tree,
             study_if_any(checked, tree, study),
             parameters=parameter or (),
             measures=measure or (),
             variant=variant,
+            level=level,
             check=check,
             threads=wanted.threads,
             progress=progress,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from klack.analyses.study.parameters import unit_of, written
 from klack.analyses.study.points import Linked, Space, Values, space_of
 from klack.analyses.study.strokes import STROKES
+from klack.case.any_case import AnyCase
 from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
@@ -18,6 +19,8 @@ from klack.units import RATIO, Kind
 __all__ = ["SlopeSpace", "VariedKey", "slope_space"]
 
 _WHERE = "--parameter"
+_EXPECTED = ("a number other than zero", "a number of the network around the bodies")
+"""Of an impact, and of a whole valve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,14 +92,12 @@ class SlopeSpace:
         return {name: written(values[name], kind) for name, kind in self.kinds.items()}
 
 
-def slope_space(
-    case: ValveCase, source: StudySource | None, names: Sequence[str] = ()
-) -> SlopeSpace:
+def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] = ()) -> SlopeSpace:
     """Find the parameters in the case.
 
     Parameters
     ----------
-    case : ValveCase
+    case : Case or ValveCase
     source : StudySource or None
         Whose parameters are meant, with what is linked to them.
     names : sequence of str
@@ -105,8 +106,8 @@ def slope_space(
     Raises
     ------
     InputError
-        For a key that the case does not have, one that is no number with a unit, and one that
-        bodies, contact laws or the run itself follow from.
+        For a key that the case does not have, one that is no number with a unit, one that the run
+        itself follows from, and of a whole valve one that bodies or contact laws follow from.
     """
     space = space_of(case, source) if source is not None else Space(parameters=(), linked=())
     found: dict[str, VariedKey] = {}
@@ -134,7 +135,7 @@ def slope_space(
             raise InputError(
                 f"{_WHERE} {key.name}",
                 got=reason[0],
-                expected="a number of the network around the bodies",
+                expected=_EXPECTED[isinstance(case, ValveCase)],
                 hint=reason[1],
             )
     kinds: dict[str, Kind | None] = {p.name: p.kind for p in space.parameters if p.is_key}
@@ -156,7 +157,7 @@ def _width(spread: Spread) -> float:
     return spread.deviation if isinstance(spread, Normal) else 0.0
 
 
-def _key(case: ValveCase, name: str, known: Sequence[str]) -> VariedKey:
+def _key(case: AnyCase, name: str, known: Sequence[str]) -> VariedKey:
     if "." not in name and known:
         raise InputError(
             _WHERE,
@@ -178,7 +179,7 @@ def _is_fixed(space: Space, name: str) -> bool:
     return any(item.name == name and item.is_fixed for item in space.parameters)
 
 
-def _reason(case: ValveCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
+def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
     """Why there is no derivative with a parameter, and what to do instead; None if there is."""
     if item.size == 0.0:
         return "a value of zero", "a range in a study tells how large a small change of it is."
@@ -189,6 +190,8 @@ def _reason(case: ValveCase, item: VariedKey, linked: Sequence[Linked]) -> tuple
             continue
         if place[0] == "run":
             return "a setting of the run", "klack advise tells what its steps change."
+        if not isinstance(case, ValveCase):
+            continue
         if place[0] != "network" or STROKES.makes_bodies(case, place):
             return (
                 "a key that meshes, modes, contact laws or the noise follow from",

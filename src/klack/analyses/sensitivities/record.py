@@ -131,11 +131,12 @@ class ImpactSlope:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SensitivityRecord(CaseRecord):
-    """Derivatives of the measures of a stroke.
+    """Derivatives of the measures of a stroke or an impact.
 
     Parameters
     ----------
     variant : str
+        Of an impact its level.
     parameters : tuple of SlopeParameter
     measures : tuple of MeasureSlopes
     impacts : tuple of ImpactSlope
@@ -144,6 +145,8 @@ class SensitivityRecord(CaseRecord):
         By which the check changed each parameter; 0 without a check.
     runs_time, run_time : float [s]
         Processor time of the derivatives, and of one run without them.
+    by_differences : bool
+        Whether they are those of runs with changed parameters, not exact tangents.
     """
 
     variant: str
@@ -153,6 +156,7 @@ class SensitivityRecord(CaseRecord):
     share: float
     runs_time: float
     run_time: float
+    by_differences: bool = False
 
     def derivative(self, measure: str, parameter: str) -> float | None:
         """Derivative in the unit of the measure per unit of the parameter [SI].

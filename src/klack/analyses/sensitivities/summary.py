@@ -72,6 +72,10 @@ class SensitivitiesJson(TypedDict):
     parameters: dict[str, SlopeParameterJson]
     measures: dict[str, MeasureSlopesJson]
     impacts: list[ImpactSlopeJson]
+    method: Annotated[
+        Literal["tangents", "differences"],
+        Field(description="Exact, or by impacts with changed parameters."),
+    ]
     check_share: Annotated[float, Field(description="Change of each parameter; 0 unchecked.")]
     wall_time_s: Real
     derivatives_cpu_time_s: Real
@@ -101,6 +105,7 @@ def sensitivities_to_json(record: SensitivityRecord) -> dict[str, Any]:
             }
             for item in record.impacts
         ],
+        "method": "differences" if record.by_differences else "tangents",
         "check_share": record.share,
         "wall_time_s": record.wall_time,
         "derivatives_cpu_time_s": record.runs_time,
@@ -160,7 +165,22 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
                 for item in record.measures
             ],
         )
-    yield TextTable(
+    if record.by_differences:
+        yield (
+            "Derivatives by differences of impacts with each parameter changed by 1 % and 2 %: the "
+            "contact of an impact is solved anew for each speed and shape."
+        )
+    else:
+        yield _impact_table(record)
+    if record.run_time > 0.0:
+        yield (
+            f"{len(record.parameters)} parameters took as long as "
+            f"{record.runs_time / record.run_time:.1f} runs."
+        )
+
+
+def _impact_table(record: SensitivityRecord) -> TextTable:
+    return TextTable(
         title="Impacts, and how strongly their times answer",
         columns=("impact", "time", "root of summed squares", "deviation"),
         rows=[
@@ -173,11 +193,6 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
             for item in record.impacts
         ],
     )
-    if record.run_time > 0.0:
-        yield (
-            f"{len(record.parameters)} parameters took as long as "
-            f"{record.runs_time / record.run_time:.1f} runs."
-        )
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -10,9 +10,12 @@ from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.errors import InputError
 from klack.progress import Progress, silent
 
-__all__ = ["run_points"]
+__all__ = ["require_way", "run_points"]
 
 
 def run_points(
@@ -61,6 +64,29 @@ def run_points(
     except KeyboardInterrupt:
         raise RunsInterrupted(_row_table(asked, rows)) from None
     return _row_table(asked, rows)
+
+
+def require_way(case: AnyCase, variant: str | None, level: str | None) -> None:
+    """Refuse a level of a stroke, and a variant of an impact.
+
+    Raises
+    ------
+    InputError
+    """
+    if variant is not None and isinstance(case, Case):
+        raise InputError(
+            "variant",
+            got=f"'{variant}', for an impact of two bodies",
+            expected="a level; variants are of strokes",
+            hint='write level="interface", or leave it out.',
+        )
+    if level is not None and isinstance(case, ValveCase):
+        raise InputError(
+            "level",
+            got=f"'{level}', for a stroke of a whole valve",
+            expected="a variant; levels are of impacts",
+            hint='write variant="dry", or leave it out.',
+        )
 
 
 def _row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTable:
