@@ -19,7 +19,10 @@ from klack.units import RATIO, Kind
 __all__ = ["SlopeSpace", "VariedKey", "slope_space"]
 
 _WHERE = "--parameter"
-_EXPECTED = ("a number other than zero", "a number of the network around the bodies")
+_EXPECTED = (
+    "a number of bodies, motion or contact, not zero",
+    "a number of the network around the bodies",
+)
 """Of an impact, and of a whole valve."""
 
 
