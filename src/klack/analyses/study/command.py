@@ -95,7 +95,6 @@ def _run(
 
     from klack.analyses.study.analysis import STUDY
     from klack.analyses.study.log import point_log_form
-    from klack.analyses.study.progress_page import ProgressPage
     from klack.analyses.study.where import Where
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
@@ -109,11 +108,16 @@ def _run(
         source, name = source.made(made), "made"
     ending = Ending.of(wanted, f"{checked.name}-{name}")
     with ending.resumable(point_log_form(checked, tree)[0]) as progress:
-        page = ProgressPage(ending.folder, progress)
-        seen = {"seen": page.write} if is_search and ending.report else {}
+        page, seen = None, {}
+        if is_search and ending.report:
+            from klack.analyses.study.progress_page import ProgressPage
+
+            page = ProgressPage(ending.folder, progress)
+            seen = {"seen": page.write}
         record = run(
             checked, tree, source, folder=ending.folder, where=where, progress=progress, **seen
         )
     code = ending.end(STUDY, record)
-    page.remove()
+    if page is not None:
+        page.remove()
     return code
