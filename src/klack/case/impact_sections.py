@@ -18,6 +18,7 @@ from klack.case.opposite import CaseOpposite
 from klack.case.placement import Placement
 from klack.case.shots import Shots
 from klack.case.study import CaseStudy
+from klack.contact.friction import MOST_FRICTION, Friction
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
@@ -108,6 +109,33 @@ class CaseContact(Section):
     local_law: LocalLaw = Field(
         default=ConsistentLocalLaw(kind="consistent"), description="Local law of the reduced level."
     )
+    friction: Ratio = Field(
+        default=0.0, ge=0, le=MOST_FRICTION, description="Coulomb's coefficient between the faces."
+    )
+    static_friction: Ratio | None = Field(
+        default=None,
+        ge=0,
+        le=MOST_FRICTION,
+        description="The same while they stick, at least 'friction'; default the same.",
+    )
+    stribeck_speed: Speed = Field(
+        default=0.0,
+        ge=0,
+        description="Speed of slip over which the static coefficient fades to 'friction'; "
+        "default at once.",
+    )
+
+    @model_validator(mode="after")
+    def _falling_friction(self) -> Self:
+        static = self.static_friction
+        if static is not None and static < self.friction:
+            raise CaseProblem(
+                ("static_friction",),
+                got=f"{static:g}, below 'friction' ({self.friction:g})",
+                expected="at least 'friction'",
+                hint="leave it out where only one coefficient is known.",
+            )
+        return self
 
     @field_validator("gap", mode="after")
     @classmethod
@@ -120,6 +148,12 @@ class CaseContact(Section):
                 hint="give the distance to first touch; the upper body is moved there.",
             )
         return gap
+
+    @property
+    def faces(self) -> Friction:
+        """Friction between the faces."""
+        static = self.friction if self.static_friction is None else self.static_friction
+        return Friction(kinetic=self.friction, static=static, speed=self.stribeck_speed)
 
     @property
     def moving(self) -> SurfaceName:
