@@ -66,6 +66,8 @@ class EnergyLedger:
         Done on the bodies by constant forces.
     spring : float [J]
         Change of the energy stored in springs to ground.
+    friction : float [J]
+        Lost in friction between the faces.
     """
 
     initial: float
@@ -75,12 +77,13 @@ class EnergyLedger:
     damping: float = 0.0
     work: float = 0.0
     spring: float = 0.0
+    friction: float = 0.0
 
     @property
     def residual(self) -> float:
         """Energy that appeared from nowhere, relative to the energy turned over [-]."""
         held = sum(body.total for body in self.bodies) + self.contact + self.spring
-        lost = self.contact_dissipation + self.damping
+        lost = self.contact_dissipation + self.damping + self.friction
         scale = self.turned_over
         return (held + lost - self.initial - self.work) / scale if scale else 0.0
 
@@ -103,6 +106,7 @@ class EnergyLedger:
             out[f"{body.name} vibration"] = body.vibration
         out["contact"] = self.contact
         out["contact dissipation"] = self.contact_dissipation
+        out["friction"] = self.friction
         out["modal damping"] = self.damping
         out["work of constant forces"] = self.work
         out["springs"] = self.spring

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
 
 from klack.cache.entry import Entry
 from klack.contact.complementarity import ComplementaritySolver
@@ -54,7 +55,11 @@ A Hertzian circle has 0.39, a full disc of uniform pressure 0.35."""
 
 
 def contact_compliance(
-    space: ContactSpace, flexibility_a: Flexibility, flexibility_b: Flexibility
+    space: ContactSpace,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+    *,
+    tangents: tuple[csr_array, csr_array] | None = None,
 ) -> NDArray[np.float64]:
     """Condense the static compliance of both bodies to the contact points.
 
@@ -62,30 +67,38 @@ def contact_compliance(
     ----------
     space : ContactSpace
     flexibility_a, flexibility_b : Flexibility
+    tangents : pair of sparse arrays, optional
+        Tangential rows (:func:`klack.contact.mortar.tangent_rows`), after those of the gaps.
 
     Returns
     -------
     array, shape (nc, nc) [m/N]
-        Symmetric.
+        Symmetric; with tangents of all rows.
     """
-    _require_memory(space)
+    rows = space.G_a, space.G_b
+    if tangents is not None:
+        rows = (
+            csr_array(vstack([rows[0], tangents[0]])),
+            csr_array(vstack([rows[1], tangents[1]])),
+        )
+    _require_memory(space, *rows)
     return _remembered_compliance(
         flexibility_a,
         flexibility_b,
-        (space.G_a, space.G_b),
-        lambda: flexibility_a.condensed(space.G_a) + flexibility_b.condensed(space.G_b),
+        rows,
+        lambda: flexibility_a.condensed(rows[0]) + flexibility_b.condensed(rows[1]),
     )
 
 
-def _require_memory(space: ContactSpace) -> None:
+def _require_memory(space: ContactSpace, *rows: csr_array) -> None:
     """Refuse more points than fit: the compliance, its symmetric part and a factor of it.
 
     And what condensing the larger body to them takes.
     """
-    condensing = max(condensation_memory(*G.shape) for G in (space.G_a, space.G_b))
+    condensing = max(condensation_memory(*G.shape) for G in rows)
     require_memory(
         "contact compliance",
-        4 * 8.0 * space.count**2 + condensing,
+        4 * 8.0 * float(rows[0].shape[0]) ** 2 + condensing,
         what=f"a full matrix of {space.count} contact points",
         hint="larger elements on the two surfaces, or a smaller contact.reach.",
     )

@@ -10,6 +10,7 @@ __all__ = [
     "DAMPING",
     "DEBT",
     "DIRECTION",
+    "FRICTION",
     "GUIDE",
     "GUIDE_STRAIN",
     "OPEN_STEPS",
@@ -21,6 +22,7 @@ __all__ = [
     "Modes",
     "Outside",
     "Record",
+    "Rubbing",
     "State",
 ]
 
@@ -37,7 +39,8 @@ OPEN_STEPS = 5  # since the last contact, -1 before the first
 ROUNDS = 6  # of the complementarity solver
 CONTACT_STEPS = 7
 DIRECTION = 8  # sign of the last axial contact force, 0 before the first
-_BOOKS = 9
+FRICTION = 9  # loss between the faces
+_BOOKS = 10
 
 
 class Modes(NamedTuple):
@@ -64,10 +67,27 @@ class Outside(NamedTuple):
 class ContactPoints(NamedTuple):
     """Points that may close; none in flight, where no contact is looked at."""
 
-    A: Matrix  # (n, n) [m/N] of ``contact_compliance``
+    A: Matrix  # (d n, d n) [m/N] of ``contact_compliance``; d = 1 without friction
     traces: Matrix  # (n, M)
     gap: Vector  # (n,) [m] at q = 0
     axial: Vector  # (n,)
+    tangents: Matrix  # (ways n, M), ways = d - 1
+    axial_across: Vector  # (ways n,)
+    static: Vector  # (n,) [-] coefficients of friction
+    kinetic: Vector  # (n,) [-]
+    fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
+
+    @classmethod
+    def smooth(cls, A: Matrix, traces: Matrix, gap: Vector, axial: Vector) -> Self:
+        """Return points without friction."""
+        nothing, rows = np.zeros(0), np.zeros((0, traces.shape[1]))
+        return cls(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing)
+
+    @classmethod
+    def none(cls, modes: int) -> Self:
+        """Return no point at all."""
+        nothing = np.zeros(0)
+        return cls.smooth(np.zeros((0, 0)), np.zeros((0, modes)), nothing, nothing)
 
 
 class Bore(NamedTuple):
@@ -106,6 +126,28 @@ class ActiveSet(NamedTuple):
         return cls(np.zeros(points, dtype=bool), order, inverse, counts)
 
 
+class Rubbing(NamedTuple):
+    """What friction remembers of the points, changed in place; empty without."""
+
+    forces: Vector  # (d n,) [N] last forces, normal ones first: the first guess
+    across: Vector  # (ways n,) [N] tangential forces
+    bent: Vector  # (ways n,) [m] tangential offset less that of the modes: residual compliance
+    doing: NDArray[np.int64]  # (n,) see :mod:`klack.transient.rubbing`
+    slip: Vector  # (n,) [m] within the last step, 0 where the point stuck or was open
+
+    @classmethod
+    def none(cls, points: int, ways: int) -> Self:
+        """Return points that do not touch."""
+        n = points if ways else 0
+        return cls(
+            np.zeros((1 + ways) * n),
+            np.zeros(ways * n),
+            np.zeros(ways * n),
+            np.zeros(n, dtype=np.int64),
+            np.zeros(n),
+        )
+
+
 class State(NamedTuple):
     """Where the bodies and their contact are, changed in place."""
 
@@ -113,18 +155,20 @@ class State(NamedTuple):
     v: Vector  # (M,)
     lam: Vector  # (n,) [N] contact forces
     contact: ActiveSet
+    rubbing: Rubbing
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     books: Vector  # sums, see ``DAMPING`` and the following names
 
     @classmethod
-    def still(cls, modes: int, points: int, heights: int) -> Self:
+    def still(cls, modes: int, points: int, heights: int, ways: int = 0) -> Self:
         """Return a state of rest at q = 0."""
         return cls(
             np.zeros(modes),
             np.zeros(modes),
             np.zeros(points),
-            ActiveSet.none(points),
+            ActiveSet.none(0 if ways else points),
+            Rubbing.none(points, ways),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
             np.zeros(_BOOKS),
@@ -139,10 +183,24 @@ class Record(NamedTuple):
     drift: Matrix  # (steps, bodies) [m/s] speed of the centres of mass at the end of the step
     outside: Vector  # [N] mean axial force from outside
     points: NDArray[np.float32]  # (steps, n) [N] mean force of every point, or (0, n)
+    pressed: Vector  # [N] the part of ``force`` that is not friction; (0,) without friction
+    across: NDArray[np.float32]  # (steps, ways n) [N] mean friction of every point, or (0, 0)
+    doing: NDArray[np.int8]  # (steps, n) open, stuck or slipping at the end, or (0, 0)
 
     @classmethod
-    def empty(cls, steps: int, bodies: int, points: int, *, keep_points: bool) -> Self:
+    def empty(
+        cls, steps: int, bodies: int, points: int, ways: int = 0, *, keep_points: bool
+    ) -> Self:
         """Return room for so many steps."""
         force, gap, outside = np.zeros((3, steps))
-        rows = np.zeros((steps if keep_points else 0, points), dtype=np.float32)
-        return cls(force, gap, np.zeros((steps, bodies)), outside, rows)
+        kept = steps if keep_points else 0
+        return cls(
+            force,
+            gap,
+            np.zeros((steps, bodies)),
+            outside,
+            np.zeros((kept, points), dtype=np.float32),
+            np.zeros(steps if ways else 0),
+            np.zeros((kept if ways else 0, ways * points), dtype=np.float32),
+            np.zeros((kept if ways else 0, points if ways else 0), dtype=np.int8),
+        )

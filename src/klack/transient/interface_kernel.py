@@ -27,6 +27,9 @@ follows from all forces of the step, each force comes with the answer of the spr
 
 and the matrix of the complementarity problem loses
 :math:`\tfrac12 \kappa (\Phi B_1 p) (\Phi B_1 p)^T` (:func:`contact_compliance`).
+
+With friction between the faces the same holds in all directions of the points
+(:mod:`klack.transient.interface_friction`).
 """
 
 from typing import NamedTuple
@@ -53,6 +56,14 @@ from klack.transient.interface_arrays import (
     Outside,
     Record,
     State,
+)
+from klack.transient.interface_friction import (
+    friction_work,
+    offset_change,
+    push_across,
+    remember,
+    rub,
+    tell_friction,
 )
 
 __all__ = [
@@ -96,12 +107,20 @@ class _Step(NamedTuple):
     normal: Matrix  # (k, 2) [N] of the guide on the shaft
     slowing: Vector  # (k,) change of the sliding speed per braking force [m/(N s)]
     dragging: Vector  # (k,) the same per speed that drag has braked [-]
+    free: Vector  # (d n,) [m] gaps and increments of offset without contact forces; friction only
+    motion: Vector  # (d n,) [m] the same with them
+    way: Vector  # (M,) of the modes within the step
+    moved: Vector  # (ways n,) [m] the part of the offsets that the modes move
+    bent: Vector  # (ways n,) [m] the other part, at the end
+    mu: Vector  # (n,) [-]
 
 
 def contact_compliance(
     local: NDArray, traces: NDArray, B1: NDArray, push: NDArray, spring: float
 ) -> NDArray:
     """Matrix A of :func:`march`: gaps at the end of a step per contact force there, (n, n) [m/N].
+
+    With friction the directions of all points, normal ones first, instead of gaps.
 
     Parameters
     ----------
@@ -244,6 +263,7 @@ def _work(points: ContactPoints, before: Vector, step: _Step) -> tuple[float, fl
 def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
     """Room for a step, and how much a force brakes the shaft."""
     M, n, guides = len(modes.push), len(points.gap), len(bore.clearance)
+    rubs = len(points.tangents)
     slowing, dragging = np.zeros(guides), np.zeros(guides)
     for k in range(guides):
         for j in range(guides):
@@ -264,12 +284,21 @@ def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
         np.zeros((guides, 2)),
         slowing,
         dragging,
+        np.empty(n + rubs if rubs else 0),
+        np.empty(n + rubs if rubs else 0),
+        np.zeros(M),
+        np.zeros(rubs),
+        np.zeros(rubs),
+        np.empty(n if rubs else 0),
     )
 
 
 @phase
 def _potential(points: ContactPoints, state: State) -> float:
-    """Energy of the contact, -lam (gap + Phi q) / 2, since closed points have no gap [J]."""
+    """Energy of the contact, -lam (gap + Phi q) / 2, since closed points have no gap [J].
+
+    With friction and what its forces bend across the normals.
+    """
     potential = 0.0
     for k in range(len(points.gap)):
         if state.lam[k] > 0.0:
@@ -277,6 +306,8 @@ def _potential(points: ContactPoints, state: State) -> float:
             for i in range(len(state.q)):
                 d += points.traces[k, i] * state.q[i]
             potential -= 0.5 * state.lam[k] * d
+    for i in range(len(state.rubbing.across)):
+        potential += 0.5 * state.rubbing.across[i] * state.rubbing.bent[i]
     return potential
 
 
@@ -390,6 +421,8 @@ def _close(points: ContactPoints, state: State, step: _Step) -> float:
             state.carried[k] = True
         least = min(least, step.gap[k])
     _gather(points.traces, step.lam, 0.5, step.kick)
+    if len(points.tangents):
+        push_across(points, state.rubbing.forces[len(points.gap) :], 0.5, step.kick)
     return least
 
 
@@ -413,6 +446,14 @@ def _pay(
     work, stored = _work(points, state.q, step)
     whole_step = potential > 0.0 and stored > 0.0
     owed = state.books[DEBT] + work + stored - potential
+    rubs = len(points.tangents) > 0 and work != 0.0
+    held = 0.0  # energy of the contact across the normals
+    if rubs:
+        n = len(points.gap)
+        for i in range(len(step.bent)):
+            held += 0.5 * state.rubbing.forces[n + i] * step.bent[i]
+        given, lost = friction_work(state.rubbing, step.bent, step.moved)
+        owed += held + given + lost
     pay = 0.0
     if owed != 0.0 and work != 0.0:
         limit = 1.0
@@ -438,6 +479,11 @@ def _pay(
             work += pay * work_slope
             stored += pay * stored_slope
     state.books[DEBT] += (1.0 + pay) * work + stored - potential
+    if rubs:
+        offset_change(points, state.q, step.q, step.way, step.moved)
+        given, lost = friction_work(state.rubbing, step.bent, step.moved)
+        state.books[DEBT] += held + given + lost
+        stored += held
     return pay, stored, answer
 
 
@@ -452,6 +498,8 @@ def _tell_forces(
         force += points.axial[k] * mean
         if len(record.points):
             record.points[taken, k] = mean
+    if len(points.tangents):
+        force += tell_friction(points, state, record, taken, force)
     record.force[taken] = force
     if state.contact.counts[0] > 0:
         state.books[OPEN_STEPS] = 0.0
@@ -512,6 +560,10 @@ def _finish(
         state.v[i] = step.v[i]
     for k in range(len(step.lam)):
         state.lam[k] = step.lam[k]
+    if len(step.moved):
+        remember(
+            state, step.bent, step.moved, friction_work(state.rubbing, step.bent, step.moved)[1]
+        )
     for b in range(modes.drift.shape[0]):
         s = 0.0
         for i in range(len(state.v)):
@@ -546,7 +598,7 @@ def march(
     -------
     taken, status : int
     """
-    n, books = len(points.gap), state.books
+    n, books, rubs = len(points.gap), state.books, len(points.tangents) > 0
     step = _start(modes, points, bore)
     share = _spring_share(modes.B1, modes.push, outside.spring)
     diagonal = 0.0
@@ -557,6 +609,8 @@ def march(
     for taken in range(steps):
         braking = _begin(modes, outside, bore, state, step)
         _gather(points.traces, state.lam, 0.5, step.kick)
+        if rubs:
+            push_across(points, state.rubbing.across, 0.5, step.kick)
         axial = outside.constant + _move(modes, state, step, share)
         for k in range(len(bore.clearance)):
             axial += _press(modes, bore, step, k, share)
@@ -567,23 +621,50 @@ def march(
             least, widest = _look(points, step)
             if least < 0.0 or state.contact.counts[0] > 0:
                 tolerance = max(1e-15, 1e-13 * widest)
-                rounds = solve_active(
-                    points.A,
-                    step.open_gap,
-                    state.contact,
-                    step.lam,
-                    step.gap,
-                    tolerance,
-                    diagonal,
-                )
-                if rounds < 0:
-                    return taken, FAILED
+                if rubs:
+                    rounds = rub(
+                        points,
+                        state,
+                        step.q,
+                        step.open_gap,
+                        step.free,
+                        step.motion,
+                        step.way,
+                        step.moved,
+                        step.mu,
+                        tolerance / diagonal,
+                    )
+                    if rounds == 0:
+                        return taken, FAILED
+                    for k in range(n):
+                        step.lam[k] = state.rubbing.forces[k]
+                        step.gap[k] = step.motion[k]
+                else:
+                    rounds = solve_active(
+                        points.A,
+                        step.open_gap,
+                        state.contact,
+                        step.lam,
+                        step.gap,
+                        tolerance,
+                        diagonal,
+                    )
+                    if rounds < 0:
+                        return taken, FAILED
                 if wait and _turned(points, state, step):
                     return taken, TURNED
-                books[ROUNDS] += rounds
+                books[ROUNDS] += abs(rounds)
                 least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
+                if rubs:
+                    offset_change(points, state.q, step.q, step.way, step.moved)
+                    for i in range(len(step.bent)):
+                        step.bent[i] = state.rubbing.bent[i] + step.motion[n + i] - step.moved[i]
+            if rubs and state.contact.counts[0] == 0:
+                for i in range(len(step.bent)):
+                    step.bent[i] = 0.0
+                    state.rubbing.forces[n + i] = 0.0
             pay, potential, answer = _pay(modes, points, state, step, share, potential, answer)
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)

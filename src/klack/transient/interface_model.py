@@ -14,16 +14,22 @@ the *residual* compliance
 positive definite, where F is the static flexibility of a whole body (of a free one with inertia
 relief).  Statics are therefore exact for any number of modes and for *every* pressure pattern:
 centred, eccentric, tilted, or touching in a few places.  The contact points carry no inertia.
+
+With friction (:mod:`klack.contact.friction`) the points have tangential directions too, with the
+same hats and weights (:func:`klack.contact.mortar.tangent_rows`): rows of G are the normals of all
+points, then all of them in the first tangential direction, then in the second.  One residual
+compliance holds all directions: unlike bodies slip sideways where they are pressed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
+from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import contact_compliance
 from klack.elasticity.body import ElasticBody
@@ -39,6 +45,8 @@ __all__ = [
     "interface_model",
     "rigid_motion",
 ]
+
+_SMOOTH = Friction.coulomb(0.0)
 
 _RECIPROCITY = 1e-6
 """Largest difference of the works of two loads on each other's displacements."""
@@ -78,7 +86,11 @@ class InterfaceContact:
         Names of the bodies a and b of ``space``.
     space : ContactSpace
     compliance : array, shape (nc, nc) [m/N], optional
-        Static compliance of both bodies at these points, if it is known already.
+        Static compliance of both bodies at these points, if it is known already; with tangential
+        directions of all rows.
+    tangents : pair of sparse arrays, optional
+        Tangential rows of a and b (:func:`klack.contact.mortar.tangent_rows`); none: no friction.
+    friction : Friction
     """
 
     name: str
@@ -86,6 +98,23 @@ class InterfaceContact:
     lower: str
     space: ContactSpace
     compliance: NDArray[np.float64] | None = None
+    tangents: tuple[csr_array, csr_array] | None = None
+    friction: Friction = _SMOOTH
+
+    @property
+    def ways(self) -> int:
+        """Tangential directions of each point."""
+        return 0 if self.tangents is None else self.tangents[0].shape[0] // len(self.space.gap)
+
+    def rows(self, body: str) -> csr_array | None:
+        """Rows of all directions on a body, None where it is not part of the contact."""
+        if body == self.upper:
+            G, side = self.space.G_a, 0
+        elif body == self.lower:
+            G, side = self.space.G_b, 1
+        else:
+            return None
+        return G if self.tangents is None else csr_array(vstack([G, self.tangents[side]]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +156,8 @@ class InterfaceModel:
     traces : array, shape (nc, M) [1/sqrt(kg)]
         Change of the gaps per unit modal coordinate.
     compliance : array, shape (nc, nc) [m/N]
-        Residual compliance.
+        Residual compliance; with friction (d nc, d nc), the normals of all points first, then each
+        tangential direction.
     gap : array, shape (nc,) [m]
         At q = 0 without contact forces.
     axial : array, shape (nc,) [-]
@@ -148,6 +178,12 @@ class InterfaceModel:
     longest_period : float [s]
         Of its elastic modes, 0 without any.
     checks : StaticChecks
+    tangents : array, shape (ways nc, M) [1/sqrt(kg)]
+        Change of the tangential offsets per unit modal coordinate; no rows without friction.
+    axial_across : array, shape (ways nc,) [-]
+        The same per unit translation of the moving body along +z.
+    friction : tuple of Friction
+        Of each contact; empty without.
     """
 
     bodies: tuple[str, ...]
@@ -169,6 +205,14 @@ class InterfaceModel:
     centre: NDArray[np.float64]
     longest_period: float
     checks: StaticChecks
+    tangents: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    axial_across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    friction: tuple[Friction, ...] = ()
+
+    @property
+    def ways(self) -> int:
+        """Tangential directions of each contact point, 0 without friction."""
+        return len(self.tangents) // self.count
 
     @property
     def count(self) -> int:
@@ -215,18 +259,24 @@ def interface_model(
             expected="a body that is free along z",
             hint="give the needle first and remove its supports.",
         )
+    ways = _common_ways(contacts)
     rows = [len(contact.space.gap) for contact in contacts]
     last = np.cumsum(rows).astype(np.int64)
     first = np.asarray(last - rows, dtype=np.int64)
-    whole = _static_compliance(bodies, contacts, names, first, last)
-    blocks = [_traces(item, contacts, first, last) for item in bodies]
+    count = int(last[-1])
+    places = [
+        (count * np.arange(1 + ways)[:, None] + np.arange(a, b)).ravel()
+        for a, b in zip(first, last, strict=True)
+    ]
+    whole = _static_compliance(bodies, contacts, names, places)
+    blocks = [_traces(item, contacts, places) for item in bodies]
     traces = np.hstack(blocks)
     omega = np.concatenate([_with_rigid(item, item.modes.omega) for item in bodies])
     elastic = omega > 0
     modal = (traces[:, elastic] / omega[elastic]) @ (traces[:, elastic] / omega[elastic]).T
     compliance = whole - modal
     compliance = 0.5 * (compliance + compliance.T)
-    reciprocity, static_limit = _fresh_statics(bodies, contacts, first, last, compliance + modal)
+    reciprocity, static_limit = _fresh_statics(bodies, contacts, places, compliance + modal)
     checks = StaticChecks(
         lowest_pivot=_lowest_pivot(compliance),
         reciprocity=reciprocity,
@@ -242,7 +292,7 @@ def interface_model(
         omega=omega,
         damping=np.concatenate([_with_rigid(item, item.damping) for item in bodies]),
         owner=np.repeat(np.arange(len(bodies)), counts),
-        traces=np.ascontiguousarray(traces),
+        traces=np.ascontiguousarray(traces[:count]),
         compliance=compliance,
         gap=np.concatenate([contact.space.gap for contact in contacts]),
         axial=np.concatenate(
@@ -264,7 +314,40 @@ def interface_model(
         centre=_in_space(moving.centre_of_mass),
         longest_period=float(np.max(periods, initial=0.0)),
         checks=checks,
+        tangents=np.ascontiguousarray(traces[count:]),
+        axial_across=_axial_across(contacts, names[0], places, count),
+        friction=tuple(contact.friction for contact in contacts) if ways else (),
     )
+
+
+def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
+    """Tangential directions of every contact."""
+    ways = {contact.ways for contact in contacts}
+    if len(ways) > 1:
+        raise InputError(
+            "interface model: contacts",
+            got="tangential directions at one contact and none at another",
+            expected="tangential directions at all contacts, or none",
+            hint="give every contact tangents; friction may be 0 at one of them.",
+        )
+    return ways.pop()
+
+
+def _axial_across(
+    contacts: Sequence[InterfaceContact],
+    moving: str,
+    places: Sequence[NDArray[np.int64]],
+    count: int,
+) -> NDArray[np.float64]:
+    """Change of the tangential offsets per translation of the moving body along +z."""
+    out = np.zeros(sum(len(place) for place in places))
+    for contact, place in zip(contacts, places, strict=True):
+        if contact.tangents is not None:
+            rows = contact.tangents[0 if contact.upper == moving else 1]
+            d = contact.space.dimension
+            lifted = np.tile(np.eye(d)[d - 1], rows.shape[1] // d)
+            out[place[len(contact.space.gap) :]] = rows @ lifted
+    return out[count:]
 
 
 def rigid_motion(body: ElasticBody) -> NDArray[np.float64]:
@@ -299,16 +382,15 @@ def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
 def _traces(
     item: InterfaceBody,
     contacts: Sequence[InterfaceContact],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
+    places: Sequence[NDArray[np.int64]],
 ) -> NDArray[np.float64]:
     """Contact traces of the modes of one body at all contact points."""
     shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
-    out = np.zeros((int(last[-1]), shapes.shape[1]))
-    for contact, a, b in zip(contacts, first, last, strict=True):
-        for name, G in ((contact.upper, contact.space.G_a), (contact.lower, contact.space.G_b)):
-            if name == item.body.name:
-                out[a:b] += G @ shapes
+    out = np.zeros((sum(len(place) for place in places), shapes.shape[1]))
+    for contact, place in zip(contacts, places, strict=True):
+        rows = contact.rows(item.body.name)
+        if rows is not None:
+            out[place] += rows @ shapes
     return out
 
 
@@ -327,11 +409,10 @@ def _static_compliance(
     bodies: Sequence[InterfaceBody],
     contacts: Sequence[InterfaceContact],
     names: Sequence[str],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
+    places: Sequence[NDArray[np.int64]],
 ) -> NDArray[np.float64]:
     """Static compliance of all points; a body with several contacts couples them."""
-    total = np.zeros((int(last[-1]),) * 2)
+    total = np.zeros((sum(len(place) for place in places),) * 2)
     for contact in contacts:
         for name in (contact.upper, contact.lower):
             if name not in names:
@@ -341,30 +422,24 @@ def _static_compliance(
                     expected=f"one of: {', '.join(names)}",
                     hint="give every body of the contacts.",
                 )
-    for contact, a, b in zip(contacts, first, last, strict=True):
+    for contact, place in zip(contacts, places, strict=True):
         C = contact.compliance
         if C is None:
             pair = [
                 bodies[names.index(name)].flexibility for name in (contact.upper, contact.lower)
             ]
-            C = contact_compliance(contact.space, pair[0], pair[1])
-        total[a:b, a:b] = C
+            C = contact_compliance(contact.space, pair[0], pair[1], tangents=contact.tangents)
+        total[np.ix_(place, place)] = C
     for i, one in enumerate(contacts):
         for j, other in enumerate(contacts):
             if i == j:
                 continue
             for item in bodies:
-                G, H = _rows_of(one, item.body.name), _rows_of(other, item.body.name)
+                G, H = one.rows(item.body.name), other.rows(item.body.name)
                 if G is not None and H is not None:
                     part = G @ item.flexibility.solve(H.T.toarray())
-                    total[first[i] : last[i], first[j] : last[j]] += part
+                    total[np.ix_(places[i], places[j])] += part
     return 0.5 * (total + total.T)
-
-
-def _rows_of(contact: InterfaceContact, name: str) -> csr_array | None:
-    if contact.upper == name:
-        return contact.space.G_a
-    return contact.space.G_b if contact.lower == name else None
 
 
 def _lowest_pivot(compliance: NDArray[np.float64]) -> float:
@@ -379,18 +454,17 @@ def _lowest_pivot(compliance: NDArray[np.float64]) -> float:
 def _fresh_statics(
     bodies: Sequence[InterfaceBody],
     contacts: Sequence[InterfaceContact],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
+    places: Sequence[NDArray[np.int64]],
     whole: NDArray[np.float64],
 ) -> tuple[float, float]:
     """Two uneven loads on the whole bodies, solved anew: reciprocity, deviation of ``whole``."""
-    loads = np.random.default_rng(5).uniform(0.0, 1.0, (int(last[-1]), 2))
+    loads = np.random.default_rng(5).uniform(0.0, 1.0, (len(whole), 2))
     answers = np.zeros(loads.shape)
     for item in bodies:
         parts = [
-            (G, slice(int(a), int(b)))
-            for contact, a, b in zip(contacts, first, last, strict=True)
-            if (G := _rows_of(contact, item.body.name)) is not None
+            (G, place)
+            for contact, place in zip(contacts, places, strict=True)
+            if (G := contact.rows(item.body.name)) is not None
         ]
         forces = sum(G.T @ loads[rows] for G, rows in parts)
         u = item.flexibility.deflections(np.asarray(forces))

@@ -29,6 +29,11 @@ class ImpactSegment:
         Rigid placement of the moving body when the segment began: translation of the centre of
         mass and rotation vector.
     velocity : array, shape (6,) [m/s], [rad/s]
+    friction_force : float32 array, shape (n, ways nc) [N]
+        Mean friction of every contact point on the moving body's side in each step, all points in
+        the first tangential direction, then in the second; no rows without friction or points.
+    doing : int8 array, shape (n, nc)
+        0 open, 1 sticking, 2 slipping at the end of each step; likewise.
     """
 
     contact: str
@@ -37,6 +42,8 @@ class ImpactSegment:
     point_force: NDArray[np.float32]
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
+    friction_force: NDArray[np.float32]
+    doing: NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,6 +77,8 @@ class InterfaceEnergy:
     debt : float [J]
         Energy that the contact steps have given too much and not yet taken back; the residual
         of the balance except for round-off.
+    friction : float [J]
+        Lost in friction between the faces.
     """
 
     initial: float
@@ -78,12 +87,13 @@ class InterfaceEnergy:
     guide: float
     work: float
     debt: float
+    friction: float = 0.0
 
     @property
     def residual(self) -> float:
         """Energy from nowhere over the largest of initial energy and work [-]."""
         return (
-            self.final - self.initial + self.damping + self.guide - self.work
+            self.final - self.initial + self.damping + self.guide + self.friction - self.work
         ) / self.turned_over
 
     @property

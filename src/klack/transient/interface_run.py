@@ -27,6 +27,7 @@ from klack.transient.interface_arrays import (
     DAMPING,
     DEBT,
     DIRECTION,
+    FRICTION,
     GUIDE,
     GUIDE_STRAIN,
     OPEN_STEPS,
@@ -38,6 +39,7 @@ from klack.transient.interface_arrays import (
     Modes,
     Outside,
     Record,
+    Rubbing,
     State,
 )
 from klack.transient.interface_kernel import (
@@ -181,6 +183,9 @@ class _Segment:
         self.drift = [run.model.drift @ run.v]
         self.parts: list[tuple[NDArray[np.float64], ...]] = []
         self.point_force: list[NDArray[np.float32]] = []
+        self.friction_force: list[NDArray[np.float32]] = []
+        self.doing: list[NDArray[np.int8]] = []
+        self.pressed: list[NDArray[np.float64]] = []
         self.contact_steps = run.books[CONTACT_STEPS]
 
     @property
@@ -206,7 +211,10 @@ class _Run:
         n, M = model.count, model.mode_count
         self.steppers: dict[int, Modes] = {}
         B1, self.push = self.stepper(0).B1, self.stepper(0).push
-        self.A = contact_compliance(model.compliance, model.traces, B1, self.push, spring)
+        rows = np.vstack([model.traces, model.tangents]) if model.ways else model.traces
+        self.A = contact_compliance(model.compliance, rows, B1, self.push, spring)
+        self.tangents = model.tangents if model.ways else np.zeros((0, M))
+        self.friction = _point_friction(model, step)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.gap0 = np.array(model.gap)
         below = model.axial > 1e-6
@@ -214,9 +222,11 @@ class _Run:
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
         self.bore = _bore(guide, M)
-        self.state = State.still(M, n, len(self.bore.clearance))
+        self.state = State.still(M, n, len(self.bore.clearance), model.ways)
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
-        self.in_flight = self.state._replace(lam=np.zeros(0), contact=ActiveSet.none(0))
+        self.in_flight = self.state._replace(
+            lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
+        )
         self.taken_at = np.zeros(6)
         first, last = model.contacts[0][1:]
         self.arm = np.zeros(3)
@@ -314,10 +324,7 @@ class _Run:
 
     def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
         """Jump until a gap may close soon; recompute the gaps meanwhile."""
-        nothing = np.zeros(0)
-        away = ContactPoints(
-            np.zeros((0, 0)), np.zeros((0, self.model.mode_count)), nothing, nothing
-        )
+        away = ContactPoints.none(self.model.mode_count)
         while self.time < duration:
             stale = self.stale()
             horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
@@ -391,7 +398,16 @@ class _Run:
             self.segments.append(self.close(segment))
 
     def fine(self, segment: _Segment, steps: int, wait: int) -> int:
-        points = ContactPoints(self.A, self.model.traces, self.gap0, self.model.axial)
+        model = self.model
+        points = ContactPoints(
+            self.A,
+            model.traces,
+            self.gap0,
+            model.axial,
+            self.tangents,
+            model.axial_across,
+            *self.friction,
+        )
         taken, status, record = self.march(self.stepper(0), steps, wait, points, self.state)
         if status == FAILED:
             raise ConvergenceError(
@@ -403,6 +419,9 @@ class _Run:
         segment.drift.extend(drift)
         if self.points:
             segment.point_force.append(record.points[:taken])
+            segment.friction_force.append(record.across[:taken])
+            segment.doing.append(record.doing[:taken])
+        segment.pressed.append(record.pressed[:taken])
         self.time += taken * self.step
         self.steps += taken
         self.keep_motion()
@@ -421,7 +440,10 @@ class _Run:
         self, modes: Modes, steps: int, wait: int, points: ContactPoints, state: State
     ) -> tuple[int, int, Record]:
         n = len(points.gap)
-        record = Record.empty(steps, len(self.model.bodies), n, keep_points=self.points and n > 0)
+        ways = self.model.ways if n else 0
+        record = Record.empty(
+            steps, len(self.model.bodies), n, ways, keep_points=self.points and n > 0
+        )
         outside = Outside(self.constant, self.spring)
         taken, status = march(steps, wait, modes, outside, points, self.bore, state, record)
         return taken, status, record
@@ -438,7 +460,11 @@ class _Run:
         self.motion.append((self.time, position, velocity))
 
     def contact_energy(self) -> float:
-        return float(-0.5 * self.state.lam @ (self.gap0 + self.model.traces @ self.q))
+        pressed = -0.5 * self.state.lam @ (self.gap0 + self.model.traces @ self.q)
+        rubbing = self.state.rubbing
+        if len(rubbing.across):
+            pressed += 0.5 * rubbing.across @ rubbing.bent
+        return float(pressed)
 
     def spring_energy(self) -> float:
         return float(0.5 * self.spring * (self.push @ self.q) ** 2)
@@ -488,11 +514,14 @@ class _Run:
             | {f"velocity of {name}": drift[:, i] for i, name in enumerate(model.bodies)},
         )
         points = np.zeros((0, model.count), dtype=np.float32)
+        across, doing = np.zeros((0, 0), dtype=np.float32), np.zeros((0, 0), dtype=np.int8)
         if self.points:
             points = np.concatenate(segment.point_force)
+            across, doing = np.concatenate(segment.friction_force), np.concatenate(segment.doing)
+        pressed = np.concatenate(segment.pressed) if model.ways else force
         initial, spring, books = segment.ledger
         spent = self.books - books
-        contact, side, other = self.closed(force)
+        contact, side, other = self.closed(pressed)
         # as if the other body were below: z points from it to the moving one
         moving, hit, mass = side * drift[:, 0], np.zeros(len(drift)), np.inf
         if other is not None:
@@ -500,7 +529,7 @@ class _Run:
         history = ImpactHistory(
             step=self.step,
             start=segment.time,
-            force=np.abs(force),
+            force=np.where(pressed < 0.0, -force, force),
             gap=gap,
             velocity_a=moving,
             velocity_b=hit,
@@ -515,6 +544,7 @@ class _Run:
                 damping=float(spent[DAMPING]),
                 work=float(spent[WORK]),
                 spring=self.spring_energy() - spring + float(spent[GUIDE_STRAIN]),
+                friction=float(spent[FRICTION]),
             ),
             external_force=side * outside,
             longest_period=model.longest_period,
@@ -528,6 +558,8 @@ class _Run:
             point_force=points,
             position=segment.position,
             velocity=segment.velocity,
+            friction_force=across,
+            doing=doing,
         )
 
     def closed(self, force: NDArray[np.float64]) -> tuple[str, float, int | None]:
@@ -590,6 +622,7 @@ class _Run:
                 guide=float(self.books[GUIDE]),
                 work=float(self.books[WORK]),
                 debt=float(self.books[DEBT]),
+                friction=float(self.books[FRICTION]),
             ),
             steps=self.steps,
             steps_in_contact=contact_steps,
@@ -601,6 +634,17 @@ class _Run:
 
 _SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
 """A millimetre of translation weighs like a radian over a metre: lengths of valves."""
+
+
+def _point_friction(model: InterfaceModel, step: float) -> tuple[NDArray[np.float64], ...]:
+    """Coefficients of every point: static, kinetic; slip in a step that fades one to the other."""
+    sides = [
+        (friction.static, friction.kinetic, friction.speed * step) for friction in model.friction
+    ]
+    counts = [last - first for _, first, last in model.contacts]
+    if not sides:
+        return (np.zeros(0),) * 3
+    return tuple(np.repeat(values, counts) for values in zip(*sides, strict=True))
 
 
 def _bore(guide: Guide | None, modes: int) -> Bore:

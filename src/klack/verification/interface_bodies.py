@@ -268,7 +268,7 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
         0,
         Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift),
         Outside(0.0, 0.0),
-        ContactPoints(A, model.traces, model.gap, model.axial),
+        ContactPoints.smooth(A, model.traces, model.gap, model.axial),
         Bore.none(M),
         state,
         Record.empty(steps, len(model.bodies), n, keep_points=False),

@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import LevelResult
+from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
-from klack.contact.mortar import ContactSpace
+from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
+from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
@@ -109,27 +111,40 @@ def build_interface(
         )
         for body, flexibility in _sides(problem)
     ]
-    moving, above = problem.pair.upper.name, problem.opposite
+    pair, above = problem.pair, problem.opposite
+    faces = problem.case.contact.faces
+    smooth = faces.is_none
+    here = problem.space if space is None else space
+    at_hand = problem.static.compliance if space is None else compliance
     contacts = [
         InterfaceContact(
             name=CONTACT,
-            upper=moving,
-            lower=problem.pair.lower.name,
-            space=problem.space if space is None else space,
-            compliance=problem.static.compliance if space is None else compliance,
+            upper=pair.upper.name,
+            lower=pair.lower.name,
+            space=here,
+            compliance=at_hand if smooth else None,
+            tangents=None if smooth else tangent_rows(here, *_meshes(pair)),
+            friction=faces,
         )
     ]
     if above is not None:
+        there = (above.body.mesh, above.surface, pair.upper.mesh, above.moving_surface)
         contacts.append(
             InterfaceContact(
                 name=OPPOSITE,
                 upper=above.body.name,
-                lower=moving,
+                lower=pair.upper.name,
                 space=above.space,
-                compliance=above.static.compliance,
+                compliance=above.static.compliance if smooth else None,
+                tangents=None if smooth else tangent_rows(above.space, *there),
+                friction=faces,
             )
         )
     return interface_model(bodies, contacts)
+
+
+def _meshes(pair: BodyPair) -> tuple[Mesh, Surface, Mesh, Surface]:
+    return pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface
 
 
 def within_reach(

@@ -1,0 +1,145 @@
+r"""Friction between the faces in a step of the interface level.
+
+Tangential offsets of the points, of the moving body past the other,
+
+.. math:: s = \Phi_t q + e, \qquad e = C_{tn} \lambda_n + C_{tt} \lambda_t ,
+
+change by :math:`\Delta s` within a step, part of it elastic, and Coulomb's law holds on that
+increment (:mod:`klack.transient.rubbing`): no speed of slip, and nothing is smoothed.  A point
+that closes begins with :math:`\lambda_t = 0` from where it is; one that opens forgets.
+
+Energy: with the mean forces :math:`\bar\lambda_t = \tfrac12 (\lambda_{t0} + \lambda_{t1})` of a
+step and the part :math:`\tfrac12 \lambda_t^T e` of the potential of the contact,
+
+.. math:: \bar\lambda_t^T \Phi_t \Delta q + \Delta (\tfrac12 \lambda_t^T e) =
+    \bar\lambda_t^T \Delta s + \tfrac12 (\lambda_{t1}^T e_0 - \lambda_{t0}^T e_1) .
+
+The first term is what friction takes.  It has the right sign wherever the slip turns by less than
+a right angle within a step; the rest joins the debt of the contact, as the second term does (of
+points that close or open), and is paid by normal forces: friction never pays.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.compiling.jit import inner
+from klack.simulation.phase import phase
+from klack.transient.interface_arrays import FRICTION, ContactPoints, Record, Rubbing, State
+from klack.transient.rubbing import SLIP, solve_rubbing
+
+__all__ = ["friction_work", "offset_change", "push_across", "remember", "rub", "tell_friction"]
+
+Vector = NDArray[np.float64]
+
+
+@inner
+def offset_change(
+    points: ContactPoints, before: Vector, q: Vector, way: Vector, moved: Vector
+) -> None:
+    """How far the modes move the points across their normals, on their ``way``."""
+    for i in range(len(way)):
+        way[i] = q[i] - before[i]
+    np.dot(points.tangents, way, moved)
+
+
+@inner
+def rub(
+    points: ContactPoints,
+    state: State,
+    q: Vector,
+    open_gap: Vector,
+    free: Vector,
+    motion: Vector,
+    way: Vector,
+    moved: Vector,
+    mu: Vector,
+    tolerance: float,
+) -> int:
+    """Forces of all directions at the end of the step; returns the rounds, 0: none found.
+
+    ``free`` and ``motion`` become gaps and increments of offset without and with the new forces.
+    """
+    n, rubbing = len(points.gap), state.rubbing
+    offset_change(points, state.q, q, way, moved)
+    for k in range(n):
+        free[k] = open_gap[k]
+        fall = 1.0
+        if rubbing.slip[k] > 0.0:
+            fall = np.exp(-rubbing.slip[k] / points.fade[k]) if points.fade[k] > 0.0 else 0.0
+        mu[k] = points.kinetic[k] + fall * (points.static[k] - points.kinetic[k])
+    for i in range(len(moved)):
+        free[n + i] = moved[i] - rubbing.bent[i]
+    rounds = solve_rubbing(points.A, free, mu, rubbing.forces, motion, rubbing.doing, tolerance)
+    carrying = 0
+    for k in range(n):
+        if rubbing.forces[k] > 0.0:
+            carrying += 1
+    state.contact.counts[0] = carrying
+    return int(rounds)
+
+
+@phase
+def push_across(points: ContactPoints, across: Vector, factor: float, kick: Vector) -> None:
+    """Add the modal force of tangential forces, times a factor."""
+    for i in range(len(across)):
+        if across[i] != 0.0:
+            a = factor * across[i]
+            for j in range(len(kick)):
+                kick[j] += a * points.tangents[i, j]
+
+
+@phase
+def friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float, float]:
+    """Work of the mean tangential forces on the modes, and what friction takes [J]."""
+    n = len(rubbing.slip)
+    ways = len(moved) // n
+    given, taken = 0.0, 0.0
+    for k in range(n):
+        lost = 0.0
+        for c in range(ways):
+            i = c * n + k
+            mean = 0.5 * (rubbing.across[i] + rubbing.forces[n + i])
+            if mean != 0.0:
+                given += mean * moved[i]
+                lost -= mean * (moved[i] + bent[i] - rubbing.bent[i])
+        if lost > 0.0:
+            taken += lost
+    return given, taken
+
+
+@phase
+def tell_friction(
+    points: ContactPoints, state: State, record: Record, taken: int, pressed: float
+) -> float:
+    """Record the mean friction of every point; returns its axial resultant [N]."""
+    rubbing, n = state.rubbing, len(points.gap)
+    force = 0.0
+    for i in range(len(rubbing.across)):
+        mean = 0.5 * (rubbing.across[i] + rubbing.forces[n + i])
+        force += points.axial_across[i] * mean
+        if len(record.across):
+            record.across[taken, i] = mean
+    record.pressed[taken] = pressed
+    if len(record.doing):
+        for k in range(n):
+            record.doing[taken, k] = rubbing.doing[k]
+    return force
+
+
+@phase
+def remember(state: State, bent: Vector, moved: Vector, lost: float) -> None:
+    """The end of the step becomes the state."""
+    rubbing = state.rubbing
+    n = len(rubbing.slip)
+    ways = len(moved) // n
+    state.books[FRICTION] += lost
+    for k in range(n):
+        way = 0.0
+        if rubbing.doing[k] == SLIP:
+            for c in range(ways):
+                i = c * n + k
+                way += (moved[i] + bent[i] - rubbing.bent[i]) ** 2
+        rubbing.slip[k] = np.sqrt(way)
+    for i in range(len(moved)):
+        rubbing.across[i] = rubbing.forces[n + i]
+        rubbing.bent[i] = bent[i]
