@@ -58,7 +58,7 @@ from klack.transient.interface_result import (
     RigidMotion,
 )
 
-__all__ = ["Gaps", "simulate_interface"]
+__all__ = ["Gaps", "contact_points", "simulate_interface"]
 
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
@@ -162,6 +162,42 @@ def simulate_interface(
     return result
 
 
+def contact_points(
+    model: InterfaceModel, B1: NDArray[np.float64], step: float, spring: float = 0.0
+) -> ContactPoints:
+    """Points of the compiled step, with the gaps of the model.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    B1 : array, shape (M,)
+        Of the propagator of this step.
+    step : float [s]
+    spring : float [N/m]
+        Of a spring that holds the moving body.
+    """
+    push = np.ascontiguousarray(model.rigid[2])
+    if not model.ways:
+        A = contact_compliance(model.compliance, model.traces, B1, push, spring)
+        return ContactPoints.smooth(A, model.traces, model.gap, model.axial)
+    rows = np.vstack([model.traces, model.tangents])
+    counts = [last - first for _, first, last in model.contacts]
+    static, kinetic, fade = np.repeat(
+        [(f.static, f.kinetic, f.speed * step) for f in model.friction], counts, axis=0
+    ).T
+    return ContactPoints(
+        contact_compliance(model.compliance, rows, B1, push, spring),
+        model.traces,
+        model.gap,
+        model.axial,
+        model.tangents,
+        model.axial_across,
+        np.ascontiguousarray(static),
+        np.ascontiguousarray(kinetic),
+        np.ascontiguousarray(fade),
+    )
+
+
 def _modes(model: InterfaceModel, step: float) -> Modes:
     """Everything that depends on the length of the step."""
     P = modal_propagator(model.omega, model.damping, step)
@@ -211,10 +247,7 @@ class _Run:
         n, M = model.count, model.mode_count
         self.steppers: dict[int, Modes] = {}
         B1, self.push = self.stepper(0).B1, self.stepper(0).push
-        rows = np.vstack([model.traces, model.tangents]) if model.ways else model.traces
-        self.A = contact_compliance(model.compliance, rows, B1, self.push, spring)
-        self.tangents = model.tangents if model.ways else np.zeros((0, M))
-        self.friction = _point_friction(model, step)
+        self.contact = contact_points(model, B1, step, spring)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.gap0 = np.array(model.gap)
         below = model.axial > 1e-6
@@ -398,16 +431,7 @@ class _Run:
             self.segments.append(self.close(segment))
 
     def fine(self, segment: _Segment, steps: int, wait: int) -> int:
-        model = self.model
-        points = ContactPoints(
-            self.A,
-            model.traces,
-            self.gap0,
-            model.axial,
-            self.tangents,
-            model.axial_across,
-            *self.friction,
-        )
+        points = self.contact._replace(gap=self.gap0)
         taken, status, record = self.march(self.stepper(0), steps, wait, points, self.state)
         if status == FAILED:
             raise ConvergenceError(
@@ -634,17 +658,6 @@ class _Run:
 
 _SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
 """A millimetre of translation weighs like a radian over a metre: lengths of valves."""
-
-
-def _point_friction(model: InterfaceModel, step: float) -> tuple[NDArray[np.float64], ...]:
-    """Coefficients of every point: static, kinetic; slip in a step that fades one to the other."""
-    sides = [
-        (friction.static, friction.kinetic, friction.speed * step) for friction in model.friction
-    ]
-    counts = [last - first for _, first, last in model.contacts]
-    if not sides:
-        return (np.zeros(0),) * 3
-    return tuple(np.repeat(values, counts) for values in zip(*sides, strict=True))
 
 
 def _bore(guide: Guide | None, modes: int) -> Bore:

@@ -18,13 +18,12 @@ from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
     Bore,
-    ContactPoints,
     Modes,
     Outside,
     Record,
     State,
 )
-from klack.transient.interface_kernel import contact_compliance, march
+from klack.transient.interface_kernel import march
 from klack.transient.interface_model import (
     InterfaceBody,
     InterfaceContact,
@@ -32,6 +31,7 @@ from klack.transient.interface_model import (
     StaticChecks,
     interface_model,
 )
+from klack.transient.interface_run import contact_points
 
 __all__ = [
     "advance",
@@ -259,18 +259,17 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
     n, M = model.count, model.mode_count
     P = modal_propagator(model.omega, model.damping, step)
     push = np.ascontiguousarray(model.rigid[2])
-    A = contact_compliance(model.compliance, model.traces, P.B1, push, 0.0)
     none = np.zeros((0, M))
-    state = State.still(M, n, 0)
+    state = State.still(M, n, 0, model.ways)
     state.q[:], state.v[:] = q, v
     march(
         steps,
         0,
         Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift),
         Outside(0.0, 0.0),
-        ContactPoints.smooth(A, model.traces, model.gap, model.axial),
+        contact_points(model, P.B1, step),
         Bore.none(M),
         state,
-        Record.empty(steps, len(model.bodies), n, keep_points=False),
+        Record.empty(steps, len(model.bodies), n, model.ways, keep_points=False),
     )
     return ModalState(q=state.q, v=state.v, force=state.lam)

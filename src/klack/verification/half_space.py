@@ -1,0 +1,220 @@
+r"""A rigid sphere on contact points of an elastic half-space: the classical oblique impact.
+
+A square cell of side *h* with the mean traction 1/h^2 at the origin moves the surface at (x, y)
+(Boussinesq and Cerruti; Johnson 1985, section 3.2 and 3.6; Love 1929 for the integral of 1/r): with
+the integrals over the cell
+
+.. math:: I = \int \frac{dA}{r}, \quad I_{xx} = \int \frac{x^2 dA}{r^3}, \quad
+    I_{xy} = \int \frac{x y \, dA}{r^3}, \quad L_x = \int \frac{x \, dA}{r^2}
+
+a pressure moves it in by :math:`(1-\nu^2) I / (\pi E)` and towards the cell by
+:math:`(1+\nu)(1-2\nu) L_x / (2 \pi E)`, a traction along x moves it by
+:math:`(1+\nu) [(1-\nu) I + \nu I_{xx}] / (\pi E)` along and by
+:math:`(1+\nu) \nu I_{xy} / (\pi E)` across.  What pressures move sideways cancels between like
+bodies.
+"""
+
+from dataclasses import dataclass, replace
+from math import gamma, inf, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.friction import Friction
+from klack.materials import Material
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_run import simulate_interface
+from klack.verification.interface_bodies import modal_model
+
+__all__ = ["ObliqueImpact", "SphereImpact", "half_space_compliance"]
+
+Array = NDArray[np.float64]
+
+_BEYOND = 1.3  # radii of contact that the points reach
+
+
+def half_space_compliance(points: Array, size: float, lower: Material, upper: Material) -> Array:
+    """Compliance of two half-spaces at square cells of one grid, (3 n, 3 n) [m/N].
+
+    Gaps of all cells first, then their tangential offsets (upper past lower) along x and along y.
+
+    Parameters
+    ----------
+    points : array, shape (n, 2) [m]
+        Centres of the cells.
+    size : float [m]
+        Side of the cells.
+    lower, upper : Material
+    """
+    n = len(points)
+    x, y = (points[:, None, :] - points[None, :, :]).transpose(2, 0, 1)  # from cell j to point i
+    whole, xx, yy, xy, lx, ly = (np.zeros((n, n)) for _ in range(6))
+    for sx in (-1.0, 1.0):
+        for sy in (-1.0, 1.0):
+            X, Y, sign = x + 0.5 * sx * size, y + 0.5 * sy * size, sx * sy
+            r = np.hypot(X, Y)
+            xx += sign * Y * np.log(X + r)
+            yy += sign * X * np.log(Y + r)
+            xy -= sign * r
+            lx += sign * (Y * np.log(r) + X * np.arctan(Y / X))
+            ly += sign * (X * np.log(r) + Y * np.arctan(X / Y))
+    whole = xx + yy
+    C = np.zeros((3 * n, 3 * n))
+    for body, side in ((lower, 1.0), (upper, -1.0)):
+        nu = body.poisson
+        soft = (1.0 + nu) / (pi * body.young * size**2)
+        drawn = side * soft * 0.5 * (1.0 - 2.0 * nu)
+        C += np.block(
+            [
+                [soft * (1.0 - nu) * whole, -drawn * lx, -drawn * ly],
+                [drawn * lx, soft * ((1.0 - nu) * whole + nu * xx), soft * nu * xy],
+                [drawn * ly, soft * nu * xy, soft * ((1.0 - nu) * whole + nu * yy)],
+            ]
+        )
+    return C
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObliqueImpact:
+    """What an oblique impact of a sphere leaves.
+
+    Parameters
+    ----------
+    centre : float [m/s]
+        Tangential speed of the centre.
+    spin : float [rad/s]
+        About the axis across the plane of motion; positive where it rolls on.
+    surface : float [m/s]
+        Tangential speed of the point of contact.
+    normal : float [m/s]
+        Speed of rebound.
+    lost : float [J]
+        In friction.
+    peak : float [-]
+        Largest tangential force over friction times the largest normal force.
+    """
+
+    centre: float
+    spin: float
+    surface: float
+    normal: float
+    lost: float
+    peak: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SphereImpact:
+    """Rigid motion of a sphere that hits a half-space, both elastic at the contact.
+
+    Parameters
+    ----------
+    radius : float [m]
+    sphere, ground : Material
+    speed : float [m/s]
+        Along the normal.
+    cells : float [-]
+        Contact points over the radius of the largest contact.
+    inertia : float [-]
+        m R^2 / I; 2.5 for a solid sphere, 0 for a body that does not turn.
+    """
+
+    radius: float
+    sphere: Material
+    ground: Material
+    speed: float
+    cells: float = 6.0
+    inertia: float = 2.5
+
+    @property
+    def mass(self) -> float:
+        """Of the sphere [kg]."""
+        return self.sphere.density * 4.0 / 3.0 * pi * self.radius**3
+
+    @property
+    def approach(self) -> float:
+        """Largest approach [m] (Hertz 1882; Johnson 1985, equation 11.23)."""
+        modulus = 1.0 / sum(1.0 / m.plane_strain_modulus for m in (self.sphere, self.ground))
+        stiff = modulus * sqrt(self.radius)
+        return float((15.0 * self.mass * self.speed**2 / (16.0 * stiff)) ** 0.4)
+
+    @property
+    def contact_time(self) -> float:
+        """Of a frictionless impact [s] (Johnson 1985, equation 11.24)."""
+        return 4.0 * sqrt(pi) / 5.0 * gamma(0.4) / gamma(0.9) * self.approach / self.speed
+
+    @property
+    def kappa(self) -> float:
+        """Tangential over normal stiffness of the contact (Mindlin 1949) [-]."""
+        shear = sum(
+            (2.0 - m.poisson) * 2.0 * (1.0 + m.poisson) / m.young
+            for m in (self.sphere, self.ground)
+        )
+        modulus = sum(1.0 / m.plane_strain_modulus for m in (self.sphere, self.ground))
+        return float(4.0 * modulus / shear)
+
+    def model(self, friction: Friction, turn: float = 0.0) -> InterfaceModel:
+        """Interface-level model with tangential directions turned by an angle [rad]."""
+        R, size = self.radius, sqrt(self.radius * self.approach) / self.cells
+        count = int(_BEYOND * self.cells) + 1
+        line = size * np.arange(-count, count + 1)
+        points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+        points = points[np.linalg.norm(points, axis=1) < _BEYOND * self.cells * size]
+        n = len(points)
+        x, y = points.T
+        nothing, one = np.zeros(n), np.ones(n)
+        # u = v + w x r with r = (x, y, -R)
+        motion = np.array(
+            [
+                [nothing, nothing, one, y, -x, nothing],
+                [one, nothing, nothing, nothing, -R * one, -y],
+                [nothing, one, nothing, R * one, nothing, x],
+            ]
+        )
+        about = self.inertia / (self.mass * R**2)
+        unit = np.sqrt(np.concatenate([np.full(3, 1.0 / self.mass), np.full(3, about)]))
+        rows = motion.transpose(0, 2, 1).reshape(3 * n, 6) * unit
+        c, s, eye = np.cos(turn), np.sin(turn), np.eye(n)
+        T = np.block(
+            [[eye, 0 * eye, 0 * eye], [0 * eye, c * eye, s * eye], [0 * eye, -s * eye, c * eye]]
+        )
+        rows = T @ rows
+        C = T @ half_space_compliance(points, size, self.ground, self.sphere) @ T.T
+        model = modal_model(
+            masses=(self.mass, inf),
+            omega=np.zeros(6),
+            traces=rows[:n],
+            compliance=0.5 * (C + C.T),
+            gap=(x**2 + y**2) / (2.0 * R),
+            rigid=np.diag(unit),
+            points=np.column_stack([points, nothing]),
+        )
+        return replace(
+            model,
+            tangents=np.ascontiguousarray(rows[n:]),
+            axial_across=np.zeros(2 * n),
+            friction=(friction,),
+        )
+
+    def hit(
+        self, tangential: float, friction: Friction, *, steps: int = 300, turn: float = 0.0
+    ) -> ObliqueImpact:
+        """Impact with a tangential speed [m/s] of a sphere that does not spin before."""
+        model = self.model(friction, turn)
+        run = simulate_interface(
+            model,
+            speed=self.speed,
+            duration=1.15 * self.contact_time,
+            step=self.contact_time / steps,
+            velocity=np.array([tangential, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        )
+        after = run.motion.velocity[-1]
+        across = run.impacts[0].friction_force.reshape(-1, 2, model.count).sum(axis=2)
+        size = np.linalg.norm(across, axis=1).max()
+        return ObliqueImpact(
+            centre=float(after[0]),
+            spin=float(after[4]),
+            surface=float(after[0] - self.radius * after[4]),
+            normal=float(after[2]),
+            lost=run.energy.friction,
+            peak=float(size / (friction.kinetic * run.history.force.max())),
+        )
