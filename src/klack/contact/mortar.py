@@ -472,9 +472,12 @@ def tangent_rows(
 ) -> tuple[csr_array, csr_array]:
     r"""Displacement of a past b at the contact points, with the hats and weights of their gaps.
 
-    .. math:: s_k = \frac{1}{A_k} \int \psi_k \, t \cdot (u_a - u_b) \, dA = T_a u_a + T_b u_b
+    .. math:: s_k = \frac{1}{A_k} \int \psi_k \, [t \cdot (u_a - u_b)
+        \mp g \, n \cdot \partial u_s / \partial t] \, dA = T_a u_a + T_b u_b
 
-    so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies cancel.
+    so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies cancel,
+    and so do their moments: across a gap *g* (that of the meshes) the normal of the slave side *s*
+    (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
     Axisymmetric bodies have one direction *t*, along the meridian; solids two: away from the axis
     of motion (along it on walls, along x where hats surround it), and round it.  Each is taken in
     the tangential plane of every integration point.
@@ -509,11 +512,15 @@ def tangent_rows(
                 at.position.reshape(f * q, d), normal, other_mesh, other_surface
             )
             share = np.where(met.met.reshape(f, q, 1), share, 0.0)
-            N, _ = shape_functions(block.family, piece.xi)
+            N, dN = shape_functions(block.family, piece.xi)
+            gap = np.where(met.met, met.gap, 0.0).reshape(f, q)
+            base = _dual_tangents(mesh, block, dN)
             rows = number[hats]
             towards = _away_from_axis(at.position[:, :, None], central[rows][:, None])
             for way, t in enumerate(_tangents(at.normal[:, :, None], towards)):
                 value = sign * np.einsum("fqk,qn,fqkd->fknd", share, N, t)
+                turned = np.einsum("qni,fqid,fqkd->fqkn", dN, base, t)
+                value -= sign * np.einsum("fqk,fq,fqkn,fqd->fknd", share, gap, turned, at.normal)
                 own = np.where(rows < 0, -1, rows + way * space.count)
                 _store(entries[space.slave], d, own[:, :, None], block.connectivity[:, None], value)
                 _store_master(
@@ -527,6 +534,13 @@ def tangent_rows(
     area = np.tile(space.area, mesh.dimension - 1)
     T_a, T_b = (_scaled(entries[side], area, sides[side][0].dof_count) for side in ("a", "b"))
     return T_a, T_b
+
+
+def _dual_tangents(mesh: Mesh, block: FaceBlock, dN: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Gradients of the reference coordinates along faces, shape (f, q, d - 1, d) [1/m]."""
+    along = np.einsum("qni,fnd->fqid", dN, mesh.points[block.connectivity])
+    metric = np.einsum("fqid,fqjd->fqij", along, along)
+    return np.asarray(np.linalg.solve(metric, along))
 
 
 def _away_from_axis(points: NDArray[np.float64], central: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from klack.materials import Material
 from klack.transient.active_set import solve_active
 from klack.transient.full_order import simulate_full_order
 from klack.transient.interface_arrays import ActiveSet
-from klack.transient.interface_model import InterfaceBody, InterfaceContact, InterfaceModel
+from klack.transient.interface_model import InterfaceContact, InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
 from klack.verification.beam_impact import sphere_on_beam
@@ -34,6 +34,7 @@ from klack.verification.interface_bodies import (
     free_rod,
     lateral_guide,
     modal_model,
+    momenta,
     reduce_bodies,
     rigid_body,
     rod_between_stops,
@@ -91,7 +92,7 @@ def _free_blocks() -> list[Check]:
     q[:6] = np.linalg.solve(model.rigid[:, :6], [0.0, 0.0, 1e-6, 2e-3, -3e-3, 0.0])
     v[:6] = np.linalg.solve(model.rigid[:, :6], [0.01, 0.02, -0.5, 5.0, -3.0, 20.0])
     after = advance(model, q, v, step=40e-9, steps=800)
-    before, later = _momenta(items, v), _momenta(items, after.v)
+    before, later = momenta(items, v), momenta(items, after.v)
     source = "Newton's laws; the normals of both faces are one and the same"
     return [
         compare(
@@ -128,21 +129,6 @@ def _free_blocks() -> list[Check]:
             source=source,
         ),
     ]
-
-
-def _momenta(
-    items: tuple[InterfaceBody, ...], v: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Momentum and its moment about the origin, of all bodies."""
-    linear, angular, start = np.zeros(3), np.zeros(3), 0
-    for item in items:
-        shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
-        end = start + shapes.shape[1]
-        nodal = (item.body.M @ (shapes @ v[start:end])).reshape(-1, 3)
-        linear += nodal.sum(axis=0)
-        angular += np.cross(item.body.mesh.points, nodal).sum(axis=0)
-        start = end
-    return linear, angular
 
 
 def _patch_test() -> Check:

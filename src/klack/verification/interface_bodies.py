@@ -38,6 +38,7 @@ __all__ = [
     "free_rod",
     "lateral_guide",
     "modal_model",
+    "momenta",
     "reduce_bodies",
     "rigid_body",
     "rod_between_stops",
@@ -243,6 +244,19 @@ def reduce_bodies(
             )
         )
     return interface_model(items, contacts), tuple(items)
+
+
+def momenta(items: Sequence[InterfaceBody], v: Array) -> tuple[Array, Array]:
+    """Momentum and its moment about the origin, of all bodies."""
+    linear, angular, start = np.zeros(3), np.zeros(3), 0
+    for item in items:
+        shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
+        end = start + shapes.shape[1]
+        nodal = (item.body.M @ (shapes @ v[start:end])).reshape(-1, 3)
+        linear += nodal.sum(axis=0)
+        angular += np.cross(item.body.mesh.points, nodal).sum(axis=0)
+        start = end
+    return linear, angular
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

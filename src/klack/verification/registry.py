@@ -25,6 +25,8 @@ COVERS = {
     "thick block.",
     "interface": "Contact point by point on modal bodies: statics, Hertz impacts, sub-impacts, "
     "guides, energy over many impacts.",
+    "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, "
+    "jams, and a measurement.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
     "vibration": "Mobility, force on the support, energy injected, plates, and radiation of "
     "pistons.",

@@ -1,0 +1,472 @@
+"""Checks of friction between the faces."""
+
+from functools import partial
+from math import cos, pi, radians, sin, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.friction import Friction
+from klack.materials import Material
+from klack.transient.interface_model import InterfaceContact
+from klack.transient.interface_run import simulate_interface
+from klack.transient.rubbing import solve_rubbing
+from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.half_space import SphereImpact, half_space_compliance
+from klack.verification.impacts import STEEL, needle_over_seat
+from klack.verification.interface_bodies import advance, momenta, reduce_bodies
+from klack.verification.interface_impacts import free_blocks
+from klack.verification.rubbing_point import PointImpact, rubbing_faces, seat_restitution
+
+__all__ = ["checks"]
+
+_check = partial(compare, "friction")
+
+_POINT = "Coulomb slider on springs: own events (stick, slip, reversal), 1e-12"
+_POINTS = (  # body, tangential and normal velocity after, loss, contact time
+    (PointImpact(along=3.5, coupling=0.0, normal=1.0, friction=0.1, tangential=0.1),
+     0.020271718, 1.0, 0.0013698653, pi),
+    (PointImpact(along=3.5, coupling=0.0, normal=1.0, friction=0.1, tangential=0.4),
+     -0.17550749, 1.0, 0.018456731, pi),
+    (PointImpact(along=3.25, coupling=1.2990381, normal=1.75, friction=0.6, tangential=0.4),
+     -0.25721165, 0.88492908, 0.16462779, 3.0395043),
+    (PointImpact(along=3.25, coupling=-1.2990381, normal=1.75, friction=0.3, tangential=0.6),
+     -0.89611303, 0.83094847, 0.075802013, 2.3167471),
+    (PointImpact(along=3.25, coupling=-1.2990381, normal=1.75, friction=2.0, tangential=-0.9),
+     0.69962282, 1.1239087, 0.00012351388, 3.2366536),
+)  # fmt: skip
+_POINT_NAMES = ("sphere, little slip", "sphere", "rod", "rod that reverses", "rod that jams")
+
+_KELLER = (  # the same bodies on a point that is rigid across: velocities after, tolerance
+    (PointImpact(along=3.5, coupling=0.0, normal=1.0, friction=0.1, tangential=1.0), 0.3, 1.0, 1e-10),
+    (PointImpact(along=3.5, coupling=0.0, normal=1.0, friction=0.5, tangential=1.0), 0.0, 1.0, 5e-7),
+    (PointImpact(along=3.25, coupling=1.2990381, normal=1.75, friction=0.6, tangential=0.4),
+     0.0, 1.1065309, 5e-6),
+    (PointImpact(along=3.25, coupling=1.2990381, normal=1.75, friction=0.3, tangential=0.3),
+     0.77642554, 1.0, 1e-6),
+    (PointImpact(along=3.25, coupling=-1.2990381, normal=1.75, friction=0.3, tangential=0.6),
+     -0.30371345, 0.83952534, 1e-4),
+    (PointImpact(along=3.25, coupling=-1.2990381, normal=1.75, friction=2.0, tangential=-0.9),
+     0.0, 1.3312626, 1e-4),
+)  # fmt: skip
+
+_MAW = {  # Poisson's ratio, m R^2/I: psi1, psi2, loss over (mu/kappa)^2 m v^2
+    (0.3, 2.5): (
+        (0.25, 0.0416122, 0.00865807),
+        (0.5, 0.0478318, 0.0353381),
+        (1.0, -0.0596967, 0.142241),
+        (2.0, -0.83721, 0.471208),
+        (3.0, -1.37968, 1.01391),
+        (4.0, -1.43651, 1.99132),
+        (5.0, -0.764706, 3.48843),
+    ),
+    (0.2, 2.5): ((0.5, 0.108963, 0.033972), (1.0, 0.0833891, 0.141762), (3.0, -1.28187, 1.05107)),
+    (0.0, 2.5): ((0.5, 0.175137, 0.031294), (1.0, 0.28477, 0.131187), (3.0, -1.03758, 1.13197)),
+    (0.3, 1e-12): ((0.5, -0.461503, 0.0184665), (1.0, -0.647059, 0.290607)),
+    (0.3, 2.0): ((0.5, -0.0904662, 0.0402458), (1.0, -0.332794, 0.148084), (3.0, -1.41863, 1.1648)),
+}
+_MAW_NAMES = {2.5: "sphere", 1e-12: "body that does not turn", 2.0: "disc"}
+_MAW_SOURCE = (
+    "Maw, Barber & Fawcett 1976, Wear 38:101; tables from Mindlin & Deresiewicz 1953, "
+    "2000 and 4000 elements extrapolated"
+)
+
+# Kharaz, Gorham & Salman 2001: alumina sphere of 5 mm on soda-lime glass, 3.9 m/s, mu 0.092, as
+# digitised by the makers of two programs: incidence in degrees, measured value
+_TANGENTIAL = (
+    (1.84, 0.79344), (3.703, 0.74533), (9.496, 0.67257), (20.012, 0.59691), (30.127, 0.68756),
+    (39.382, 0.77148), (49.694, 0.84761), (60.02, 0.90142), (71.0693, 0.93657), (79.2277, 0.96952),
+)  # fmt: skip
+_SPIN = (
+    (21.251, 577.65), (31.157, 612.88), (39.143, 595.49), (50.348, 453.21), (60.328, 382.09),
+    (69.9606, 242.966), (78.5602, 142.355),
+)  # fmt: skip
+_ANGLE = ((20.567, 12.208), (30.29, 21.67), (39.535, 32.613), (49.747, 45.125), (60.208, 57.474))
+_KHARAZ = "Kharaz, Gorham & Salman 2001, Powder Technol. 120:281 (measured; no free parameter)"
+_STEEP = 15.0  # degrees; nearer to the normal the measurement is not that of linear elasticity
+
+_CATTANEO = (  # T / (mu P), displacement over that at full slip, loop energy (factor below)
+    (0.2, 0.13822612, 0.00028525319),
+    (0.5, 0.37003948, 0.0058695188),
+    (0.8, 0.65800481, 0.036937503),
+    (0.95, 0.86427912, 0.094101592),
+)
+
+
+def checks() -> list[Check]:
+    """Return all checks of friction between the faces."""
+    return [
+        _smooth(),
+        *_points(),
+        _order(),
+        *_eccentric(),
+        *_cattaneo(),
+        *_maw(),
+        *_frames(),
+        *_measured(),
+        *_seat(),
+        *_blocks(),
+    ]
+
+
+def _smooth() -> Check:
+    """Tangential directions without friction, against none."""
+    needle, seat, space = needle_over_seat(size=8e-6, bulk=0.8e-3)
+    smooth = InterfaceContact(name="face", upper="needle", lower="seat", space=space)
+    forces = [
+        simulate_interface(
+            reduce_bodies((needle, seat), [contact], (10, 10))[0],
+            speed=0.3,
+            duration=50e-6,
+            step=40e-9,
+        ).history.force
+        for contact in (smooth, rubbing_faces(needle, seat, space, ("tip", "cone"), 0.0))
+    ]
+    return _check(
+        "needle on its seat, friction 0: force against that without tangents [relative]",
+        expected=0.0,
+        computed=float(np.max(np.abs(forces[1] - forces[0])) / np.max(forces[0])),
+        tolerance=1e-8,
+        source="the frictionless complementarity problem",
+    )
+
+
+def _points() -> list[Check]:
+    found = [
+        _check(
+            f"one point on springs, {name}: tangential velocity after [m/s]",
+            expected=after,
+            computed=impact.hit(time).tangential,
+            tolerance=1e-4,
+            source=_POINT,
+            absolute=True,
+        )
+        for name, (impact, after, *_, time) in zip(_POINT_NAMES, _POINTS, strict=True)
+    ]
+    impact, _, _, lost, time = _POINTS[2]
+    return [
+        *found,
+        _check(
+            "one point on springs, rod: energy lost in friction [J]",
+            expected=lost,
+            computed=impact.hit(time).lost,
+            tolerance=5e-4,
+            source=_POINT,
+        ),
+    ]
+
+
+def _order() -> Check:
+    """Order of the step, over all bodies."""
+    errors = [
+        max(
+            abs(impact.hit(time, steps=steps).tangential - after)
+            for impact, after, *_, time in _POINTS
+        )
+        for steps in (400, 1600)
+    ]
+    return _check(
+        "one point on springs: order of the step, largest errors at 400 and 1600 steps [-]",
+        expected=2.0,
+        computed=float(np.log(errors[0] / errors[1]) / np.log(4.0)),
+        tolerance=0.5,
+        source="second order, reversals included",
+        absolute=True,
+    )
+
+
+def _eccentric() -> list[Check]:
+    """A point that is nearly rigid across its normal: limit of a rigid impact."""
+    names = ("sphere that slips", "sphere that sticks", "rod that sticks", "rod that slips on",
+             "rod that reverses", "rod that jams")  # fmt: skip
+    out = []
+    for name, (body, tangential, normal, tolerance) in zip(names, _KELLER, strict=True):
+        stiff = PointImpact(**{**_fields(body), "stiffer": 1e9})
+        after = stiff.hit(pi, steps=40_000)
+        worst = max(
+            (after.tangential - tangential, after.normal - normal), key=lambda error: abs(error)
+        )
+        out.append(
+            _check(
+                f"rigid eccentric impact, {name}: velocities after, larger deviation [m/s]",
+                expected=0.0,
+                computed=worst,
+                tolerance=tolerance,
+                source="Keller 1986, J. Appl. Mech. 53:1; Stronge 2000 (energetic restitution 1)",
+            )
+        )
+    return out
+
+
+def _fields(body: PointImpact) -> dict[str, float]:
+    return {name: getattr(body, name) for name in PointImpact.__dataclass_fields__}
+
+
+def _cattaneo() -> list[Check]:
+    """Hertz contact held, tangential force raised, turned round and raised again."""
+    radius, approach, mu, cells = 10e-3, 4e-6, 0.3, 8.0
+    a = sqrt(radius * approach)
+    size = a / cells
+    line = size * np.arange(-9, 10)
+    points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    n = len(points)
+    C = half_space_compliance(points, size, STEEL, STEEL)
+    lam, w, doing = np.zeros(3 * n), np.zeros(3 * n), np.zeros(n, dtype=np.int64)
+    coefficient, bent = np.full(n, mu), np.zeros(2 * n)
+    gap = np.sum(points**2, axis=1) / (2.0 * radius) - approach
+
+    def moved_by(way: float) -> float:
+        """Tangential force against the next part of the way of the upper body."""
+        q = np.concatenate([gap, np.full(n, way) - bent[:n], -bent[n:]])
+        solve_rubbing(C, q, coefficient, lam, w, doing, 1e-9 * max(lam.max(), 1.0))
+        bent[:] = (C @ lam)[n:]
+        return -float(lam[n : 2 * n].sum())
+
+    moved_by(0.0)
+    P = float(lam[:n].sum())
+    shear = STEEL.young / (2.0 * (1.0 + STEEL.poisson))
+    slip = 3.0 * mu * P / (16.0 * a) * 2.0 * (2.0 - STEEL.poisson) / shear
+    # up to 0.97 of full slip, down to the opposite, up again
+    ways = slip * np.concatenate(
+        [np.full(60, 0.97 / 60), np.full(120, -0.97 / 60), np.full(120, 0.97 / 60)]
+    )
+    force = np.array([moved_by(way) for way in ways])
+    at, rise = np.cumsum(ways), force[:60] / (mu * P)
+    curve = ComparedCurve(
+        x_label="tangential displacement over that at full slip [-]",
+        y_label="tangential force over friction times load [-]",
+        expected=(np.array([row[1] for row in _CATTANEO]), np.array([row[0] for row in _CATTANEO])),
+        computed=(np.append(0.0, at[:60] / slip), np.append(0.0, rise)),
+    )
+    source = "Cattaneo 1938; Mindlin 1949 (Johnson 1985, section 7.2)"
+    out = [
+        _check(
+            f"Hertz contact under a tangential force of {share:g} of friction: displacement [-]",
+            expected=displacement,
+            computed=float(np.interp(share, rise, at[:60] / slip)),
+            tolerance=0.01,
+            source=source,
+            curve=curve,
+            reason="0.06 % off at 0.5 of friction with 8 points over the radius; less at 0.8 is luck",
+        )
+        for share, displacement, _ in _CATTANEO[1:3]
+    ]
+    # one closed loop between -T and T
+    loop = slice(59, None)
+    mean = 0.5 * (force[loop][1:] + force[loop][:-1])
+    around = float(np.sum(mean * np.diff(at[loop])))
+    t = float(force[59] / (mu * P))
+    bracket = 1.0 - (1.0 - t) ** (5 / 3) - 5.0 * t / 6.0 * (1.0 + (1.0 - t) ** (2 / 3))
+    back = float(force[-1] / force[59])
+    return [
+        *out,
+        _check(
+            f"the same between -{t:.3f} and {t:.3f} of friction: energy of a loop over mu P d [-]",
+            expected=24.0 / 5.0 * bracket,
+            computed=around / (mu * P * slip),
+            tolerance=0.03,
+            source="Mindlin & Deresiewicz 1953",
+        ),
+        _check(
+            "the same: force after a whole loop over that before it [-]",
+            expected=1.0,
+            computed=back,
+            tolerance=1e-3,
+            source="a closed loop (Mindlin & Deresiewicz 1953)",
+        ),
+    ]
+
+
+def _maw() -> list[Check]:
+    out = []
+    for (poisson, inertia), rows in _MAW.items():
+        sphere = _like_spheres(poisson, inertia)
+        mu = 0.1
+        psi = mu / sphere.kappa * sphere.speed
+        hits = [sphere.hit(row[0] * psi, Friction.coulomb(mu)) for row in rows]
+        after = np.array([hit.surface for hit in hits]) / psi
+        lost = np.array([hit.lost for hit in hits]) / (sphere.mass * psi**2)
+        before, truth, loss = (np.array(column) for column in zip(*rows, strict=True))
+        name = f"{_MAW_NAMES[inertia]}, Poisson's ratio {poisson:g}"
+        out += [
+            _check(
+                f"oblique impact of a {name}: velocity of the surface after, largest error of "
+                f"{len(rows)} incidences [psi]",
+                expected=0.0,
+                computed=_largest(after - truth),
+                tolerance=0.015,
+                source=_MAW_SOURCE,
+                curve=ComparedCurve(
+                    x_label="tangential speed of the surface before, psi1 [-]",
+                    y_label="tangential speed of the surface after, psi2 [-]",
+                    expected=(before, truth),
+                    computed=(before, after),
+                ),
+            ),
+            _check(
+                f"oblique impact of a {name}: energy lost in friction, largest error [relative]",
+                expected=0.0,
+                computed=_largest(lost / loss - 1.0),
+                tolerance=0.03 if inertia < 1.0 else 0.01,
+                source=_MAW_SOURCE,
+            ),
+        ]
+    sphere = _like_spheres(0.3, 2.5, cells=10.0)
+    psi = 0.1 / sphere.kappa * sphere.speed
+    return [
+        *out,
+        _check(
+            "the same sphere with 10 points over the radius, psi 1: velocity after [psi]",
+            expected=-0.0596967,
+            computed=sphere.hit(psi, Friction.coulomb(0.1)).surface / psi,
+            tolerance=0.005,
+            source=_MAW_SOURCE,
+            absolute=True,
+        ),
+    ]
+
+
+def _like_spheres(poisson: float, inertia: float, cells: float = 6.0) -> SphereImpact:
+    material = Material(name="steel", young=210e9, poisson=poisson, density=7850.0)
+    return SphereImpact(
+        radius=10e-3, sphere=material, ground=material, speed=0.1, cells=cells, inertia=inertia
+    )
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    return float(values[np.argmax(np.abs(values))])
+
+
+def _frames() -> list[Check]:
+    """The law knows no direction of its own."""
+    sphere, friction = _unlike(3.0), Friction.coulomb(0.1)
+    plain, turned = sphere.hit(0.6, friction), sphere.hit(0.6, friction, turn=0.7)
+    mirrored = sphere.hit(-0.6, friction)
+    return [
+        _check(
+            "oblique impact with tangential directions turned by 0.7 rad: velocity after [m/s]",
+            expected=plain.surface,
+            computed=turned.surface,
+            tolerance=2e-9,
+            source="isotropy",
+        ),
+        _check(
+            "mirrored oblique impact: velocity after [m/s]",
+            expected=-plain.surface,
+            computed=mirrored.surface,
+            tolerance=5e-11,
+            source="symmetry",
+        ),
+    ]
+
+
+def _unlike(normal: float, cells: float = 6.0) -> SphereImpact:
+    alumina = Material(name="alumina", young=380e9, poisson=0.23, density=4000.0)
+    glass = Material(name="glass", young=70e9, poisson=0.25, density=2500.0)
+    return SphereImpact(radius=2.5e-3, sphere=alumina, ground=glass, speed=normal, cells=cells)
+
+
+def _measured() -> list[Check]:
+    """Alumina on glass; linear elasticity with one coefficient does not hold near the normal."""
+    friction, speed = Friction.coulomb(0.092), 3.9
+
+    def hit(degrees: float) -> tuple[float, float, float]:
+        angle = radians(degrees)
+        after = _unlike(speed * cos(angle)).hit(speed * sin(angle), friction, steps=200)
+        out = np.degrees(np.arctan2(after.centre, after.normal))
+        return after.centre / (speed * sin(angle)), after.spin, float(out)
+
+    tangential = np.array([hit(angle)[0] for angle, _ in _TANGENTIAL])
+    spin = np.array([hit(angle)[1] for angle, _ in _SPIN])
+    rebound = np.array([hit(angle)[2] for angle, _ in _ANGLE])
+    angles, values = (np.array(column) for column in zip(*_TANGENTIAL, strict=True))
+    steep = angles > _STEEP
+    curve = ComparedCurve(
+        x_label="angle of incidence [deg]",
+        y_label="tangential restitution [-]",
+        expected=(angles, values),
+        computed=(angles, tangential),
+    )
+    return [
+        _check(
+            "alumina on glass above 15 degrees: tangential restitution, rms deviation [-]",
+            expected=0.0,
+            computed=_rms(tangential[steep] - values[steep]),
+            tolerance=0.02,
+            source=_KHARAZ,
+            curve=curve,
+        ),
+        _check(
+            "alumina on glass below 15 degrees: tangential restitution, rms deviation [-]",
+            expected=0.0,
+            computed=_rms(tangential[~steep] - values[~steep]),
+            tolerance=0.12,
+            source=_KHARAZ,
+            curve=curve,
+            reason="unlike bodies: linear elasticity with one coefficient gives 0.66 where 0.79 "
+            "was measured; the difference is shown, not explained",
+        ),
+        _check(
+            "alumina on glass above 15 degrees: spin after, rms deviation [rad/s]",
+            expected=0.0,
+            computed=_rms(spin - np.array([row[1] for row in _SPIN])),
+            tolerance=25.0,
+            source=_KHARAZ,
+        ),
+        _check(
+            "alumina on glass above 15 degrees: rebound angle of the centre, rms deviation [deg]",
+            expected=0.0,
+            computed=_rms(rebound - np.array([row[1] for row in _ANGLE])),
+            tolerance=0.4,
+            source=_KHARAZ,
+        ),
+    ]
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _seat() -> list[Check]:
+    """Rigid needle on a cone whose ring is compliant along and across."""
+    stiffer = 0.8235
+    out = []
+    for half_angle, mu in ((30.0, 0.1), (45.0, 0.1), (45.0, 0.3), (60.0, 0.3)):
+        a = radians(half_angle)
+        ratio = stiffer / (tan(a) * mu)
+        loss = 2.0 * mu * cos(a) / (sin(a) + mu * cos(a)) * (ratio - 1.0) / (ratio + 1.0)
+        out.append(
+            _check(
+                f"needle on a cone of half angle {half_angle:g} degrees, friction {mu:g}: "
+                "restitution [-]",
+                expected=sqrt(1.0 - loss),
+                computed=seat_restitution(a, mu, stiffer),
+                tolerance=2e-5,
+                source="Coulomb's slider on the springs of the ring; Jaeger 1994, 64:235",
+                absolute=True,
+            )
+        )
+    return out
+
+
+def _blocks() -> list[Check]:
+    """Momentum, its moment and the energy of two free bodies that rub off-axis."""
+    a, b, space = free_blocks()
+    contact = rubbing_faces(a, b, space, ("bottom", "top"), 0.2)
+    model, items = reduce_bodies((a, b), [contact], (10, 10))
+    q, v = np.zeros((2, model.mode_count))
+    q[:6] = np.linalg.solve(model.rigid[:, :6], [0.0, 0.0, 1e-6, 2e-3, -3e-3, 0.0])
+    v[:6] = np.linalg.solve(model.rigid[:, :6], [0.1, 0.2, -0.5, 5.0, -3.0, 20.0])
+    after = advance(model, q, v, step=40e-9, steps=800)
+    before, later = momenta(items, v), momenta(items, after.v)
+    names = ("linear momentum", "the moment of momentum")
+    return [
+        _check(
+            f"two free blocks that rub: change of {name} [relative]",
+            expected=0.0,
+            computed=float(np.max(np.abs(later[i] - before[i])) / np.max(np.abs(before[i]))),
+            tolerance=tolerance,
+            source="Newton's laws; both faces share one tangential plane",
+        )
+        for i, (name, tolerance) in enumerate(zip(names, (2e-13, 1e-13), strict=True))
+    ]
