@@ -67,7 +67,7 @@ class EnergyLedger:
     spring : float [J]
         Change of the energy stored in springs to ground.
     friction : float [J]
-        Lost in friction between the faces.
+        Lost in friction of the faces, never below zero.
     """
 
     initial: float
@@ -80,12 +80,16 @@ class EnergyLedger:
     friction: float = 0.0
 
     @property
+    def lost(self) -> float:
+        """Sum of all losses [J]."""
+        return self.contact_dissipation + self.damping + self.friction
+
+    @property
     def residual(self) -> float:
         """Energy that appeared from nowhere, relative to the energy turned over [-]."""
         held = sum(body.total for body in self.bodies) + self.contact + self.spring
-        lost = self.contact_dissipation + self.damping + self.friction
         scale = self.turned_over
-        return (held + lost - self.initial - self.work) / scale if scale else 0.0
+        return (held + self.lost - self.initial - self.work) / scale if scale else 0.0
 
     @property
     def turned_over(self) -> float:
@@ -94,22 +98,26 @@ class EnergyLedger:
 
     @property
     def least_loss(self) -> float:
-        """Smaller one of the two losses, relative to the energy turned over [-]."""
+        """Smallest loss, relative to the energy turned over [-]; without friction, of the two."""
+        losses = [self.contact_dissipation, self.damping]
+        if self.friction:
+            losses.append(self.friction)
         scale = self.turned_over
-        return min(self.contact_dissipation, self.damping) / scale if scale else 0.0
+        return min(losses) / scale if scale else 0.0
 
     def parts(self) -> dict[str, float]:
-        """Return every entry by name [J], the initial energy first."""
+        """Return every entry by name [J], the initial energy first; friction where not zero."""
         out = {"initial kinetic": self.initial}
         for body in self.bodies:
             out[f"{body.name} kinetic (rigid)"] = body.translation
             out[f"{body.name} vibration"] = body.vibration
         out["contact"] = self.contact
         out["contact dissipation"] = self.contact_dissipation
-        out["friction"] = self.friction
         out["modal damping"] = self.damping
         out["work of constant forces"] = self.work
         out["springs"] = self.spring
+        if self.friction:
+            out["friction"] = self.friction
         return out
 
 

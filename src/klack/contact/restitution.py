@@ -90,7 +90,8 @@ class ImpactMeasures:
     impulse_residual : float [-]
         ``(J - m_a dv_a + outside) / J`` over the cluster: momentum balance of body a.
     dissipated_share : float [-]
-        Contact dissipation and modal damping of the whole record over the energy of approach.
+        Contact dissipation, modal damping and friction of the whole record over the energy of
+        approach.
     vibration_share : float [-]
         ``1 - e^2 - dissipated_share``: energy of approach left in vibration.
     impacts : int
@@ -218,7 +219,7 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> Impact
     drift = np.interp(release, history.edges, outside) - np.interp(touch, history.edges, outside)
     dv = J * (inverse_a + inverse_b) + float(drift)
     approach_energy = 0.5 * before**2 / (inverse_a + inverse_b)
-    lost = history.ledger.contact_dissipation + history.ledger.damping
+    lost = history.ledger.lost
     return ImpactMeasures(
         peak_force=strongest.peak_force,
         peak_time=strongest.peak_time - touch,

@@ -264,7 +264,7 @@ def energy_balance(ledger: EnergyLedger) -> float | None:
 
 def _lost(ledger: EnergyLedger) -> float:
     turned_over = max(ledger.initial, abs(ledger.work))
-    return (ledger.contact_dissipation + ledger.damping) / turned_over if turned_over else 0.0
+    return ledger.lost / turned_over if turned_over else 0.0
 
 
 def comparison_to_json(comparison: Comparison) -> CalculixJson:
