@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
@@ -31,6 +31,7 @@ class FullBody:
         role: str,
         damping: BodyDamping | None,
         spring: float = 0.0,
+        T: csr_array | None = None,
     ) -> None:
         self.name = body.name
         self.role = role
@@ -44,6 +45,14 @@ class FullBody:
                 expected=f"rows for its {self.dof_count} degrees of freedom",
                 hint="build the contact space from the meshes of these two bodies, a first.",
             )
+        if T is not None and (T.shape[1] != self.dof_count or T.shape[0] % G.shape[0]):
+            raise InputError(
+                f"simulate_full_order: friction of body {role} ('{body.name}')",
+                got=f"{T.shape[0]} rows for {T.shape[1]} degrees of freedom",
+                expected=f"one or two rows for each of {G.shape[0]} contact points, for "
+                f"{self.dof_count} degrees of freedom",
+                hint="build the friction from the same contact points and meshes.",
+            )
         axis = np.zeros(self.dof_count)
         axis[self.dimension - 1 :: self.dimension] = 1.0
         fixed = np.ones(self.dof_count, dtype=bool)
@@ -54,6 +63,8 @@ class FullBody:
         self.C: DampingMatrix | None = None
         self.K = csr_array(body.K)[self.free][:, self.free]
         self.G = csr_array(G)[:, self.free]
+        # what the contact forces act on: the gaps, then the slips where there is friction
+        self.rows = self.G if T is None else vstack([self.G, T[:, self.free]], format="csr")
         self.contact_nodes = np.unique(csr_array(G).indices // self.dimension).astype(np.int64)
         self.axis = axis[self.free]
         self.mass = float(axis @ (self.whole_mass @ axis))
@@ -84,6 +95,7 @@ class FullBody:
         self.M = csr_array(M)[self.free][:, self.free]
         self.axial_mass = (csr_array(M) @ self.full_axis)[self.free]
         self.G_transposed = csr_array(self.G.T)
+        self.rows_transposed = csr_array(self.rows.T)
         self.G_axis = self.G @ self.axis
         self.mobility = np.zeros((self.G.shape[0],) * 2)
         self.mobility_known = False
@@ -92,7 +104,7 @@ class FullBody:
             self.C = DampingMatrix.of(self.damping, self.body, csr_array(M))
             S = S + self.C.sparse * (2.0 / step)
         self.factor = factorize(csr_array(S), backend=backend, threads=threads, precision=precision)
-        self.solve: InterfaceSolve = interface_solve(self.factor, self.G)
+        self.solve: InterfaceSolve = interface_solve(self.factor, self.rows)
         columns, weight = [np.zeros((len(self.free), 0))], [np.zeros(0)]
         if self.C is not None:
             columns.append(self.C.columns)
@@ -102,11 +114,11 @@ class FullBody:
             weight.append(np.array([self.spring]))
         if sum(len(part) for part in weight):
             Z, D = np.hstack(columns), np.concatenate(weight)
-            self.solve = LowRankSolve(self.solve, self.factor, self.G, Z, D)
+            self.solve = LowRankSolve(self.solve, self.factor, self.rows, Z, D)
 
-    def learn(self, points: NDArray[np.int64]) -> None:
-        """Compute the response to contact points that come near for the first time."""
-        self.solve.learn(points)
+    def learn(self, points: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
+        """Compute the response to contact points, with these rows, that come near first."""
+        self.solve.learn(rows)
         if self.inverse_mass is None or self.mobility_known:
             return
         self.mobility_known = 2 * len(points) >= len(self.mobility)
@@ -125,7 +137,7 @@ class FullBody:
             self.inverse_mass.close()
 
     def fly(self) -> NDArray[np.float64]:
-        """Free flight w of this step; the gaps change by its return value, shape (nc,) [m]."""
+        """Free flight w of this step; gaps and offsets change by its return value [m]."""
         self.w = self.u + self.step * self.v
         self.resistance = 2.0 * self.elastic + self.step * self.elastic_rate
         if self.C is not None:
@@ -134,26 +146,26 @@ class FullBody:
         if self.spring > 0.0:
             both = float(self.axial_mass @ (self.u + self.w)) / self.mass
             self.resistance += self.axial_mass * (self.spring / self.mass * both)
-        return self.G @ self.w
+        return self.rows @ self.w
 
     def predict(self, push: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First half of the solve; returns the change of the watched gaps."""
-        self.right = 2.0 * self.force - self.resistance + self.G_transposed @ push
+        """First half of the solve; returns the change of the watched gaps and offsets."""
+        self.right = 2.0 * self.force - self.resistance + self.rows_transposed @ push
         self.solve.predict(self.right - self.defect)
         return self.solve.response()
 
     def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Second half; returns the change of all gaps since the start of the run."""
+        """Second half; returns the change of all gaps and offsets since the start of the run."""
         self.change = self.solve.complete(lam)
         self.next = self.w + self.change
-        return self.G @ self.next
+        return self.rows @ self.next
 
     def commit(self, lam: NDArray[np.float64]) -> tuple[float, float]:
         """Make the end of the step the new state.
 
         Parameters
         ----------
-        lam : array, shape (nc,) [N]
+        lam : array, shape (nc,) or with those across the normals [N]
             Forces that :meth:`complete` was given.
 
         Returns
@@ -166,7 +178,7 @@ class FullBody:
         moved, change = self.next - self.u, self.change
         elastic = self.K @ change
         defect = (4.0 / self.step**2) * (self.M @ change) + elastic
-        defect -= self.right + self.G_transposed @ lam
+        defect -= self.right + self.rows_transposed @ lam
         damped = 0.0
         if self.C is not None:
             drag = self.C.force(moved)
@@ -186,6 +198,26 @@ class FullBody:
             self.v[self.light] = moved[self.light] / self.step
             self.refresh()
         return damped, rounded
+
+    def across(self, velocity: tuple[float, float]) -> NDArray[np.float64]:
+        """Rigid motion along x and y [m/s].
+
+        Raises
+        ------
+        InputError
+            For an axisymmetric body, or one that something holds sideways.
+        """
+        if not any(velocity):
+            return np.zeros(len(self.free))
+        direction = self.free % self.dimension
+        if self.dimension < 3 or np.count_nonzero(direction < 2) < 2 * (self.dof_count // 3):
+            raise InputError(
+                f"simulate_full_order: sideways motion of body '{self.name}'",
+                got=f"({velocity[0]:g}, {velocity[1]:g}) m/s",
+                expected="(0, 0) m/s for an axisymmetric body, or one that is held sideways",
+                hint="model a solid that is free to move across the axis.",
+            )
+        return np.array([*velocity, 0.0])[direction]
 
     def refresh(self) -> None:
         """Take K u and K v, which every step only adds to, from K itself."""

@@ -22,6 +22,18 @@ is no penalty and no regularisation.  Damping (:mod:`klack.transient.body_dampin
     (Khenous, Laborde & Renard 2008.)  Contact nodes have no inertia; they follow statically, with
     forces at the ends of the steps, :math:`2 \lambda = \lambda_0 + \lambda_1`.
 
+With friction the faces also carry forces across their normals, with rows *T* of tangential offset
+(:func:`klack.contact.mortar.tangent_rows`), :math:`2 T^T \lambda_t` on the right side and
+
+.. math:: |\lambda_t| \le \mu \lambda, \qquad
+    \lambda_t = -\mu \lambda \frac{s}{|s|} \text{ where } s = T (u_1 - u_0) \ne 0 ,
+
+solved together with the gaps (:mod:`klack.transient.rubbing`).  The slip is that of the whole step,
+elastic part included, and not counted from *w*, which is put back along the normals only: so the
+energy changes by :math:`\lambda_t^T s \le 0` more, a loss of strict sign.  In the massless scheme
+:math:`\lambda_t` holds at the end of the step as well; its friction is :math:`-\lambda_{t1}^T s`,
+and the rest of the work of the mean force belongs to points that open, close or turn.
+
 Neither needs :math:`M^{-1}` in the loop: with :math:`v = \tilde v - M^{-1} G^T y` the corrections
 are carried by the contact-sized vector *y*, and a step costs one product with K and one solve with
 :math:`S = 4 M / h^2 + K` (:mod:`klack.transient.interface_solve`).
@@ -42,6 +54,7 @@ from threadpoolctl import threadpool_limits
 
 from klack import energy_balance
 from klack.contact.complementarity import ComplementaritySolver
+from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
@@ -56,9 +69,11 @@ from klack.transient.result import (
     FieldsOfBody,
     FullOrderResult,
     MotionOfBody,
+    RubbingRecord,
     Snapshots,
     SolverStatistics,
 )
+from klack.transient.rubbing_points import RubbingPoints
 
 __all__ = ["Scheme", "recommended_step", "simulate_full_order"]
 
@@ -105,6 +120,8 @@ def simulate_full_order(
     axial_force: float = 0.0,
     spring_stiffness: float = 0.0,
     damping: tuple[BodyDamping | None, BodyDamping | None] = (None, None),
+    friction: FaceFriction | None = None,
+    sideways: tuple[float, float] = (0.0, 0.0),
     stop_after_separation: float | None = None,
     energy_interval: int = 10,
     longest_period: float = 0.0,
@@ -141,6 +158,10 @@ def simulate_full_order(
         placement.
     damping : pair of BodyDamping or None
         Of body a and of body b; without any by default.
+    friction : FaceFriction, optional
+        Between the faces, of these contact points.
+    sideways : tuple of float [m/s]
+        Velocity of a along x and y at the start, in addition to ``speed``; of solids only.
     stop_after_separation : float, optional [s]
         End the run early when no point has carried a force for this long after a contact.
     energy_interval : int
@@ -189,9 +210,12 @@ def simulate_full_order(
         )
     begin = perf_counter()
     with ExitStack() as stack:
-        bodies = [FullBody(body_a, space.G_a, "a", damping[0], spring_stiffness)]
+        if friction is not None and friction.law.is_none:
+            friction = None
+        T_a, T_b = (None, None) if friction is None else (friction.T_a, friction.T_b)
+        bodies = [FullBody(body_a, space.G_a, "a", damping[0], spring_stiffness, T_a)]
         if body_b is not None:
-            bodies.append(FullBody(body_b, space.G_b, "b", damping[1]))
+            bodies.append(FullBody(body_b, space.G_b, "b", damping[1], T=T_b))
         if bodies[0].supported:
             raise InputError(
                 f"simulate_full_order: body '{bodies[0].name}'",
@@ -204,14 +228,14 @@ def simulate_full_order(
         pool = None
         if threads > 1 and len(bodies) > 1:
             pool = stack.enter_context(ThreadPoolExecutor(max_workers=len(bodies)))
-        run = _Run(bodies, space, speed, step, scheme, pool, axial_force)
+        run = _Run(bodies, space, speed, step, scheme, pool, axial_force, friction)
         run.together(
             [
                 partial(b.set_up, step, scheme, backend, precision, _share(threads, bodies))
                 for b in bodies
             ]
         )
-        start, retraction = run.place()
+        start, retraction = run.place(sideways)
         set_up_time = perf_counter() - begin
         steps = ceil(duration / step * (1.0 - 1e-9))
         # products of contact size: more threads only wait for each other, at twice the time
@@ -272,11 +296,19 @@ class _Run:
         scheme: Scheme,
         pool: ThreadPoolExecutor | None,
         axial_force: float,
+        friction: FaceFriction | None,
     ) -> None:
         self.bodies, self.space, self.speed, self.step = bodies, space, speed, step
         self.scheme, self.pool, self.axial_force = scheme, pool, axial_force
-        count = len(space.gap)
-        self.lam = np.zeros(count)  # contact forces of the last step (massless: at its end)
+        count = self.count = len(space.gap)
+        ways = 0 if friction is None else friction.T_a.shape[0] // count
+        self.rubbing = None if friction is None else RubbingPoints(friction.law, step, count, ways)
+        # contact forces of the last step (massless: at its end), along, then across the normals
+        self.lam = np.zeros((ways + 1) * count)
+        self.at_rest = np.concatenate([space.gap, np.zeros(ways * count)])  # gaps and offsets
+        self.axial = space.axial
+        if friction is not None:
+            self.axial = np.concatenate([space.axial, friction.T_a @ bodies[0].full_axis])
         self.y = np.zeros(count)
         self.closed = np.zeros(count, dtype=bool)
         self.overshooting = np.zeros(count, dtype=bool)
@@ -284,10 +316,11 @@ class _Run:
         self.learned = np.zeros(count, dtype=bool)
         self.share = 1.0 if scheme == "massless" else 2.0
         self.contact_loss = self.overshoot_loss = self.damped = self.work = self.stored = 0.0
+        self.friction_loss = 0.0
         self.outside = axial_force
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
-    def place(self) -> tuple[float, float]:
+    def place(self, sideways: tuple[float, float]) -> tuple[float, float]:
         """Place a just before the first touch; returns the time flown and the retraction."""
         needle, axial = self.bodies[0], self.space.axial
         facing = axial > 1e-6
@@ -303,15 +336,20 @@ class _Run:
         if retraction > 0:
             _log.info("bodies overlap by %.3g um; body a starts further back", retraction * 1e6)
         flown = 0
-        if self.axial_force == 0.0 == needle.spring:
+        if self.axial_force == 0.0 == needle.spring and not any(sideways):
             flown = max(0, floor(touch / (self.speed * self.step)) - 1)
         needle.force = needle.axial_mass * (self.axial_force / needle.mass)
         needle.u = needle.axis * (retraction - self.speed * flown * self.step)
-        needle.v = -self.speed * needle.axis
+        needle.v = -self.speed * needle.axis + needle.across(sideways)
         needle.refresh()
-        self.gap = self.space.gap + sum(body.G @ body.u for body in self.bodies)
+        self.ends = self.at_rest + sum(body.rows @ body.u for body in self.bodies)
         self.watch(self.gap < self.margin)
         return flown * self.step, retraction
+
+    @property
+    def gap(self) -> NDArray[np.float64]:
+        """Gaps at the end of the last step, shape (nc,) [m]."""
+        return self.ends[: self.count]
 
     @property
     def reach_per_step(self) -> float:
@@ -327,32 +365,42 @@ class _Run:
         """Watch these points from now on."""
         if np.any(points & ~self.learned):
             new = (points | (self.gap < _LEARN_STEPS * self.reach_per_step)) & ~self.learned
-            self.together([partial(body.learn, np.flatnonzero(new)) for body in self.bodies])
+            points_new = np.flatnonzero(new)
+            rows = self._rows(points_new)
+            self.together([partial(body.learn, points_new, rows) for body in self.bodies])
             self.learned |= new
         self.watched = points
         self.points = np.flatnonzero(points)
+        self.rows = self._rows(self.points)
         for body in self.bodies:
-            body.solve.select(self.points)
+            body.solve.select(self.rows)
+        grid = np.ix_(self.rows, self.rows)
+        compliance = self.share * np.sum([b.solve.compliance[grid] for b in self.bodies], axis=0)
+        if self.rubbing is None:
+            self.force_problem = ComplementaritySolver(compliance)
+        else:
+            self.rubbing.watch(self.points, compliance)
         grid = np.ix_(self.points, self.points)
-        self.force_problem = ComplementaritySolver(
-            self.share * np.sum([body.solve.compliance[grid] for body in self.bodies], axis=0)
-        )
         self.overshoot_problem = ComplementaritySolver(
             np.sum([body.mobility[grid] for body in self.bodies], axis=0)
         )
 
+    def _rows(self, points: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the rows of these points: gaps, then offsets in every direction."""
+        directions = np.arange(len(self.lam) // self.count)
+        return (self.count * directions[:, None] + points).ravel()
+
     def advance(self) -> tuple[float, float]:
         """One step; returns its mean axial contact force [N] and its mean smallest gap [m]."""
-        flight = self.space.gap + self._sum([body.fly for body in self.bodies])
-        push = self._push(flight)
+        flight = self.at_rest + self._sum([body.fly for body in self.bodies])
+        push = self._push(flight[: self.count])
         change = self._sum([partial(body.predict, push) for body in self.bodies])
         while True:
             lam = np.zeros(len(flight))
-            lam[self.points], active, rounds = self._forces(flight[self.points] + change)
-            given = self.share * lam[self.points]
-            gap = self.space.gap + self._sum(
-                [partial(body.complete, given) for body in self.bodies]
-            )
+            lam[self.rows], active, rounds = self._forces(flight[self.rows] + change)
+            given = self.share * lam[self.rows]
+            ends = self.at_rest + self._sum([partial(body.complete, given) for body in self.bodies])
+            gap = ends[: self.count]
             missed = (gap < -_PENETRATION) & ~self.watched
             if not np.any(missed):
                 break
@@ -362,10 +410,10 @@ class _Run:
         self.rounds += rounds
         self.closed[:] = False
         self.closed[self.points] = active
-        return self._commit(lam, gap)
+        return self._commit(lam, ends)
 
     def _push(self, flight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Contact-sized forces that are known before the solve, shape (nc,) [N]."""
+        """Contact-sized forces that are known before the solve, of the shape of lam [N]."""
         self.mu = np.zeros(len(flight))
         if self.scheme == "massless":
             return self.lam
@@ -383,25 +431,34 @@ class _Run:
             )
             self.overshooting[:] = False
             self.overshooting[self.points] = active
-        return (4.0 / self.step**2) * (self.mu - self.step * self.y)
+        push = np.zeros(len(self.lam))
+        push[: self.count] = (4.0 / self.step**2) * (self.mu - self.step * self.y)
+        return push
 
     def _forces(
-        self, gap: NDArray[np.float64]
+        self, free: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+        """Forces of the watched points that would get these gaps and offsets without."""
         active = self.closed[self.points]
+        gap = free[: len(self.points)]
         if not np.any(active) and np.all(gap >= 0.0):
-            return np.zeros(len(gap)), active, 0
-        return self.force_problem.solve(gap, active)
+            return np.zeros(len(free)), active, 0
+        if self.rubbing is None:
+            return self.force_problem.solve(gap, active)
+        slip = free[len(gap) :] - self.ends[self.rows[len(gap) :]]
+        return self.rubbing.solve(np.concatenate([gap, slip]), self.lam[self.rows])
 
-    def _commit(self, lam: NDArray[np.float64], gap: NDArray[np.float64]) -> tuple[float, float]:
+    def _commit(self, lam: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
         """Add the energies of the step and make its end the new state."""
-        before, self.gap = self.gap, gap
-        if self.scheme == "massless":
-            mean = 0.5 * (self.lam + lam)
-            self.contact_loss -= float(mean @ (gap - before))
-        else:
-            mean = lam
-            self.contact_loss -= float(lam @ (gap - before))
+        moved, before, self.ends = ends - self.ends, self.gap, ends
+        gap = self.gap
+        mean = 0.5 * (self.lam + lam) if self.scheme == "massless" else lam
+        self.contact_loss -= float(mean @ moved)
+        if self.rubbing is not None:
+            rubbed = self.rubbing.commit(lam[self.count :], moved[self.count :])
+            self.friction_loss += rubbed
+            self.contact_loss -= rubbed
+        if self.scheme != "massless":
             self.overshoot_loss += float(2.0 / self.step**2 * self.mu @ gap)
             if np.any(self.mu) or np.any(self.y):
                 self.y = (2.0 / self.step) * self.mu - self.y
@@ -417,14 +474,14 @@ class _Run:
         self.outside = self.axial_force - spring
         self.lam, self.mean = lam, mean
         self.steps += 1
-        self.steps_in_contact += bool(np.any(lam))
+        self.steps_in_contact += bool(np.any(lam[: self.count]))
         self.watch_sum += len(self.points)
         if self.steps % _REVIEW_STEPS == 0:
             self.together([body.refresh for body in self.bodies])
             near = (gap < self.margin) | self.closed
             if np.any(near != self.watched):
                 self.watch(near)
-        return float(self.space.axial @ mean), float(np.min(0.5 * (before + gap)))
+        return float(self.axial @ mean), float(np.min(0.5 * (before + gap)))
 
     @property
     def travel(self) -> float:
@@ -451,6 +508,8 @@ class _Record:
         self.gap: list[float] = []
         self.outside: list[float] = []
         self.point_force: list[NDArray[np.float32]] = []
+        self.across: list[NDArray[np.float32]] = []
+        self.doing: list[NDArray[np.int8]] = []
         self.velocity: list[list[float]] = []
         self.energy: list[tuple[float, ...]] = []
         self.energy_step: list[int] = []
@@ -477,14 +536,17 @@ class _Record:
         kinetic = [body.kinetic(run.y) for body in run.bodies]
         strain = [body.strain() for body in run.bodies]
         losses = (run.contact_loss, run.overshoot_loss, run.work, run.damped, run.stored)
-        self.energy.append((*kinetic, *strain, *losses))
+        self.energy.append((*kinetic, *strain, *losses, run.friction_loss))
         self.energy_step.append(run.steps)
 
     def keep_step(self, run: _Run, force: float, gap: float) -> None:
         self.force.append(force)
         self.gap.append(gap)
         self.outside.append(run.outside)
-        self.point_force.append(run.mean.astype(np.float32))
+        self.point_force.append(run.mean[: run.count].astype(np.float32))
+        if run.rubbing is not None:
+            self.across.append(run.mean[run.count :].astype(np.float32).reshape(-1, run.count))
+            self.doing.append(run.rubbing.doing.copy())
         self.keep_velocity(run)
         carries = bool(np.any(run.mean))
         if carries and not self.touched:
@@ -557,7 +619,7 @@ class _Show:
 
 
 def _check_rim(run: _Run) -> None:
-    beyond = run.space.rim & (run.lam > 0.0)
+    beyond = run.space.rim & (run.lam[: run.count] > 0.0)
     if np.any(beyond) and not run.space.complete_at(_RIM_RESERVE * run.travel):
         at = ", ".join(f"{x * 1e3:.4g}" for x in run.space.points[np.argmax(beyond)])
         raise ReachError(
@@ -593,6 +655,7 @@ def _result(
         work=energy[:, 2 * count + 2],
         damping=energy[:, 2 * count + 3],
         spring=energy[:, 2 * count + 4],
+        friction=energy[:, 2 * count + 5],
     )
     history = ImpactHistory(
         step=run.step,
@@ -628,6 +691,9 @@ def _result(
         approach=max(0.0, record.first_touch - record.lowest) if record.touched else 0.0,
         retraction=retraction,
         statistics=_statistics(run, times),
+        rubbing=None
+        if run.rubbing is None
+        else RubbingRecord(force=np.array(record.across), doing=np.array(record.doing)),
     )
 
 
@@ -653,6 +719,7 @@ def _ledger(
         damping=float(book.damping[-1]),
         work=float(book.work[-1]),
         spring=float(book.spring[-1]),
+        friction=float(book.friction[-1]),
     )
 
 
@@ -669,6 +736,7 @@ def _statistics(run: _Run, times: tuple[float, float]) -> SolverStatistics:
         watched=run.watch_sum / max(run.steps, 1),
         repeats=run.repeats,
         factor_entries=sum(factor.nonzeros or 0 for factor in factors),
+        turns=0 if run.rubbing is None else run.rubbing.turns,
         set_up_time=times[0],
         loop_time=times[1],
     )

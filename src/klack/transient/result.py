@@ -13,6 +13,7 @@ __all__ = [
     "FieldsOfBody",
     "FullOrderResult",
     "MotionOfBody",
+    "RubbingRecord",
     "Snapshots",
     "SolverStatistics",
 ]
@@ -39,6 +40,8 @@ class EnergyRecord:
         Lost in the damping of the bodies, >= 0.
     spring : array, shape (k,) [J]
         Taken up by the spring since the start.
+    friction : array, shape (k,) [J]
+        Lost in friction of the faces, >= 0; grows only.
     """
 
     time: NDArray[np.float64]
@@ -49,6 +52,7 @@ class EnergyRecord:
     work: NDArray[np.float64]
     damping: NDArray[np.float64]
     spring: NDArray[np.float64]
+    friction: NDArray[np.float64]
 
     @property
     def total(self) -> NDArray[np.float64]:
@@ -58,7 +62,7 @@ class EnergyRecord:
     @property
     def residual(self) -> NDArray[np.float64]:
         """Energy from nowhere, shape (k,) [J]: round-off in a sound run."""
-        lost = self.contact + self.overshoot + self.damping
+        lost = self.contact + self.overshoot + self.damping + self.friction
         return self.total - self.total[0] + self.spring + lost - self.work
 
 
@@ -136,6 +140,8 @@ class SolverStatistics:
         Steps done twice because a point outside of these closed.
     factor_entries : int
         Stored entries of all factors (0 where the solver does not tell).
+    turns : int
+        Steps whose forces with friction were found by taking turns, point by point.
     set_up_time, loop_time : float [s]
         Wall-clock.
     """
@@ -150,8 +156,25 @@ class SolverStatistics:
     watched: float
     repeats: int
     factor_entries: int
+    turns: int
     set_up_time: float
     loop_time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RubbingRecord:
+    """What the contact points did across their normals.
+
+    Parameters
+    ----------
+    force : float32 array, shape (n, ways, nc) [N]
+        On body a along each tangential direction, mean over each step.
+    doing : int8 array, shape (n, nc)
+        Open, sticking or slipping in each step, as of :mod:`klack.transient.rubbing`.
+    """
+
+    force: NDArray[np.float32]
+    doing: NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -175,6 +198,8 @@ class FullOrderResult:
     retraction : float [m]
         Distance that a was moved back along +z at the start because the bodies overlapped.
     statistics : SolverStatistics
+    rubbing : RubbingRecord, optional
+        With friction.
     """
 
     history: ImpactHistory
@@ -185,6 +210,7 @@ class FullOrderResult:
     approach: float
     retraction: float
     statistics: SolverStatistics
+    rubbing: RubbingRecord | None = None
 
     @property
     def pressure(self) -> NDArray[np.float32]:
@@ -201,5 +227,5 @@ class FullOrderResult:
         """Energy that the scheme lost, relative to the energy at the start [-]."""
         given = self.energy.total[0] + self.energy.work[-1]
         kept = self.energy.total[-1] + self.energy.spring[-1] + self.energy.damping[-1]
-        lost = given - kept
+        lost = given - kept - self.energy.friction[-1]
         return float(lost / max(self.energy.total[0], abs(self.energy.work[-1])))

@@ -14,6 +14,7 @@ from klack.assembling.reduced_pair import starting_gap
 from klack.case.schema import (
     Case,
 )
+from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
@@ -61,11 +62,12 @@ def simulate_in_full(
     case, pair = problem.case, problem.pair
     spring = case.motion.spring
     stiffness = 0.0 if spring is None else spring.stiffness
+    space = problem.space if space is None else space
     progress("full order", 0.0)
     return simulate_full_order(
         pair.upper,
         pair.lower,
-        problem.space if space is None else space,
+        space,
         speed=case.motion.speed,
         duration=case.run.duration,
         step=case.run.full_step,
@@ -73,6 +75,14 @@ def simulate_in_full(
         axial_force=-(case.motion.closing_force + stiffness * starting_gap(case)),
         spring_stiffness=stiffness,
         damping=(_damping(case, pair.upper, kept), _damping(case, pair.lower, kept)),
+        friction=FaceFriction.between(
+            case.contact.faces,
+            space,
+            pair.upper.mesh,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+        ),
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,

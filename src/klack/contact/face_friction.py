@@ -1,0 +1,53 @@
+"""Faces of two bodies that rub: the law of friction, and the slip that it acts on."""
+
+from dataclasses import dataclass
+from typing import Self
+
+from scipy.sparse import csr_array
+
+from klack.contact.friction import Friction
+from klack.contact.mortar import ContactSpace, tangent_rows
+from klack.mesh.mesh import Mesh, Surface
+
+__all__ = ["FaceFriction"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FaceFriction:
+    """Coulomb friction at the contact points of two bodies.
+
+    Parameters
+    ----------
+    law : Friction
+    T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
+        Displacement of a past b, ``T_a u_a + T_b u_b``: all points in the first direction, then in
+        the second one (:func:`klack.contact.mortar.tangent_rows`).
+    """
+
+    law: Friction
+    T_a: csr_array
+    T_b: csr_array
+
+    @classmethod
+    def between(
+        cls,
+        law: Friction,
+        space: ContactSpace,
+        mesh_a: Mesh,
+        surface_a: Surface,
+        mesh_b: Mesh,
+        surface_b: Surface,
+    ) -> Self | None:
+        """Friction of the contact points ``space`` of two surfaces; None where they have none.
+
+        Parameters
+        ----------
+        law : Friction
+        space : ContactSpace
+        mesh_a, surface_a, mesh_b, surface_b
+            As given to :func:`klack.contact.mortar.contact_space`.
+        """
+        if law.is_none:
+            return None
+        T_a, T_b = tangent_rows(space, mesh_a, surface_a, mesh_b, surface_b)
+        return cls(law=law, T_a=T_a, T_b=T_b)
