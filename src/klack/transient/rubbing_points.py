@@ -17,8 +17,8 @@ __all__ = ["RubbingPoints"]
 _PRECISION = 1e-12
 """Residual of the law over the largest force that one point would need by itself."""
 
-_LEAST_GAP = 1e-14
-"""Below this distance [m] gaps and slips are round-off."""
+_LEAST_GAP = 1e-18
+"""Below this distance [m] gaps and slips are round-off: displacements of 1 um times 1e-12."""
 
 _RIGID = 1e-9
 """Compliance across the normal, over that along it, below which a point cannot move across."""

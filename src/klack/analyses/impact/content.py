@@ -315,6 +315,18 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
     return tuple(found)
 
 
+def _contact_of(study: ImpactStudy) -> str:
+    rubbing = [result.label for result in study.ordered if result.energies.get("friction")]
+    if not rubbing:
+        return "frictionless contact of smooth surfaces"
+    if len(rubbing) == len(study.ordered):
+        return "contact of smooth surfaces with Coulomb friction"
+    return (
+        "contact of smooth surfaces, with Coulomb friction at the levels "
+        f"{'; '.join(rubbing)} and without it at the others"
+    )
+
+
 def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     tops = [
         f"{quantity(float(body.frequencies[-1]), 'Hz', 3)} ({body.name})"
@@ -324,8 +336,8 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     limits = [
         (
             "Physics",
-            "Linear elastic, isotropic bodies with small deformations; frictionless contact of "
-            "smooth surfaces; no fluid, no roughness, no plastic flow.",
+            "Linear elastic, isotropic bodies with small deformations; "
+            f"{_contact_of(study)}; no fluid, no roughness, no plastic flow.",
         ),
         (
             "Reduced level",
