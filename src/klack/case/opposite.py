@@ -3,8 +3,9 @@
 from pydantic import Field
 
 from klack.case.bodies import BodySurface, SurfaceName
+from klack.contact.friction import MOST_FRICTION, Friction
 from klack.input.section import Section
-from klack.units import Length
+from klack.units import Length, Ratio
 
 __all__ = ["CaseOpposite"]
 
@@ -24,6 +25,16 @@ class CaseOpposite(Section):
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
     )
+    friction: Ratio | None = Field(
+        default=None,
+        ge=0,
+        le=MOST_FRICTION,
+        description="Coulomb's coefficient between the faces here; default as at the contact.",
+    )
+
+    def faces(self, contact: Friction) -> Friction:
+        """Friction between the faces, where the contact below has the one given."""
+        return contact if self.friction is None else Friction.coulomb(self.friction)
 
     @property
     def stop(self) -> SurfaceName:

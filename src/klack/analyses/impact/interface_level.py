@@ -16,6 +16,7 @@ from klack.assembling.modes import selection_of
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
+from klack.contact.friction import Friction
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.statics import ReachError, extended_compliance
@@ -113,7 +114,8 @@ def build_interface(
     ]
     pair, above = problem.pair, problem.opposite
     faces = problem.case.contact.faces
-    smooth = faces.is_none
+    above_faces = faces if above is None else _opposite_faces(problem.case)
+    smooth = faces.is_none and above_faces.is_none
     here = problem.space if space is None else space
     at_hand = problem.static.compliance if space is None else compliance
     contacts = [
@@ -137,10 +139,15 @@ def build_interface(
                 space=above.space,
                 compliance=above.static.compliance if smooth else None,
                 tangents=None if smooth else tangent_rows(above.space, *there),
-                friction=faces,
+                friction=above_faces,
             )
         )
     return interface_model(bodies, contacts)
+
+
+def _opposite_faces(case: Case) -> Friction:
+    faces = case.contact.faces
+    return faces if case.opposite is None else case.opposite.faces(faces)
 
 
 def _meshes(pair: BodyPair) -> tuple[Mesh, Surface, Mesh, Surface]:
@@ -259,14 +266,28 @@ def _kept(
 def _load(
     problem: ContactProblem, body: ElasticBody, ports: tuple[Port, Port] | None
 ) -> NDArray[np.float64]:
-    """Load pattern of a contact port, shape (n_dof, 1)."""
+    """Load patterns of the contact on a body, shape (n_dof, m): pressure, then friction."""
     if problem.opposite is not None and body.name == problem.opposite.body.name:
         static = problem.opposite.static
         return static.load_patterns(0.7 * static.max_force)[0][:, None]
     side = 0 if body.name == problem.pair.upper.name else 1
-    if ports is not None:
-        return ports[side].pattern[:, None]
-    return problem.static.load_patterns(0.7 * problem.static.max_force)[side][:, None]
+    force = 0.7 * problem.static.max_force
+    pressure = problem.static.load_patterns(force)[side] if ports is None else ports[side].pattern
+    if problem.case.contact.faces.is_none:
+        return pressure[:, None]
+    space = problem.space
+    T = tangent_rows(space, *_meshes(problem.pair))[side]
+    G = (space.G_a, space.G_b)[side]
+    held = problem.static.pattern_at(force)
+    # friction in one direction all round the ring, then towards one side
+    first = range(0, T.shape[0], space.count)
+    patterns = [pressure, *(T[row : row + space.count].T @ held for row in first)]
+    if space.dimension == 3:
+        for direction in np.eye(3)[:2]:
+            aside = np.tile(direction, body.mesh.node_count)
+            across = T.T @ (np.tile(held, 2) * (T @ aside))
+            patterns.append(across + G.T @ (held * (G @ aside)))
+    return np.column_stack(patterns)
 
 
 def build_guide(
