@@ -38,7 +38,20 @@ class FaceFriction:
         mesh_b: Mesh,
         surface_b: Surface,
     ) -> Self | None:
-        """Friction of the contact points ``space`` of two surfaces; None where they have none.
+        """Friction of two surfaces as of :meth:`on`; None where they have none."""
+        return None if law.is_none else cls.on(law, space, mesh_a, surface_a, mesh_b, surface_b)
+
+    @classmethod
+    def on(
+        cls,
+        law: Friction,
+        space: ContactSpace,
+        mesh_a: Mesh,
+        surface_a: Surface,
+        mesh_b: Mesh,
+        surface_b: Surface,
+    ) -> Self:
+        """Tangential rows of the contact points ``space`` of two surfaces, even without friction.
 
         Parameters
         ----------
@@ -47,7 +60,5 @@ class FaceFriction:
         mesh_a, surface_a, mesh_b, surface_b
             As given to :func:`klack.contact.mortar.contact_space`.
         """
-        if law.is_none:
-            return None
         T_a, T_b = tangent_rows(space, mesh_a, surface_a, mesh_b, surface_b)
         return cls(law=law, T_a=T_a, T_b=T_b)

@@ -478,9 +478,9 @@ def tangent_rows(
     so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies cancel,
     and so do their moments: across a gap *g* (that of the meshes) the normal of the slave side *s*
     (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
-    Axisymmetric bodies have one direction *t*, along the meridian; solids two: away from the axis
-    of motion (along it on walls, along x where hats surround it), and round it.  Each is taken in
-    the tangential plane of every integration point.
+    Axisymmetric bodies have one direction *t*, along the meridian and away from the axis of motion
+    (along it on walls); solids have a second one round it (the first is along x where hats surround
+    it).  Each is taken in the tangential plane of every integration point.
 
     Parameters
     ----------
@@ -559,14 +559,14 @@ def _tangents(
     normal: NDArray[np.float64], towards: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
     """Directions at right angles to normals, shape (..., d) each."""
-    if normal.shape[-1] == 2:
-        along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
-        return (np.broadcast_to(along, np.broadcast_shapes(along.shape, towards.shape)),)
-    up = np.zeros(3)
-    up[2] = 1.0
+    d = normal.shape[-1]
     is_wall = np.abs(np.sum(normal * towards, axis=-1, keepdims=True)) > _WALL
-    first = np.where(is_wall, up, towards)
-    first = first - np.sum(first * normal, axis=-1, keepdims=True) * normal
+    wanted = np.where(is_wall, np.eye(d)[-1], towards)
+    if d == 2:
+        along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+        way = np.sum(along * wanted, axis=-1, keepdims=True)
+        return (np.where(way < 0.0, -along, along),)
+    first = wanted - np.sum(wanted * normal, axis=-1, keepdims=True) * normal
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)
     return first, np.cross(normal, first)
 

@@ -23,6 +23,7 @@ from scipy.sparse import csr_array, vstack
 
 from klack.cache.entry import Entry
 from klack.contact.complementarity import ComplementaritySolver
+from klack.contact.face_friction import FaceFriction
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
@@ -59,7 +60,7 @@ def contact_compliance(
     flexibility_a: Flexibility,
     flexibility_b: Flexibility,
     *,
-    tangents: tuple[csr_array, csr_array] | None = None,
+    faces: FaceFriction | None = None,
 ) -> NDArray[np.float64]:
     """Condense the static compliance of both bodies to the contact points.
 
@@ -67,19 +68,19 @@ def contact_compliance(
     ----------
     space : ContactSpace
     flexibility_a, flexibility_b : Flexibility
-    tangents : pair of sparse arrays, optional
-        Tangential rows (:func:`klack.contact.mortar.tangent_rows`), after those of the gaps.
+    faces : FaceFriction, optional
+        With tangential rows, after those of the gaps.
 
     Returns
     -------
     array, shape (nc, nc) [m/N]
-        Symmetric; with tangents of all rows.
+        Symmetric; with faces of all rows.
     """
     rows = space.G_a, space.G_b
-    if tangents is not None:
+    if faces is not None:
         rows = (
-            csr_array(vstack([rows[0], tangents[0]])),
-            csr_array(vstack([rows[1], tangents[1]])),
+            csr_array(vstack([rows[0], faces.T_a])),
+            csr_array(vstack([rows[1], faces.T_b])),
         )
     _require_memory(space, *rows)
     return _remembered_compliance(

@@ -22,13 +22,14 @@ compliance holds all directions: unlike bodies slip sideways where they are pres
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import contact_compliance
@@ -45,8 +46,6 @@ __all__ = [
     "interface_model",
     "rigid_motion",
 ]
-
-_SMOOTH = Friction.coulomb(0.0)
 
 _RECIPROCITY = 1e-6
 """Largest difference of the works of two loads on each other's displacements."""
@@ -88,9 +87,7 @@ class InterfaceContact:
     compliance : array, shape (nc, nc) [m/N], optional
         Static compliance of both bodies at these points, if it is known already; with tangential
         directions of all rows.
-    tangents : pair of sparse arrays, optional
-        Tangential rows of a and b (:func:`klack.contact.mortar.tangent_rows`); none: no friction.
-    friction : Friction
+    faces : FaceFriction, optional
     """
 
     name: str
@@ -98,23 +95,22 @@ class InterfaceContact:
     lower: str
     space: ContactSpace
     compliance: NDArray[np.float64] | None = None
-    tangents: tuple[csr_array, csr_array] | None = None
-    friction: Friction = _SMOOTH
+    faces: FaceFriction | None = None
 
     @property
     def ways(self) -> int:
         """Tangential directions of each point."""
-        return 0 if self.tangents is None else self.tangents[0].shape[0] // len(self.space.gap)
+        return 0 if self.faces is None else self.faces.T_a.shape[0] // len(self.space.gap)
 
     def rows(self, body: str) -> csr_array | None:
         """Rows of all directions on a body, None where it is not part of the contact."""
         if body == self.upper:
-            G, side = self.space.G_a, 0
+            G, T = self.space.G_a, None if self.faces is None else self.faces.T_a
         elif body == self.lower:
-            G, side = self.space.G_b, 1
+            G, T = self.space.G_b, None if self.faces is None else self.faces.T_b
         else:
             return None
-        return G if self.tangents is None else csr_array(vstack([G, self.tangents[side]]))
+        return G if T is None else csr_array(vstack([G, T]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,6 +209,17 @@ class InterfaceModel:
     def ways(self) -> int:
         """Tangential directions of each contact point, 0 without friction."""
         return len(self.tangents) // self.count
+
+    def without_friction(self) -> "InterfaceModel":
+        """Return the same bodies and contact points without friction."""
+        n = self.count
+        return replace(
+            self,
+            compliance=np.ascontiguousarray(self.compliance[:n, :n]),
+            tangents=np.zeros((0, 0)),
+            axial_across=np.zeros(0),
+            friction=(),
+        )
 
     @property
     def count(self) -> int:
@@ -316,7 +323,7 @@ def interface_model(
         checks=checks,
         tangents=np.ascontiguousarray(traces[count:]),
         axial_across=_axial_across(contacts, names[0], places, count),
-        friction=tuple(contact.friction for contact in contacts) if ways else (),
+        friction=tuple(contact.faces.law for contact in contacts if contact.faces is not None),
     )
 
 
@@ -328,7 +335,7 @@ def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
             "interface model: contacts",
             got="tangential directions at one contact and none at another",
             expected="tangential directions at all contacts, or none",
-            hint="give every contact tangents; friction may be 0 at one of them.",
+            hint="give every contact faces; their friction may be 0.",
         )
     return ways.pop()
 
@@ -342,8 +349,8 @@ def _axial_across(
     """Change of the tangential offsets per translation of the moving body along +z."""
     out = np.zeros(sum(len(place) for place in places))
     for contact, place in zip(contacts, places, strict=True):
-        if contact.tangents is not None:
-            rows = contact.tangents[0 if contact.upper == moving else 1]
+        if contact.faces is not None:
+            rows = contact.faces.T_a if contact.upper == moving else contact.faces.T_b
             d = contact.space.dimension
             lifted = np.tile(np.eye(d)[d - 1], rows.shape[1] // d)
             out[place[len(contact.space.gap) :]] = rows @ lifted
@@ -428,7 +435,7 @@ def _static_compliance(
             pair = [
                 bodies[names.index(name)].flexibility for name in (contact.upper, contact.lower)
             ]
-            C = contact_compliance(contact.space, pair[0], pair[1], tangents=contact.tangents)
+            C = contact_compliance(contact.space, pair[0], pair[1], faces=contact.faces)
         total[np.ix_(place, place)] = C
     for i, one in enumerate(contacts):
         for j, other in enumerate(contacts):

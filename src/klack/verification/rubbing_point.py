@@ -5,8 +5,9 @@ from math import inf
 
 import numpy as np
 
+from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
-from klack.contact.mortar import ContactSpace, tangent_rows
+from klack.contact.mortar import ContactSpace
 from klack.contact.restitution import measure_impact
 from klack.elasticity.body import ElasticBody
 from klack.transient.interface_model import InterfaceContact
@@ -119,6 +120,5 @@ def rubbing_faces(
         upper=upper.name,
         lower=lower.name,
         space=space,
-        tangents=tangent_rows(space, *meshes),
-        friction=Friction.coulomb(friction),
+        faces=FaceFriction.on(Friction.coulomb(friction), space, *meshes),
     )

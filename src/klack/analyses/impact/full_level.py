@@ -7,7 +7,7 @@ import numpy as np
 
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
-from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.damping_choice import damping_of, is_damped
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import starting_gap
@@ -139,9 +139,21 @@ def run_full(
         step=case.run.full_step,
         wall_time=statistics.loop_time,
         setup_time=statistics.set_up_time,
-        pressure=pressure_record(history, result.point_force, space.points, space.area),
+        pressure=pressure_record(
+            history, result.point_force, space.points, space.area, _friction(case, result)
+        ),
     )
     return level, result
+
+
+def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
+    if result.rubbing is None:
+        return None
+    return FrictionRecord(
+        force=result.rubbing.force,
+        doing=result.rubbing.doing,
+        coefficient=case.contact.friction,
+    )
 
 
 def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
-from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
+from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
@@ -125,8 +126,7 @@ def build_interface(
             lower=pair.lower.name,
             space=here,
             compliance=at_hand if smooth else None,
-            tangents=None if smooth else tangent_rows(here, *_meshes(pair)),
-            friction=faces,
+            faces=None if smooth else FaceFriction.on(faces, here, *_meshes(pair)),
         )
     ]
     if above is not None:
@@ -138,8 +138,7 @@ def build_interface(
                 lower=pair.upper.name,
                 space=above.space,
                 compliance=above.static.compliance if smooth else None,
-                tangents=None if smooth else tangent_rows(above.space, *there),
-                friction=above_faces,
+                faces=None if smooth else FaceFriction.on(above_faces, above.space, *there),
             )
         )
     return interface_model(bodies, contacts)
@@ -394,6 +393,15 @@ def run_interface(
     case = problem.case
     _compile(case, model, guide)
     result = simulate_case(case, model, guide)
+    frictionless, friction = None, None
+    if model.ways:
+        frictionless = simulate_case(case, model.without_friction(), guide).history
+        segment = result.impacts[0]
+        friction = FrictionRecord(
+            force=segment.friction_force.reshape(-1, model.ways, model.count),
+            doing=segment.doing,
+            coefficient=case.contact.friction,
+        )
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
@@ -406,6 +414,7 @@ def run_interface(
         wall_time=result.wall_time,
         setup_time=setup_time,
         pressure=pressure_record(
-            result.history, result.impacts[0].point_force, model.points, model.area
+            result.history, result.impacts[0].point_force, model.points, model.area, friction
         ),
+        frictionless=frictionless,
     )

@@ -90,6 +90,7 @@ def level_result(
     wall_time: float,
     setup_time: float,
     pressure: PressureRecord | None = None,
+    frictionless: ImpactHistory | None = None,
 ) -> LevelResult:
     """Measures and energies of one computed impact."""
     ledger = history.ledger
@@ -111,6 +112,7 @@ def level_result(
             if len(body.modal)
         ),
         pressure=pressure,
+        frictionless=None if frictionless is None else measure_impact(frictionless),
     )
     return replace(result, doubts=doubts_of(result))
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.impact.record import PressureRecord
+from klack.analyses.impact.record import FrictionRecord, PressureRecord
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
 
@@ -17,8 +17,12 @@ def pressure_record(
     point_force: NDArray[np.float32],
     points: NDArray[np.float64],
     area: NDArray[np.float64],
+    friction: FrictionRecord | None = None,
 ) -> PressureRecord | None:
-    """Contact forces of all points over the first impact, thinned to a hundred instants or so."""
+    """Contact forces of all points over the first impact, thinned to a hundred instants or so.
+
+    ``friction`` is that of every step of the history, as ``point_force`` is.
+    """
     if not len(point_force):
         return None
     measures = measure_impact(history)
@@ -32,4 +36,11 @@ def pressure_record(
         points=points,
         area=area,
         point_force=np.ascontiguousarray(point_force[chosen]),
+        friction=None
+        if friction is None
+        else FrictionRecord(
+            force=np.ascontiguousarray(friction.force[chosen]),
+            doing=np.ascontiguousarray(friction.doing[chosen]),
+            coefficient=friction.coefficient,
+        ),
     )

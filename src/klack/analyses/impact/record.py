@@ -20,6 +20,7 @@ from klack.reduction.transfer import TransferComparison
 __all__ = [
     "SETTLED",
     "ContactSummary",
+    "FrictionRecord",
     "ImpactStudy",
     "LawSummary",
     "LevelResult",
@@ -106,6 +107,26 @@ class ModalEnergy:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class FrictionRecord:
+    """Friction of all contact points, at the times of their :class:`PressureRecord`.
+
+    Parameters
+    ----------
+    force : float32 array, shape (n, ways, nc) [N]
+        On the moving body: outwards from the axis along the face; in three dimensions round the
+        axis too.
+    doing : int8 array, shape (n, nc)
+        0 open, 1 sticking, 2 slipping (:mod:`klack.transient.rubbing`).
+    coefficient : float [-]
+        While a point slips.
+    """
+
+    force: NDArray[np.float32]
+    doing: NDArray[np.int8]
+    coefficient: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PressureRecord:
     """Forces of all contact points during the first impact.
 
@@ -118,12 +139,15 @@ class PressureRecord:
     area : array, shape (nc,) [m^2]
         The pressure of a point is its force over its area.
     point_force : float32 array, shape (n, nc) [N]
+    friction : FrictionRecord or None
+        Where the faces rub.
     """
 
     time: NDArray[np.float64]
     points: NDArray[np.float64]
     area: NDArray[np.float64]
     point_force: NDArray[np.float32]
+    friction: FrictionRecord | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,6 +175,8 @@ class LevelResult:
     modal_energy : tuple of ModalEnergy
     pressure : PressureRecord or None
         Of levels that resolve the contact point by point.
+    frictionless : ImpactMeasures or None
+        What the level computes without the friction of the faces, where they rub.
     doubts : tuple of str
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
     """
@@ -168,6 +194,7 @@ class LevelResult:
     energy_residual: float
     modal_energy: tuple[ModalEnergy, ...] = ()
     pressure: PressureRecord | None = None
+    frictionless: ImpactMeasures | None = None
     doubts: tuple[str, ...] = ()
 
 
