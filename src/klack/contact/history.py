@@ -133,7 +133,8 @@ class ImpactHistory:
     step : float [s]
         Length of an interval; a multiple of the integration step.
     force : array, shape (n,) [N]
-        Mean contact force over the interval, >= 0: pushes a in +z and b in -z.
+        Mean contact force over the interval, pushes a in +z and b in -z; >= 0, but for faces that
+        friction keeps from parting.
     gap : array, shape (n,) [m]
         Mean gap over the interval, negative where closed (for a full-order contact: the
         pressure-weighted or area-weighted mean).

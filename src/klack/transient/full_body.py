@@ -45,11 +45,12 @@ class FullBody:
                 expected=f"rows for its {self.dof_count} degrees of freedom",
                 hint="build the contact space from the meshes of these two bodies, a first.",
             )
-        if T is not None and (T.shape[1] != self.dof_count or T.shape[0] % G.shape[0]):
+        ways = max(1, self.dimension - 1)
+        if T is not None and T.shape != (ways * G.shape[0], self.dof_count):
             raise InputError(
                 f"simulate_full_order: friction of body {role} ('{body.name}')",
                 got=f"{T.shape[0]} rows for {T.shape[1]} degrees of freedom",
-                expected=f"one or two rows for each of {G.shape[0]} contact points, for "
+                expected=f"{ways * G.shape[0]} rows, {ways} for each contact point, for "
                 f"{self.dof_count} degrees of freedom",
                 hint="build the friction from the same contact points and meshes.",
             )

@@ -316,14 +316,14 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
 
 
 def _contact_of(study: ImpactStudy) -> str:
-    rubbing = [result.label for result in study.ordered if result.energies.get("friction")]
+    rubbing = [f"'{result.level}'" for result in study.ordered if result.energies.get("friction")]
     if not rubbing:
         return "frictionless contact of smooth surfaces"
     if len(rubbing) == len(study.ordered):
         return "contact of smooth surfaces with Coulomb friction"
     return (
-        "contact of smooth surfaces, with Coulomb friction at the levels "
-        f"{'; '.join(rubbing)} and without it at the others"
+        "contact of smooth surfaces, with Coulomb friction at level "
+        f"{' and '.join(rubbing)} and without it at the others"
     )
 
 
