@@ -15,6 +15,7 @@ from klack.analyses.impact.estimate_wording import (
     estimate_sentence,
 )
 from klack.analyses.impact.figures import charts
+from klack.analyses.impact.friction_figure import friction_figure, friction_views
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.pressure_figure import pressure_figure
 from klack.analyses.impact.pressure_view import study_views
@@ -26,7 +27,7 @@ from klack.analyses.impact.wording import answer
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.assembling.body_summary import BodySummary
-from klack.contact.restitution import Deviation
+from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.report.chart import AnyChart
 from klack.report.page import Content, Section, Table
 from klack.report.wording import (
@@ -44,6 +45,13 @@ __all__ = [
 ]
 
 
+_WITHOUT_FRICTION: tuple[tuple[str, Callable[[ImpactMeasures], str]], ...] = (
+    ("restitution", lambda m: f"{m.restitution:.4f}"),
+    ("peak force", lambda m: quantity(m.peak_force, "N", 5)),
+    ("contact time", lambda m: quantity(m.contact_time, "s", 5)),
+)
+
+
 def report_content(study: ImpactStudy) -> Content:
     """Texts, tables and figures of a study."""
     found = charts(study)
@@ -57,6 +65,7 @@ def report_content(study: ImpactStudy) -> Content:
     sections.append(_bodies_at_peak(study))
     sections.append(Section(title="Force over time", charts=named("force")))
     sections.append(_pressure(study))
+    sections.append(_friction(study))
     sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
     if transfer:
         sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
@@ -187,6 +196,33 @@ def _pressure(study: ImpactStudy) -> Section:
         title=title,
         picture=pressure_figure(views),
         tables=(Table(columns=columns, rows=pressure_rows(views)),),
+    )
+
+
+def _friction(study: ImpactStudy) -> Section:
+    title = "Friction between the faces"
+    views = friction_views(study)
+    if not views:
+        return Section(title=title)
+    rubbing = [r for r in study.ordered if r.energies.get("friction")]
+    rows = [
+        (
+            "lost in friction, of the energy before",
+            *(
+                f"{100 * r.energies['friction'] / r.energies['initial kinetic']:.2f} %"
+                for r in rubbing
+            ),
+        ),
+        ("restitution", *(f"{r.measures.restitution:.4f}" for r in rubbing)),
+    ]
+    for name, text in _WITHOUT_FRICTION:
+        values = [text(r.frictionless) if r.frictionless else "" for r in rubbing]
+        if any(values):
+            rows.append((f"{name} without friction", *values))
+    return Section(
+        title=title,
+        picture=friction_figure(views),
+        tables=(Table(columns=("", *(r.label for r in rubbing)), rows=tuple(rows)),),
     )
 
 
