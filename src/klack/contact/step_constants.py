@@ -15,6 +15,7 @@ __all__ = [
     "LANES",
     "LAW_HERTZ",
     "LAW_LINEAR",
+    "LAW_RUBBING",
     "LAW_TABLE",
     "LEAST_WAY",
     "LEFT_BY_FILM",
@@ -44,6 +45,7 @@ NO_LAW: Annotated[int, "C", "only a film, no contact"] = -1
 LAW_LINEAR: Annotated[int, "C", "numbers: k"] = 0
 LAW_HERTZ: Annotated[int, "C", "numbers: K, n"] = 1
 LAW_TABLE: Annotated[int, "C", "numbers: intervals, then six for each"] = 2
+LAW_RUBBING: Annotated[int, "", "springs, ratio, then onsets, normal, strength"] = 3
 
 # contact equation of a step
 FORCE_LEFT: Annotated[float, "C", "accepted error of a force over the force"] = 1e-11

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
@@ -146,7 +147,7 @@ def simulate(
     q, v = np.zeros(flat.v.size), flat.v.copy()
     record = Record.empty(records, contacts, flat.watched)
     record.v[0] = flat.watched.v @ v
-    books = np.zeros(3 + 2 * contacts)
+    books = np.zeros(4 + 2 * contacts)
     run = run_one_contact if contacts == 1 else run_steps
     status = run(
         int(steps_per_record),
@@ -181,7 +182,7 @@ def simulate(
         own = slice(block.first, block.last)
         positions.append(block.basis @ (q[own] + block.rest))
         speeds.append(block.basis @ v[own])
-    ledger = _ledger(flat, positions, speeds, books)
+    ledger = _ledger(system, flat, positions, speeds, books)
     energy_balance.check_energy_balance(
         "simulate",
         ledger.residual,
@@ -258,6 +259,7 @@ def simulate_impact(
 
 
 def _ledger(
+    system: ReducedSystem,
     flat: FlatSystem,
     positions: list[NDArray[np.float64]],
     speeds: list[NDArray[np.float64]],
@@ -273,9 +275,12 @@ def _ledger(
             y0, y = float(phi @ q0), float(phi @ q)
             spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
     contact, at = 0.0, flat.contacts
-    for c in range(len(at.gap)):
-        gap, e = books[3 + 2 * c], books[4 + 2 * c]
-        contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
+    for c, pair in enumerate(system.contacts):
+        gap, e = books[4 + 2 * c], books[5 + 2 * c]
+        if isinstance(pair.law, RubbingLaw):
+            contact += pair.law.stored(-gap, at.slip)
+        else:
+            contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
         contact += 0.5 * e**2 / at.series[c] if e else 0.0
     return EnergyLedger(
         initial=initial,
@@ -285,6 +290,7 @@ def _ledger(
         damping=float(books[2]),
         work=work,
         spring=spring,
+        friction=float(books[3]),
     )
 
 

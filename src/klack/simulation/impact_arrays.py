@@ -37,6 +37,7 @@ class Contacts(NamedTuple):
     law_start: Index  # (c,) into ``law_data``
     alpha: Vector  # (c,) dissipation factor
     series: Vector  # (c,) compliance in series [m/N]
+    slip: Vector  # [m] of the sliders of a law with friction, in and out; one contact only
 
 
 class Losses(NamedTuple):

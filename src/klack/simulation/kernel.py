@@ -366,9 +366,10 @@ def run_steps(
         position under the constant forces.
     modes, contacts, losses, watched, record
         See :mod:`klack.simulation.impact_arrays`.
-    books : array (3 + 2 c,)
-        Out: contact dissipation, loss at release of a series spring, modal damping loss; then for
-        each contact the last gap and the last compression of its series spring.
+    books : array (4 + 2 c,)
+        Out: contact dissipation, loss at release of a series spring, modal damping loss, loss of
+        friction (of exactly one contact only); then for each contact the last gap and the last
+        compression of its series spring.
 
     Returns
     -------
@@ -418,6 +419,6 @@ def run_steps(
         damping += damped.flight_energy - _damped_energy(q, v, modes.B, now.f, losses.weight)
     books[0], books[1], books[2] = contact_loss, release_loss, damping
     for c in range(contacts.gap.size):
-        books[3 + 2 * c] = now.gap[c]
-        books[4 + 2 * c] = now.e[c]
+        books[4 + 2 * c] = now.gap[c]
+        books[5 + 2 * c] = now.e[c]
     return STATUS_FINE

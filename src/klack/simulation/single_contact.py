@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
-from klack.contact.step_constants import LAW_LINEAR, LEAST_WAY, SEPARATED
+from klack.contact.step_constants import LAW_LINEAR, LAW_RUBBING, LEAST_WAY, SEPARATED
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
 from klack.simulation.kernel import FAST, STATUS_FINE, Damped, add_release, push_on
 from klack.simulation.phase import compiled, phase
+from klack.simulation.rubbing_step import rubbing_step
 
 __all__ = ["run_one_contact"]
 
@@ -234,6 +235,12 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
     if d0 > 0.0 or d_free > 0.0:
         if linear:
             force = solve_linear(contacts.law_data[contacts.law_start[0]], own, d0, d_free)
+        elif contacts.law_kind[0] == LAW_RUBBING:
+            guess = 2.0 * now.F - now.F_before
+            start = contacts.law_start[0]
+            force, lost = rubbing_step(
+                contacts.law_data, start, contacts.slip, own, d0, d_free, guess
+            )
         else:
             if contacts.alpha[0] > 0.0 and approaching and free < 0.0:
                 # mean rate of the gap over the step of onset: no force has acted yet
@@ -313,7 +320,8 @@ def run_one_contact(
     pushed_q, pushed_v = np.zeros(push_index.size), np.zeros(push_index.size)
     linear = contacts.law_kind[0] == LAW_LINEAR and contacts.alpha[0] == 0.0
     now = _Contact(0.0, 0.0, contacts.gap[0] + row @ q, 0.0, 0.0, True, 0.0, 0)
-    contact_loss, release_loss = 0.0, 0.0
+    rubs = contacts.law_kind[0] == LAW_RUBBING
+    contact_loss, friction_loss, release_loss = 0.0, 0.0, 0.0
     damped = Damped(0.0, True, _damped_energy(S, L, 0.0) if losses.damped else 0.0)
 
     for place in range(record.force.shape[0]):
@@ -326,7 +334,10 @@ def run_one_contact(
             for k in range(push_index.size):
                 free += row[push_index[k]] * pushed_q[k]
             now, loss = _press(contacts, linear, now, free)
-            contact_loss += loss
+            if rubs:
+                friction_loss += loss
+            else:
+                contact_loss += loss
             if losses.damped:
                 damped = _damp(L, S_before, now, damped)
             after = free + contacts.G[0, 0] * now.F
@@ -348,10 +359,11 @@ def run_one_contact(
     damping = damped.loss
     if losses.damped and damped.in_flight:
         damping += damped.flight_energy - _damped_energy(S, L, now.F)
-    books[0], books[1], books[2], books[3], books[4] = (
+    books[0], books[1], books[2], books[3], books[4], books[5] = (
         contact_loss,
         release_loss,
         damping,
+        friction_loss,
         now.gap,
         now.e,
     )

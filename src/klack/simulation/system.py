@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import InputError, require_nonnegative
 from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
@@ -25,7 +26,7 @@ class ContactPair:
     ----------
     body_a, port_a, body_b, port_b : str
         Both ports point along +z (a contact port made of ``G_b^T lam`` must be turned round).
-    law : LinearLaw, HertzLaw, TableLaw or HuntCrossley
+    law : LinearLaw, HertzLaw, TableLaw, HuntCrossley, or RubbingLaw of a single contact
         Of the compliance that neither the modes nor ``series_compliance`` carry.
     gap : float [m]
         At the start.
@@ -121,6 +122,7 @@ class ReducedSystem:
                 expected="distinct names and at least one contact",
                 hint="rename a body or add a ContactPair.",
             )
+        self._check_rubbing()
         for contact in self.contacts:
             self._check_axial(contact.body_a, contact.port_a)
             self._check_axial(contact.body_b, contact.port_b)
@@ -147,6 +149,16 @@ class ReducedSystem:
         """Return the modal amplitudes of a port, shape (m,)."""
         owner = self.body(body)
         return np.asarray(owner.port_shapes)[:, owner.port_index(port)]
+
+    def _check_rubbing(self) -> None:
+        rubbing = [c for c in self.contacts if isinstance(c.law, RubbingLaw)]
+        if rubbing and (len(self.contacts) > 1 or rubbing[0].series_compliance > 0.0):
+            raise InputError(
+                f"contact {rubbing[0].body_a}.{rubbing[0].port_a}",
+                got="a law with friction beside other contacts or a series compliance",
+                expected="one contact, all of whose compliance is in modes and law",
+                hint="leave the friction of the faces out.",
+            )
 
     def _check_axial(self, name: str, port: str) -> None:
         body, phi = self.body(name), self.shape(name, port)
