@@ -148,3 +148,23 @@ def test_impacts_on_one_point_stick_slip_reverse_and_jam(case):
 def test_errors_fall_with_the_square_of_the_step():
     coarse, fine = (np.median([missed(case, n) for case in CASES]) for n in (100, 400))
     assert coarse / fine > 12.0
+
+
+def test_faces_that_close_and_turn_round_as_a_whole_take_few_rounds():
+    """Points on a half-plane: their compliance is large together and small one by one."""
+    at = np.linspace(0.0, 1.0, 16)
+    kernel = 3.0 - np.log(np.abs(at[:, None] - at) + 0.03)
+    A, mu = np.kron(np.eye(2), kernel), np.full(16, 0.1)
+    gap = 1.0 * (at - 0.45) ** 2
+    q = np.concatenate([gap - 0.5, np.full(16, -0.5)])
+    lam, w, doing = np.zeros(32), np.empty(32), np.zeros(16, dtype=np.int64)
+    assert 0 < solve_rubbing(A, q, mu, lam, w, doing, 1e-12) < 10
+    closed = lam[:16] > 0
+    assert 4 < closed.sum() < 16  # the rest opens on the way
+    np.testing.assert_allclose(lam[16:], mu * lam[:16], atol=1e-12)
+    for move, state in ((0.01, STICK), (1.0, SLIP)):
+        again, back = lam.copy(), np.concatenate([q[:16], move - kernel @ lam[16:]])
+        assert 0 < solve_rubbing(A, back, mu, again, w, doing, 1e-12) < 10
+        assert np.any(doing == state)
+        if state == SLIP:
+            np.testing.assert_allclose(again[16:], -mu * again[:16], atol=1e-12)

@@ -18,7 +18,8 @@ A slipping point has the force :math:`\mu \lambda_n` along :math:`e = \tau / |\t
     D = a\, \frac{|\tau| - \mu \lambda_n}{\mu \lambda_n} ,
 
 which is what turns its direction: directions that are iterated by :math:`\tau` alone take hundreds
-of rounds.  Two to four rounds from the solution of the step before.  Where they do not end, the
+of rounds.  A point that would slip against the force it has sticks for one round: faces that turn round
+as a whole would else turn round again in the next one.  Two to four rounds from the solution of the step before.  Where they do not end, the
 points take turns (projected Gauss-Seidel), each with its own three equations.
 
 Friction makes the matrix unsymmetric; for a large coefficient on an eccentric body a solution may
@@ -49,14 +50,12 @@ def _answer(A: Matrix, q: Vector, n: int, ways: int, lam: Vector, w: Vector) -> 
     """Gaps and slips under the forces: w = q + A lam."""
     for i in range(len(q)):
         w[i] = q[i]
-    for k in range(n):
-        if lam[k] > 0.0:
-            for c in range(ways + 1):
-                a = lam[c * n + k]
-                if a != 0.0:
-                    row = A[c * n + k]
-                    for i in range(len(q)):
-                        w[i] += a * row[i]
+    for j in range(len(q)):
+        a = lam[j]
+        if a != 0.0:
+            row = A[j]
+            for i in range(len(q)):
+                w[i] += a * row[i]
 
 
 @phase
@@ -95,10 +94,13 @@ def _judge(
             for c in range(ways):
                 worst = max(worst, abs(w[(c + 1) * n + k]) / own)
             continue
-        doing[k] = SLIP
+        doing[k], held = SLIP, 0.0
         for c in range(ways):
             along[k, c] /= size
+            held += lam[(c + 1) * n + k] * along[k, c]
             worst = max(worst, abs(lam[(c + 1) * n + k] - most * along[k, c]))
+        if held < 0.0:
+            doing[k] = STICK
         stiffer[k] = own * (size - most) / most if most > 0.0 else 0.0
     return worst
 
@@ -235,10 +237,6 @@ def solve_rubbing(
         if _judge(A, mu, n, ways, lam, w, doing, along, stiffer) <= tolerance:
             return rounds
         _newton(A, q, mu, n, ways, lam, doing, along, stiffer, place, kind)
-        for k in range(n):
-            if lam[k] < 0.0:  # it opens in the next round
-                for c in range(ways):
-                    lam[(c + 1) * n + k] = 0.0
     return -rub_in_turn(A, q, mu, lam, w, doing, tolerance)
 
 
