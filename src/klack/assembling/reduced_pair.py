@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
-from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw, SubmodelLocalLaw
+from klack.case.impact_sections import (
+    ConsistentLocalLaw,
+    HertzLocalLaw,
+    LinearLocalLaw,
+    SubmodelLocalLaw,
+)
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import (
@@ -19,6 +24,9 @@ from klack.contact.laws import (
     LinearLaw,
 )
 from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
+from klack.contact.rubbing_fit import RubbingFit, rubbing_fit
+from klack.contact.rubbing_law import RubbingLaw
+from klack.contact.statics import StaticContact
 from klack.contact.submodel import LocalStiffness, local_stiffness
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
@@ -29,12 +37,14 @@ from klack.reduction.selection import ByCount, ModeSelection
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 from klack.stages import show, trial
+from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = [
     "PORT",
     "ReducedPair",
     "classical_stiffness",
     "first_stiffness",
+    "friction_doubt",
     "hertz_coefficient",
     "impact_system",
     "own_pair",
@@ -49,6 +59,7 @@ PORT = "contact"
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
+_FAIR_LOOP = 0.02  # share of the work by which loops of the law may be wrong without a word
 _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
 
 
@@ -66,14 +77,20 @@ class ReducedPair:
         The consistent law with its shares; None for another kind.
     pattern_force : float [N]
         Force at which the pressure pattern of the port was taken.
+    static : StaticContact or RubbingContact
+        Of the full bodies, with the friction that ``law`` has.
+    rubbing : RubbingFit or None
+        The law with memory of faces with friction, made of ``local`` and static loops.
     """
 
     upper: ReducedBody
     lower: ReducedBody
     ports: tuple[Port, Port]
-    law: ContactLaw
+    law: ContactLaw | RubbingLaw
     local: LocalLaw | None
     pattern_force: float
+    static: StaticContact | RubbingContact
+    rubbing: RubbingFit | None = None
 
 
 def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
@@ -169,7 +186,8 @@ def reduce_pair(
     recovery : bool
         Keep the displacement of all named surfaces.
     """
-    force = 0.7 * problem.static.max_force
+    static = _static(problem, correction)
+    force = 0.7 * static.max_force
     for _ in range(_PATTERN_ROUNDS):
         with trial() as caught:
             pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
@@ -177,7 +195,7 @@ def reduce_pair(
                 np.max(simulate_bodies(problem.case, pair.upper, pair.lower, pair.law).peak_force)
             )
         settled = abs(peak - force) <= 0.02 * force
-        force = min(peak, problem.static.max_force)
+        force = min(peak, static.max_force)
         if settled or not force > 0:
             break
     show(caught)
@@ -193,7 +211,8 @@ def _reduce_at(
     stiffness: float,
     recovery: bool,
 ) -> ReducedPair:
-    load_upper, load_lower = problem.static.load_patterns(force)
+    static = _static(problem, correction)
+    load_upper, load_lower = static.load_patterns(force)
     ports = (Port(PORT, load_upper), Port(PORT, -load_lower))
     bodies = (problem.pair.upper, problem.pair.lower)
     flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
@@ -211,9 +230,72 @@ def _reduce_at(
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )
     law, local = _law(problem, correction, upper, lower, stiffness)
+    fit = None
+    if isinstance(static, RubbingContact) and local is not None:
+        fit = _fitted(static, local)
     return ReducedPair(
-        upper=upper, lower=lower, ports=ports, law=law, local=local, pattern_force=force
+        upper=upper,
+        lower=lower,
+        ports=ports,
+        law=law if fit is None else fit.law,
+        local=local,
+        pattern_force=force,
+        static=static,
+        rubbing=fit,
     )
+
+
+def _fitted(rubbing: RubbingContact, local: LocalLaw) -> RubbingFit:
+    fit = rubbing_fit(local, rubbing.loops)
+    if fit.error > _FAIR_LOOP:
+        warnings.warn(
+            f"contact.friction: the law of the reduced level loses {100 * fit.error:.2g} % of its "
+            f"work more or less than the full bodies, which lose {100 * fit.loss:.2g} %. Keep "
+            "fewer modes, or take the interface level.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return fit
+
+
+def friction_doubt(case: Case, *, has_memory: bool) -> str:
+    """Doubt about a model of a case that has not all of its friction; else empty.
+
+    Parameters
+    ----------
+    case : Case
+    has_memory : bool
+        Its law closes and opens on two curves.
+    """
+    faces = case.contact.faces
+    if faces.is_none:
+        return ""
+    if not has_memory:
+        left = (
+            f"friction {faces.kinetic:g}" if faces.kinetic else f"static_friction {faces.static:g}"
+        )
+        return (
+            f"it leaves out contact.{left}: only the consistent local law has "
+            "friction. Try: level interface."
+        )
+    if not faces.is_constant:
+        return (
+            f"its law takes contact.friction {faces.kinetic:g} at every speed of slip and leaves "
+            f"out static_friction {faces.static:g}. Try: level interface."
+        )
+    return ""
+
+
+def _rubs(case: Case, correction: Correction) -> bool:
+    law = case.contact.local_law
+    is_consistent = isinstance(law, ConsistentLocalLaw) and correction == "consistent"
+    return is_consistent and case.contact.faces.kinetic > 0.0
+
+
+def _static(problem: ContactProblem, correction: Correction) -> StaticContact | RubbingContact:
+    """Static contact with the friction that the law will have."""
+    rubbing = problem.rubbing if _rubs(problem.case, correction) else None
+    return problem.static if rubbing is None else rubbing
 
 
 def _law(
@@ -231,7 +313,8 @@ def _law(
     if isinstance(asked, SubmodelLocalLaw) or correction != "consistent":
         return LinearLaw(stiffness), None
     modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
-    local = consistent_law(problem.static, modal)
+    static = _static(problem, correction)
+    local = consistent_law(static if isinstance(static, StaticContact) else static.closing, modal)
     return local.law, local
 
 
@@ -256,7 +339,7 @@ def impact_system(
     case: Case,
     upper: ReducedBody,
     lower: ReducedBody,
-    law: ContactLaw,
+    law: ContactLaw | RubbingLaw,
     *,
     ports: tuple[str, str] = (PORT, PORT),
     series_compliance: float = 0.0,
@@ -296,7 +379,7 @@ def impact_system(
 
 
 def simulate_bodies(
-    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw
+    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw | RubbingLaw
 ) -> ImpactHistory:
     """Impact of two reduced bodies, as the case starts it."""
     return simulate_impact(
@@ -320,7 +403,7 @@ def static_curve(pair: ReducedPair) -> tuple[NDArray[np.float64], NDArray[np.flo
     return indentation, pair.law.force(indentation)
 
 
-def _indentation_at(law: ContactLaw, force: float) -> float:
+def _indentation_at(law: ContactLaw | RubbingLaw, force: float) -> float:
     upper = 1e-9
     while float(law.force(upper)) < force:
         upper *= 1.3

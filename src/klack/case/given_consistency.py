@@ -78,6 +78,13 @@ def check_given(case: ImpactSections) -> None:
             on_key=True,
         )
     _check_law(case, name, what)
+    if not case.contact.faces.is_none:
+        raise CaseProblem(
+            ("contact", "friction" if case.contact.friction else "static_friction"),
+            got=f"friction with '{name}', {what}",
+            expected="no friction: without a surface nothing is known of its slip",
+            hint="leave it out, or give the body a mesh.",
+        )
     for i, level in enumerate(case.run.levels):
         if level not in GIVEN_LEVELS:
             raise CaseProblem(

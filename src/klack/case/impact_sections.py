@@ -297,6 +297,11 @@ class ImpactSections(CaseFile):
         """2 if both bodies are axisymmetric, else 3."""
         return self.moving_body.geometry.dimension
 
+    def without_friction(self) -> Self:
+        """The same with smooth faces."""
+        smooth = {"friction": 0.0, "static_friction": None, "stribeck_speed": 0.0}
+        return self.model_copy(update={"contact": self.contact.model_copy(update=smooth)})
+
     @property
     def has_surfaces(self) -> bool:
         """False where a body is a reduced model or nodes alone; see :class:`CaseBody`."""

@@ -35,6 +35,7 @@ __all__ = [
     "ReachError",
     "StaticContact",
     "check_rim",
+    "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
     "points_across",
@@ -82,25 +83,44 @@ def contact_compliance(
             csr_array(vstack([rows[0], faces.T_a])),
             csr_array(vstack([rows[1], faces.T_b])),
         )
-    _require_memory(space, *rows)
+    return condensed_compliance(*rows, flexibility_a, flexibility_b)
+
+
+def condensed_compliance(
+    rows_a: csr_array, rows_b: csr_array, flexibility_a: Flexibility, flexibility_b: Flexibility
+) -> NDArray[np.float64]:
+    """Static compliance of both bodies at rows that act on both, gaps or offsets of their faces.
+
+    Parameters
+    ----------
+    rows_a, rows_b : sparse array, shape (n, dofs of a), (n, dofs of b) [-]
+    flexibility_a, flexibility_b : Flexibility
+
+    Returns
+    -------
+    array, shape (n, n) [m/N]
+        Symmetric.
+    """
+    _require_memory(rows_a, rows_b)
     return _remembered_compliance(
         flexibility_a,
         flexibility_b,
-        rows,
-        lambda: flexibility_a.condensed(rows[0]) + flexibility_b.condensed(rows[1]),
+        (rows_a, rows_b),
+        lambda: flexibility_a.condensed(rows_a) + flexibility_b.condensed(rows_b),
     )
 
 
-def _require_memory(space: ContactSpace, *rows: csr_array) -> None:
-    """Refuse more points than fit: the compliance, its symmetric part and a factor of it.
+def _require_memory(rows_a: csr_array, rows_b: csr_array) -> None:
+    """Refuse more rows than fit: the compliance, its symmetric part and a factor of it.
 
     And what condensing the larger body to them takes.
     """
-    condensing = max(condensation_memory(*G.shape) for G in rows)
+    condensing = max(condensation_memory(*rows.shape) for rows in (rows_a, rows_b))
+    count = rows_a.shape[0]
     require_memory(
         "contact compliance",
-        4 * 8.0 * float(rows[0].shape[0]) ** 2 + condensing,
-        what=f"a full matrix of {space.count} contact points",
+        4 * 8.0 * count**2 + condensing,
+        what=f"a full matrix of {count} contact points",
         hint="larger elements on the two surfaces, or a smaller contact.reach.",
     )
 

@@ -24,7 +24,8 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     Warns
     -----
     AccuracyWarning
-        If the case has a guide or an upper stop, which only the interface level supports.
+        If the case has a guide or an upper stop, which only the interface level supports, or
+        friction of the faces.
     """
     if case.dimension != 3:
         raise InputError(
@@ -39,6 +40,13 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
         warnings.warn(
             f"left out of the deck, as in the full order: {', '.join(left_out)}. Try: compare with "
             "the level 'full'.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    if not case.contact.faces.is_none:
+        warnings.warn(
+            f"left out of the deck: contact.friction {case.contact.faces.static:g}. Try: compare with "
+            "the level 'full' of the case without friction.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -1,5 +1,6 @@
 """The models of a case that can leave klack: its reduced bodies, and the pair with its contacts."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -13,7 +14,7 @@ from klack.assembling.valve import build_valve
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_meetings, find_roles
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.exchange.modal_model import ModalModel, Provenance, body_model, choose_body, pair_model
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mesh.mesh import Mesh
@@ -64,11 +65,17 @@ def case_models(
     ------
     InputError
         For bodies that cannot be built, or a valve without end stops.
+
+    Warns
+    -----
+    AccuracyWarning
+        For friction of the faces, which exported models leave out.
     """
     if isinstance(case, ValveCase):
         return _of_valve(case, progress, threads)
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
+    case = _frictionless(case)
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)
@@ -94,6 +101,19 @@ def case_models(
         provenance=provenance,
         step=case.run.reduced_step,
     )
+
+
+def _frictionless(case: Case) -> Case:
+    """The case as exported models can have it: their laws have no memory."""
+    if case.contact.faces.is_none:
+        return case
+    warnings.warn(
+        f"the exported pair leaves out contact.friction {case.contact.faces.static:g}: its law closes "
+        "and opens on one curve. Try: klack impact, whose reduced level has the loss.",
+        AccuracyWarning,
+        stacklevel=3,
+    )
+    return case.without_friction()
 
 
 def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels:

@@ -18,9 +18,10 @@ A slipping point has the force :math:`\mu \lambda_n` along :math:`e = \tau / |\t
     D = a\, \frac{|\tau| - \mu \lambda_n}{\mu \lambda_n} ,
 
 which is what turns its direction: directions that are iterated by :math:`\tau` alone take hundreds
-of rounds.  A point that would slip against the force it has sticks for one round: faces that turn round
-as a whole would else turn round again in the next one.  Two to four rounds from the solution of the step before.  Where they do not end, the
-points take turns (projected Gauss-Seidel), each with its own three equations.
+of rounds.  A point that would slip against the force it has sticks for one round: faces that turn
+round as a whole would else turn round again in the next one.  Two to four rounds from the solution
+of the step before.  Where they do not end, the points take turns (projected Gauss-Seidel), each
+with its own three equations.
 
 Friction makes the matrix unsymmetric; for a large coefficient on an eccentric body a solution may
 not be unique (jam).

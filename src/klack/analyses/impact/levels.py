@@ -8,7 +8,7 @@ from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.record import LevelResult, ModalEnergy, PressureRecord
 from klack.analyses.impact.trust import doubts_of
 from klack.assembling.problem import ContactProblem
-from klack.assembling.reduced_pair import PORT, ReducedPair, simulate_bodies
+from klack.assembling.reduced_pair import PORT, ReducedPair, friction_doubt, simulate_bodies
 from klack.case.schema import (
     Case,
 )
@@ -29,13 +29,13 @@ __all__ = ["deviations", "level_result", "lumped_level", "run_lumped", "run_redu
 def run_reduced(
     case: Case, pair: ReducedPair, *, level: str, label: str, setup_time: float
 ) -> LevelResult:
-    """Impact of two reduced bodies."""
+    """Impact of two reduced bodies, with a doubt where their law leaves out friction."""
     bodies = pair.upper, pair.lower, pair.law
     simulate_bodies(case, *bodies)  # compiles, so that the time below is that of the run
     begin = perf_counter()
     history = simulate_bodies(case, *bodies)
     wall_time = perf_counter() - begin
-    return level_result(
+    result = level_result(
         history,
         level=level,
         label=label,
@@ -44,6 +44,11 @@ def run_reduced(
         wall_time=wall_time,
         setup_time=setup_time,
     )
+    return _doubted(result, friction_doubt(case, has_memory=pair.rubbing is not None))
+
+
+def _doubted(result: LevelResult, doubt: str) -> LevelResult:
+    return replace(result, doubts=(*result.doubts, doubt)) if doubt else result
 
 
 def run_lumped(problem: ContactProblem) -> LevelResult:
@@ -69,7 +74,7 @@ def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
         law = HuntCrossley(LinearLaw(case.lumped.stiffness), alpha / case.motion.speed)
     begin = perf_counter()
     history = simulate_bodies(case, bodies[0], bodies[1], law)
-    return level_result(
+    result = level_result(
         history,
         level="lumped",
         label=f"lumped: rigid masses, {case.lumped.stiffness / 1e6:.4g} N/um",
@@ -78,6 +83,7 @@ def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
         wall_time=perf_counter() - begin,
         setup_time=0.0,
     )
+    return _doubted(result, friction_doubt(case, has_memory=False))
 
 
 def level_result(

@@ -464,6 +464,8 @@ _CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none":
 
 
 def _law_words(pair: ReducedPair) -> str:
+    if pair.rubbing is not None:
+        return f"consistent law with friction (losses within {100 * pair.rubbing.error:.2g} %)"
     if pair.local is not None:
         return "consistent law"
     if isinstance(pair.law, LinearLaw):

@@ -130,9 +130,8 @@ def recovered_motion(
                 duration=steps * step,
             )
             q, v, force = record.final_position, record.final_velocity, float(record.force[-1, 0])
-        loads = problem.static.load_patterns(
-            float(np.clip(force, _LEAST * problem.static.max_force, problem.static.max_force))
-        )
+        highest = pair.static.max_force
+        loads = pair.static.load_patterns(float(np.clip(force, _LEAST * highest, highest)))
         yield (
             steps * step,
             tuple(
