@@ -45,8 +45,8 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
         )
     if not case.contact.faces.is_none:
         warnings.warn(
-            f"left out of the deck: contact.friction {case.contact.faces.static:g}. Try: compare with "
-            "the level 'full' of the case without friction.",
+            f"left out of the deck: contact.friction {case.contact.faces.static:g}. Try: compare "
+            "with the level 'full' of the case without friction.",
             AccuracyWarning,
             stacklevel=2,
         )

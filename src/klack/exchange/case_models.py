@@ -108,8 +108,8 @@ def _frictionless(case: Case) -> Case:
     if case.contact.faces.is_none:
         return case
     warnings.warn(
-        f"the exported pair leaves out contact.friction {case.contact.faces.static:g}: its law closes "
-        "and opens on one curve. Try: klack impact, whose reduced level has the loss.",
+        f"the exported pair leaves out contact.friction {case.contact.faces.static:g}: its law "
+        "closes and opens on one curve. Try: klack impact, whose reduced level has the loss.",
         AccuracyWarning,
         stacklevel=3,
     )
