@@ -168,7 +168,7 @@ def test_the_law_has_the_loops_of_the_bodies(seat, share):
     for loop in contact.loops:
         path = np.append(0.0, loop.approach - modal * loop.force)
         apart = fit.law.along(path)[1:] - loop.force
-        assert np.abs(apart).max() < 0.025 * loop.force[0]
+        assert np.abs(apart).max() < (0.03 if share > 0.4 else 0.01) * loop.force[0]
 
 
 def test_faces_that_lock_are_refused():

@@ -244,6 +244,13 @@ def test_a_guide_is_left_out_with_a_note():
         calculix_impact(case.model_copy(update={"guide": guide}), silent)
 
 
+def test_friction_is_left_out_with_a_note():
+    case = load_case(find_case("witness"))
+    rough = case.contact.model_copy(update={"friction": 0.1})
+    with pytest.warns(AccuracyWarning, match=r"left out of the deck: contact\.friction 0\.1"):
+        calculix_impact(case.model_copy(update={"contact": rough}), silent)
+
+
 def test_the_witness_case_becomes_a_deck(tmp_path):
     case = load_case(find_case("witness"))
     bodies = calculix_impact(case, silent)
