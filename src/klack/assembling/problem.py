@@ -1,5 +1,6 @@
 """Bodies of a case in their places, and the contact problem of one impact, for all levels."""
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,8 +20,14 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
+from klack.errors import AccuracyWarning, ConvergenceError
 from klack.progress import Progress, remark
-from klack.transient.rubbing_ladder import RubbingContact, TangentialRows, rubbing_contact
+from klack.transient.rubbing_ladder import (
+    LockedError,
+    RubbingContact,
+    TangentialRows,
+    rubbing_contact,
+)
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
@@ -89,6 +96,12 @@ class ContactProblem(PlacedBodies):
         """Static contact with the friction of the case; None without friction.
 
         It takes the static solutions: first used before :meth:`close`.
+
+        Warns
+        -----
+        AccuracyWarning
+            Where no such contact is found, and the law of the reduced level stays smooth: other
+            levels have no need of it.
         """
         friction = self.case.contact.faces.kinetic
         if friction == 0.0:
@@ -105,7 +118,15 @@ class ContactProblem(PlacedBodies):
             self.flexibility_lower,
         )
         rows = TangentialRows(T_a=T_a, T_b=T_b, axial=T_a @ up.ravel())
-        return rubbing_contact(self.static, rows, C, friction)
+        try:
+            return rubbing_contact(self.static, rows, C, friction)
+        except (LockedError, ReachError, ConvergenceError) as error:
+            warnings.warn(
+                f"the reduced level leaves out contact.friction {friction:g}: {error}",
+                AccuracyWarning,
+                stacklevel=2,
+            )
+            return None
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
         """Contact points of the same surfaces with twice the reach.

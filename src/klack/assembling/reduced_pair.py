@@ -245,8 +245,17 @@ def _reduce_at(
     )
 
 
-def _fitted(rubbing: RubbingContact, local: LocalLaw) -> RubbingFit:
-    fit = rubbing_fit(local, rubbing.loops)
+def _fitted(rubbing: RubbingContact, local: LocalLaw) -> RubbingFit | None:
+    """Law with memory; None where none has loops like these, with a warning."""
+    try:
+        fit = rubbing_fit(local, rubbing.loops)
+    except InputError as error:
+        warnings.warn(
+            f"the reduced level leaves out the loss of contact.friction: {error}",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return None
     if fit.error > _FAIR_LOOP:
         warnings.warn(
             f"contact.friction: the law of the reduced level loses {100 * fit.error:.2g} % of its "

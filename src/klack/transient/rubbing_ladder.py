@@ -32,7 +32,7 @@ from klack.contact.statics import StaticContact, check_rim
 from klack.errors import ConvergenceError, InputError
 from klack.transient.rubbing import solve_rubbing
 
-__all__ = ["RubbingContact", "TangentialRows", "rubbing_contact"]
+__all__ = ["LockedError", "RubbingContact", "TangentialRows", "rubbing_contact"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -42,6 +42,10 @@ TURNS = (0.5, 0.75, 1.0)
 
 _LEFT = 1e-9  # residual of the law over the highest force
 _PULL = 1e-6  # force over the highest one below which the contact is pulled apart
+
+
+class LockedError(InputError):
+    """Friction holds the faces together: they do not part by themselves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,9 +136,9 @@ def rubbing_contact(
 
     Raises
     ------
-    InputError
-        Where the faces lock: friction holds the contact together; where the contact grows to the
-        rim of its candidates.
+    LockedError
+    ReachError
+        Where the contact grows to the rim of its candidates.
     ConvergenceError
     """
     state = _State(static, rows, C, friction)
@@ -171,12 +175,12 @@ def _opened(state: "_State", approach: float, count: int, friction: float) -> tu
         state.move(at)
         force.append(state.force)
     if min(force) < -_PULL * force[0]:
-        raise InputError(
+        raise LockedError(
             "contact.friction",
             got=f"{friction:g}: the faces lock, it takes {-min(force):.3g} N to part them after "
             f"{force[0]:.3g} N",
             expected="less than the slope of the faces, so that they part by themselves",
-            hint="lower the coefficient, or compute level full, which has no local law.",
+            hint="lower the coefficient, or take levels without a local law: interface and full.",
         )
     return down, np.array(force)
 
