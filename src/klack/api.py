@@ -543,18 +543,16 @@ def sensitivities(
     InputError
         For a parameter or a measure that has no derivative.
     """
-    from klack.analyses.sensitivities.any_case import run_any_sensitivities
+    from klack.analyses.sensitivities.any_case import sensitivities_of
     from klack.case.study_source import study_if_any
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
-    return run_any_sensitivities(
+    return sensitivities_of(given.checked, variant, level)(
         given.checked,
         given.tree,
         study_if_any(given.checked, given.tree, None if study is None else Path(study)),
         parameters=parameters,
         measures=measures,
-        variant=variant,
-        level=level,
         check=check,
         progress=progress,
     )

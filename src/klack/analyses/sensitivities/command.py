@@ -57,7 +57,7 @@ def sensitivities(
 
     with show_progress(wanted.quiet):
         from klack.analyses.sensitivities.analysis import SENSITIVITIES
-        from klack.analyses.sensitivities.any_case import run_any_sensitivities
+        from klack.analyses.sensitivities.any_case import sensitivities_of
         from klack.case.case_tree import read_case_tree
         from klack.case.shipped import find_case
         from klack.case.study_source import study_if_any
@@ -65,14 +65,12 @@ def sensitivities(
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.any_case()
     with show_progress(wanted.quiet) as progress:
-        record = run_any_sensitivities(
+        record = sensitivities_of(checked, variant, level)(
             checked,
             tree,
             study_if_any(checked, tree, study),
             parameters=parameter or (),
             measures=measure or (),
-            variant=variant,
-            level=level,
             check=check,
             threads=wanted.threads,
             progress=progress,

@@ -14,17 +14,17 @@ this is told.
 """
 
 from collections.abc import Sequence
-from math import isfinite, sqrt
+from math import isfinite
 from time import perf_counter, process_time
 
 from klack.analyses.point_table import PointTable
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.sensitivities.asked_measures import asked_measures
 from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
 from klack.analyses.sensitivities.record import (
     HOLDS,
     MeasureSlopes,
     SensitivityRecord,
-    SlopeParameter,
 )
 from klack.analyses.study.impact_measures import impact_measures
 from klack.analyses.study.kinds import kind_of
@@ -77,17 +77,11 @@ def run_differences(
     """
     begin = perf_counter()
     space = slope_space(case, source, parameters)
-    wanted = list(measures)
-    if not wanted and source is not None:
-        wanted = list(dict.fromkeys((*source.study.measures, *source.study.constraints)))
-    chosen = impact_measures(case, wanted or _USUAL)
+    chosen = impact_measures(case, asked_measures(source, measures) or _USUAL)
     kind = kind_of(case)
     asked = level or (kind.asked_variant(source.study) if source is not None else None)
     shifts = [{item.name: way * _CHANGE * item.size} for item in space.varied for way in _WAYS]
-    together = [
-        {item.name: way * (-1.0) ** k * _CHANGE * item.size for k, item in enumerate(space.varied)}
-        for way in (1.0, -1.0)
-    ]
+    together = [space.together(way * _CHANGE) for way in (1.0, -1.0)]
     points = [space.written(shift) for shift in ({}, *shifts, *(together if check else ()))]
     clock = StageClock(progress)
     spent = process_time()
@@ -123,10 +117,7 @@ def run_differences(
         **case_fields(case),
         **run_fields(begin, clock),
         variant=table.variant,
-        parameters=tuple(
-            SlopeParameter(name=item.name, unit=item.unit, value=item.value)
-            for item in space.varied
-        ),
+        parameters=space.described,
         measures=found,
         impacts=(),
         share=_CHANGE if check else 0.0,
@@ -161,8 +152,7 @@ def _slopes(
                 f"The derivative of {name} with {item.name} is {near:.4g} by changes of "
                 f"{_CHANGE:.0%} and {far:.4g} by twice as much: it tells little."
             )
-    signed = [(-1.0) ** k * _CHANGE * item.size for k, item in enumerate(space.varied)]
-    parts = [s * x for s, x in zip(signed, slopes, strict=True) if x is not None]
+    predicted, scale = space.change_together(_CHANGE, slopes)
     secant = 0.5 * (values[-2] - values[-1]) if check else float("nan")
     return MeasureSlopes(
         name=name,
@@ -170,8 +160,8 @@ def _slopes(
         unit=unit,
         value=values[0] if isfinite(values[0]) else None,
         slopes=tuple(slopes),
-        predicted=sum(parts) if len(parts) == len(slopes) else None,
+        predicted=predicted,
         secant=secant if isfinite(secant) else None,
-        scale=sqrt(sum(part * part for part in parts)),
+        scale=scale,
         resolution=resolution,
     )

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 
+from klack.analyses.sensitivities.record import SlopeParameter
 from klack.analyses.study.parameters import unit_of, written
 from klack.analyses.study.points import Linked, Space, Values, space_of
 from klack.analyses.study.strokes import STROKES
@@ -72,6 +74,43 @@ class SlopeSpace:
     kinds: Mapping[str, Kind | None]
     space: Space
     skipped: tuple[str, ...] = ()
+
+    @property
+    def described(self) -> tuple[SlopeParameter, ...]:
+        """Parameters as a record lists them."""
+        return tuple(
+            SlopeParameter(name=item.name, unit=item.unit, value=item.value) for item in self.varied
+        )
+
+    def together(self, share: float) -> dict[str, float]:
+        """Shifts [SI] of all parameters by a share of their sizes, with + and - in turn.
+
+        Alternating: what two parameters of equal kind do must not only add up.
+        """
+        return {item.name: share * (-1.0) ** k * item.size for k, item in enumerate(self.varied)}
+
+    def change_together(
+        self, share: float, slopes: Sequence[float | None]
+    ) -> tuple[float | None, float]:
+        """Change of a measure under :meth:`together`, by its slopes, and the scale of its parts.
+
+        Parameters
+        ----------
+        share : float
+        slopes : sequence of float or None
+            With each parameter, per its unit.
+
+        Returns
+        -------
+        predicted : float or None
+            None where a slope is missing.
+        scale : float
+            Root of the sum of the squares of the parts.
+        """
+        shifts = self.together(share).values()
+        parts = [x * slope for x, slope in zip(shifts, slopes, strict=True) if slope is not None]
+        predicted = sum(parts) if len(parts) == len(slopes) else None
+        return predicted, sqrt(sum(part * part for part in parts))
 
     def at(self, values: Values) -> "SlopeSpace":
         """The same about another point: values [SI] of all parameters of the study."""

@@ -6,13 +6,13 @@ from math import inf, sqrt
 from time import perf_counter, process_time
 
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.sensitivities.asked_measures import asked_measures
 from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
 from klack.analyses.sensitivities.record import (
     HOLDS,
     ImpactSlope,
     MeasureSlopes,
     SensitivityRecord,
-    SlopeParameter,
 )
 from klack.analyses.sensitivities.slopes import TIMES, SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
@@ -101,10 +101,7 @@ def run_sensitivities(
         **case_fields(case),
         **run_fields(begin, clock),
         variant=name,
-        parameters=tuple(
-            SlopeParameter(name=item.name, unit=item.unit, value=item.value)
-            for item in space.varied
-        ),
+        parameters=space.described,
         measures=found,
         impacts=impacts,
         share=_SHARE if others is not None else 0.0,
@@ -123,9 +120,7 @@ def run_sensitivities(
 def _measures(
     case: ValveCase, source: StudySource | None, names: Sequence[str]
 ) -> tuple[ChosenMeasure, ...]:
-    wanted = list(names)
-    if not wanted and source is not None:
-        wanted = list(dict.fromkeys((*source.study.measures, *source.study.constraints)))
+    wanted = list(asked_measures(source, names))
     if not wanted:
         roles = find_roles(case)
         stops = [stop for stop in (roles.opening_stop, roles.seat) if stop]
@@ -161,8 +156,7 @@ def _left_out(
         )
     if source is not None and not names:
         known = {item.name for item in chosen}
-        every = dict.fromkeys((*source.study.measures, *source.study.constraints))
-        left = [name for name in every if name not in known]
+        left = [name for name in asked_measures(source) if name not in known]
         if left:
             found.append(
                 f"No derivatives of {one_of(left)}: only times, impacts, and energies and levels "
@@ -195,22 +189,12 @@ def _others_of(runner: SlopeRunner) -> tuple[_Others | None, tuple[str, ...]]:
     """
     found = []
     begin = process_time()
-    signs = _signs(len(runner.space.varied))
     for way in (0.0, 1.0, -1.0):
-        shifts = {
-            item.name: way * sign * _SHARE * item.size
-            for item, sign in zip(runner.space.varied, signs, strict=True)
-        }
         try:
-            found.append(runner.stroke(shifts))
+            found.append(runner.stroke(runner.space.together(way * _SHARE)))
         except (InputError, ConvergenceError) as error:
             return None, (f"The derivatives were not checked by other strokes: {error}",)
     return _Others((process_time() - begin) / len(found), *found), ()
-
-
-def _signs(count: int) -> tuple[float, ...]:
-    """Alternating: what two parameters of equal kind do must not only add up."""
-    return tuple(1.0 if k % 2 == 0 else -1.0 for k in range(count))
 
 
 def _checked(
@@ -221,12 +205,7 @@ def _checked(
     step: float,
 ) -> MeasureSlopes:
     value, found = slopes
-    parts = [
-        sign * _SHARE * parameter.size * slope
-        for sign, parameter, slope in zip(_signs(len(found)), space.varied, found, strict=True)
-        if slope is not None
-    ]
-    predicted = sum(parts) if len(parts) == len(found) else None
+    predicted, scale = space.change_together(_SHARE, found)
     secant, again = None, value
     if others is not None:
         plus, minus = measured(item, others.plus), measured(item, others.minus)
@@ -245,7 +224,7 @@ def _checked(
         slopes=found,
         predicted=predicted,
         secant=secant,
-        scale=sqrt(sum(part * part for part in parts)),
+        scale=scale,
         resolution=resolution,
         strayed=0.0 if value is None or again is None else abs(value - again),
     )
@@ -258,7 +237,6 @@ def _impacts(
 ) -> tuple[ImpactSlope, ...]:
     """Impacts that kept their phase, with the growth of their derivatives."""
     found, counts = list[ImpactSlope](), dict[str, int]()
-    signs = _signs(len(space.varied))
     for place, touch in enumerate(runs[0].touches):
         number = counts[touch.stop] = counts.get(touch.stop, 0) + 1
         slopes = [
@@ -272,11 +250,11 @@ def _impacts(
         deviation, is_doubtful = None, growth > max(_GROWN * largest, touch.time)
         if others is not None:
             ends = (others.plus.variant, others.minus.variant)
-            times = [_touch_time(end, touch.stop, number) for end in ends]
-            if times[0] is not None and times[1] is not None and growth > 0.0:
-                predicted = sum(s * _SHARE * part for s, part in zip(signs, parts, strict=True))
-                missed = abs(0.5 * (times[0] - times[1]) - predicted)
-                deviation = missed / (_SHARE * growth)
+            plus, minus = (_touch_time(end, touch.stop, number) for end in ends)
+            predicted, scale = space.change_together(_SHARE, slopes)
+            if plus is not None and minus is not None and predicted is not None and scale > 0.0:
+                missed = abs(0.5 * (plus - minus) - predicted)
+                deviation = missed / scale
                 is_doubtful = deviation > HOLDS and missed > runs[0].sizes.step
         found.append(
             ImpactSlope(
