@@ -144,8 +144,7 @@ def test_coulomb_friction_brakes_by_mu_n_over_m(needle):
     half = move(needle, guide, [0] * 6, time, speed=0.5, step=50e-9)
     rest = move(needle, guide, [0] * 6, 1.5 * 0.5 / braking, speed=0.5, step=50e-9)
 
-    # the first step has no force at its start: one step in 750
-    assert half.motion.velocity[-1, 2] == pytest.approx(-0.25, rel=2e-3)
+    assert half.motion.velocity[-1, 2] == pytest.approx(-0.25, rel=1e-3)
     assert abs(rest.motion.velocity[-1, 2]) < 1e-9
     assert rest.motion.position[-1, 2] == pytest.approx(-0.5 * 0.5**2 / braking, rel=3e-3)
     for run in (half, rest):
@@ -156,15 +155,15 @@ def test_friction_stops_the_shaft_and_does_not_turn_it_round(needle):
     """In steps of 5 us, each of which would take 33 mm/s from it."""
     guide = squeezed(needle, 0.2)
 
-    # the squeezed springs hold 15 times m v^2/2 from the start; the guide's books give it out
-    with allowed("simulate_interface", 16.0):
+    # the squeezed springs hold 17 times m v^2/2, and sway a little in such steps
+    with allowed("simulate_interface", 1e-2):
         run = move(needle, guide, [0] * 6, 150e-6, speed=0.1, step=5e-6)
 
     assert abs(run.energy.residual) < 1e-12
     speed = run.history.velocity_a
     assert np.all(np.diff(speed) >= 0.0)
     assert speed[-1] == pytest.approx(0.0, abs=1e-9)
-    assert run.energy.guide == pytest.approx(0.5 * MASS * 0.01 - run.energy.final, abs=1e-12)
+    assert run.energy.guide == pytest.approx(run.energy.initial - run.energy.final, abs=1e-12)
 
 
 def test_friction_needs_a_side_force(needle):

@@ -299,8 +299,22 @@ class _Run:
         self.v[: self.rigid_count] = self.coordinates(motion)
         # the spring counts from q = 0 in the kernel
         self.constant += self.spring * self.start_lift
+        self.press()
         self.start_energy = self.energy()
         self.keep_motion()
+
+    def press(self) -> None:
+        """Let the bore hold a shaft that is placed against it."""
+        for k in range(len(self.bore.clearance)):
+            place, C = self.bore.offset[k] + self.bore.traces[k] @ self.q, self.bore.compliance[k]
+            distance = float(np.hypot(*place))
+            if distance > self.bore.clearance[k]:
+                n = place / distance
+                self.state.guide_force[k] = -(distance - self.bore.clearance[k]) / (n @ C @ n) * n
+        held = np.einsum(
+            "kc,kcd,kd", self.state.guide_force, self.bore.compliance, self.state.guide_force
+        )
+        self.books[GUIDE_STRAIN] = 0.5 * float(held)
 
     def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rigid modal coordinates of a translation and rotation vector."""
