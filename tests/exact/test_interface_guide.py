@@ -144,9 +144,9 @@ def test_coulomb_friction_brakes_by_mu_n_over_m(needle):
     half = move(needle, guide, [0] * 6, time, speed=0.5, step=50e-9)
     rest = move(needle, guide, [0] * 6, 1.5 * 0.5 / braking, speed=0.5, step=50e-9)
 
-    assert half.motion.velocity[-1, 2] == pytest.approx(-0.25, rel=1e-3)
+    assert half.motion.velocity[-1, 2] == pytest.approx(-0.25, rel=1e-5)
     assert abs(rest.motion.velocity[-1, 2]) < 1e-9
-    assert rest.motion.position[-1, 2] == pytest.approx(-0.5 * 0.5**2 / braking, rel=3e-3)
+    assert rest.motion.position[-1, 2] == pytest.approx(-0.5 * 0.5**2 / braking, rel=1e-5)
     for run in (half, rest):
         assert run.energy.residual == pytest.approx(0.0, abs=1e-12)
 
@@ -163,7 +163,10 @@ def test_friction_stops_the_shaft_and_does_not_turn_it_round(needle):
     speed = run.history.velocity_a
     assert np.all(np.diff(speed) >= 0.0)
     assert speed[-1] == pytest.approx(0.0, abs=1e-9)
-    assert run.energy.guide == pytest.approx(run.energy.initial - run.energy.final, abs=1e-12)
+    with allowed("simulate_interface", 1e300):  # nothing but the walls, swaying
+        smooth = move(needle, squeezed(needle, 0.0), [0] * 6, 150e-6, step=5e-6)
+    lost = run.energy.guide - smooth.energy.guide
+    assert lost == pytest.approx(0.5 * MASS * 0.01, rel=1e-9)
 
 
 def test_friction_needs_a_side_force(needle):
@@ -318,6 +321,8 @@ def test_sections_move_as_the_axis_does(shaft):
     np.testing.assert_allclose(guide.heights, (6e-3, 18e-3), rtol=1e-12)
     np.testing.assert_allclose(guide.traces @ q, expected[:, :2], rtol=1e-6)
     np.testing.assert_allclose(guide.slide @ q, expected[:, 2], rtol=1e-6)
+    np.testing.assert_allclose(guide.turn @ q, [turn, turn], rtol=1e-6)
+    np.testing.assert_allclose(guide.radius, RADIUS, rtol=1e-9)
 
 
 def test_a_shaft_that_leans_off_its_axis_is_found_where_it_is(shaft):

@@ -31,7 +31,7 @@ GuideLaw = Annotated[ConsistentGuideLaw | LinearGuideLaw, Field(discriminator="k
 
 
 class CaseGuide(Section):
-    """Radial clearance contact of the shaft at two heights or more, and axial friction there."""
+    """Radial clearance contact of the shaft at two heights or more, and friction there."""
 
     surface: Name = Field(description="Surface of the moving body in the guide.")
     heights: tuple[Length, ...] = Field(
@@ -46,7 +46,9 @@ class CaseGuide(Section):
         default=ConsistentGuideLaw(kind="consistent"),
         description="Force against penetration of the bore: consistent or linear.",
     )
-    friction: Ratio = Field(default=0.0, ge=0, le=2, description="Coulomb's coefficient.")
+    friction: Ratio = Field(
+        default=0.0, ge=0, le=2, description="Coulomb's coefficient, along the shaft and around it."
+    )
     viscous: DampingCoefficient = Field(
         default=0.0, ge=0, description="Axial friction per speed, of the film in the guide."
     )

@@ -8,15 +8,16 @@ bore pushes it back towards the axis,
 with the lateral displacement *x* of the shaft section (mean over a ring of nodes, which has the
 same weights as the force) and the compliance :math:`k^{-1}` that the modes do not have: of the
 bore, and, for the consistent law, of the shaft itself (static flexibility less that of the kept
-modes).  Along the axis the bore brakes: Coulomb friction :math:`\mu N` against the direction of
-sliding, faded out below a small speed, and viscous drag.
+modes).  Coulomb friction of at most :math:`\mu N` acts on the rim of the shaft, along the axis and
+around it, against its slip (:mod:`klack.transient.guide_friction`); it turns and tilts the shaft as
+well.  Viscous drag brakes it along the axis.
 
-Limits: the bore does not move; friction acts along the axis only; no fluid film in the guide.
+Limits: the bore does not move; drag acts along the axis only; no fluid film in the guide.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,10 @@ class Guide:
         Displacement of the section along x and y per unit modal coordinate.
     slide : array, shape (k, M) [1/sqrt(kg)]
         The same along z.
+    turn : array, shape (k, 3, M) [1/(m sqrt(kg))]
+        Rotation of the section about x, y, z per unit modal coordinate.
+    radius : array, shape (k,) [m]
+        Of the shaft.
     compliance : array, shape (k, 2, 2) [m/N]
         Of bore and shaft, without that of the kept modes.
     friction : array, shape (k,) [-]
@@ -63,6 +68,8 @@ class Guide:
     offset: NDArray[np.float64]
     traces: NDArray[np.float64]
     slide: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    radius: NDArray[np.float64]
     compliance: NDArray[np.float64]
     friction: NDArray[np.float64]
     viscous: NDArray[np.float64]
@@ -130,13 +137,17 @@ def guide_of_shaft(
         )
     count, modes = len(heights), model.mode_count
     traces, slide = np.zeros((count, 2, modes)), np.zeros((count, modes))
+    turn, radius = np.zeros((count, 3, modes)), np.zeros(count)
     compliance = np.zeros((count, 2, 2))
     centre = np.zeros((count, 3))
     for k, height in enumerate(heights):
-        load, centre[k] = _section(body, surface, height)
+        section = _section(body, surface, height)
+        load, centre[k] = section.load, section.centre
         own = load.T @ shapes
         traces[k, :, : shapes.shape[1]] = own[:2]
         slide[k, : shapes.shape[1]] = own[2]
+        turn[k, :, : shapes.shape[1]] = section.moment.T @ shapes
+        radius[k] = section.radius
         if stiffness is not None:
             compliance[k] = np.eye(2) / stiffness
         if consistent:
@@ -154,20 +165,30 @@ def guide_of_shaft(
         offset=centre[:, :2],
         traces=traces,
         slide=slide,
+        turn=turn,
+        radius=radius,
         compliance=compliance,
         friction=np.full(count, friction),
         viscous=np.full(count, viscous / count),
     )
 
 
-def _section(
-    body: ElasticBody, surface: str, height: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights of nodes around a height, shape (n_dof, 3), and the axis there, shape (3,).
+class _Section(NamedTuple):
+    """A ring of nodes around a height."""
+
+    load: NDArray[np.float64]  # (n_dof, 3) weights of the mean displacement
+    moment: NDArray[np.float64]  # (n_dof, 3) [1/m] of the mean rotation
+    centre: NDArray[np.float64]  # (3,) [m] the axis there
+    radius: float  # [m]
+
+
+def _section(body: ElasticBody, surface: str, height: float) -> _Section:
+    """Weights of nodes around a height.
 
     Of the ring of nodes at the height, or of those next above and below.  The weights are as equal
     as can be while their mean place is the axis there: any rigid motion then moves the section as
-    it moves the axis, on unstructured meshes as well.
+    it moves the axis, on unstructured meshes as well.  Its rotation is that of the rigid motion
+    which is nearest to the displacement of the nodes with the same weights.
     """
     nodes = body.mesh.surface(surface).nodes
     z = body.mesh.points[nodes, 2]
@@ -196,7 +217,16 @@ def _section(
     load = np.zeros((body.dof_count, 3))
     for c in range(3):
         load[3 * nodes[near] + c, c] = weights
-    return load, np.append(centre, at)
+    x, y, height_above = places[near].T
+    # displacement of the nodes by a unit rotation about each axis
+    none = np.zeros(len(x))
+    spins = np.array([[none, -height_above, y], [height_above, none, -x], [-y, x, none]])
+    spins = spins.transpose(0, 2, 1)
+    inertia = np.einsum("i,aic,bic->ab", weights, spins, spins)
+    fitted = np.linalg.solve(inertia, (weights[:, None] * spins).reshape(3, -1))
+    moment = np.zeros((body.dof_count, 3))
+    moment[(3 * nodes[near][:, None] + np.arange(3)).ravel()] = fitted.T
+    return _Section(load, moment, np.append(centre, at), float(weights @ np.hypot(x, y)))
 
 
 def _axis(where: str, places: NDArray[np.float64]) -> NDArray[np.float64]:

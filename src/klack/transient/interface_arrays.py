@@ -32,7 +32,7 @@ Cube = NDArray[np.float64]
 
 DAMPING = 0
 WORK = 1  # of the constant force
-GUIDE = 2  # loss: friction and its numerical part
+GUIDE = 2  # loss: friction, drag and a numerical part
 DEBT = 3  # energy that the contact has still to pay
 GUIDE_STRAIN = 4  # energy held
 OPEN_STEPS = 5  # since the last contact, -1 before the first
@@ -95,19 +95,23 @@ class Bore(NamedTuple):
 
     traces: Cube  # (k, 2, M) displacement of the shaft across the axis
     slide: Matrix  # (k, M) the same along it
+    turn: Cube  # (k, 3, M) rotation of the section
     offset: Matrix  # (k, 2) [m] position across the axis at q = 0
+    radius: Vector  # (k,) [m] of the shaft
     clearance: Vector  # (k,) [m]
     compliance: Cube  # (k, 2, 2) [m/N]
     friction: Vector  # (k,) [-]
     viscous: Vector  # (k,) [N s/m]
-    slip_speed: float  # [m/s] below it Coulomb friction fades out
 
     @classmethod
     def none(cls, modes: int) -> Self:
         """Return a guide without a height."""
         empty = np.zeros(0)
-        across, along = np.zeros((0, 2, modes)), np.zeros((0, modes))
-        return cls(across, along, np.zeros((0, 2)), empty, np.zeros((0, 2, 2)), empty, empty, 1.0)
+        across, along, turn = np.zeros((0, 2, modes)), np.zeros((0, modes)), np.zeros((0, 3, modes))
+        return cls(
+            *(across, along, turn, np.zeros((0, 2)), empty, empty),
+            *(np.zeros((0, 2, 2)), empty, empty),
+        )
 
 
 class ActiveSet(NamedTuple):

@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
+from klack.transient.guide_friction import begin_rub, no_rub, rub_guide
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
     DAMPING,
@@ -105,8 +106,7 @@ class _Step(NamedTuple):
     lam: Vector  # (n,) [N]
     both: Vector  # (n,) [N] sum of the contact forces at both ends
     normal: Matrix  # (k, 2) [N] of the guide on the shaft
-    slowing: Vector  # (k,) change of the sliding speed per braking force [m/(N s)]
-    dragging: Vector  # (k,) the same per speed that drag has braked [-]
+    dragging: Vector  # (k,) change of the sliding speed per speed that drag has braked [-]
     free: Vector  # (d n,) [m] gaps and increments of offset without contact forces; friction only
     motion: Vector  # (d n,) [m] the same with them
     way: Vector  # (M,) of the modes within the step
@@ -261,15 +261,14 @@ def _work(points: ContactPoints, before: Vector, step: _Step) -> tuple[float, fl
 
 @njit
 def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
-    """Room for a step, and how much a force brakes the shaft."""
+    """Room for a step, and how much drag brakes the shaft."""
     M, n, guides = len(modes.push), len(points.gap), len(bore.clearance)
     rubs = len(points.tangents)
-    slowing, dragging = np.zeros(guides), np.zeros(guides)
+    dragging = np.zeros(guides)
     for k in range(guides):
         for j in range(guides):
             for i in range(M):
                 yields = abs(bore.slide[k, i] * bore.slide[j, i] * modes.B2[i])
-                slowing[k] += yields
                 dragging[k] += bore.viscous[j] * yields
     return _Step(
         np.empty(M),
@@ -282,7 +281,6 @@ def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
         np.zeros(n),
         np.empty(n),
         np.zeros((guides, 2)),
-        slowing,
         dragging,
         np.empty(n + rubs if rubs else 0),
         np.empty(n + rubs if rubs else 0),
@@ -313,7 +311,7 @@ def _potential(points: ContactPoints, state: State) -> float:
 
 @phase
 def _begin(modes: Modes, outside: Outside, bore: Bore, state: State, step: _Step) -> float:
-    """Forces known before the step, the guide's as they were; returns friction and drag [N]."""
+    """Forces known before the step, the guide's as they were; returns its drag [N]."""
     for i in range(len(modes.push)):
         step.known[i] = modes.push[i] * outside.constant
     braking = 0.0
@@ -321,12 +319,8 @@ def _begin(modes: Modes, outside: Outside, bore: Bore, state: State, step: _Step
         slide = 0.0
         for i in range(len(state.v)):
             slide += bore.slide[k, i] * state.v[i]
-        # drag of the mean speed over the step; friction may stop the shaft, not turn it round
+        # of the mean speed over the step
         drag = -bore.viscous[k] * slide / (1.0 + 0.5 * step.dragging[k])
-        if bore.friction[k] > 0.0:
-            pressed = np.sqrt(state.guide_force[k, 0] ** 2 + state.guide_force[k, 1] ** 2)
-            rub = bore.friction[k] * pressed / np.sqrt(slide**2 + bore.slip_speed**2)
-            drag -= min(rub, 1.0 / step.slowing[k]) * slide
         braking += drag
         for i in range(len(state.v)):
             step.known[i] += bore.slide[k, i] * drag
@@ -600,6 +594,7 @@ def march(
     """
     n, books, rubs = len(points.gap), state.books, len(points.tangents) > 0
     step = _start(modes, points, bore)
+    guide = no_rub(len(bore.clearance), len(modes.push))
     share = _spring_share(modes.B1, modes.push, outside.spring)
     diagonal = 0.0
     for k in range(n):
@@ -614,6 +609,9 @@ def march(
         axial = outside.constant + _move(modes, state, step, share)
         for k in range(len(bore.clearance)):
             axial += _press(modes, bore, step, k, share)
+        rubs_guide = begin_rub(bore, state.guide_force, step.normal, guide)
+        if rubs_guide:
+            axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         if n:
@@ -661,6 +659,12 @@ def march(
                     offset_change(points, state.q, step.q, step.way, step.moved)
                     for i in range(len(step.bent)):
                         step.bent[i] = state.rubbing.bent[i] + step.motion[n + i] - step.moved[i]
+                if rubs_guide:
+                    axial += rub_guide(
+                        modes, share, guide, state.q, step.known, step.whole, step.q, step.v
+                    )
+                    if rubs:
+                        offset_change(points, state.q, step.q, step.way, step.moved)
             if rubs and state.contact.counts[0] == 0:
                 for i in range(len(step.bent)):
                     step.bent[i] = 0.0
@@ -668,6 +672,8 @@ def march(
             pay, potential, answer = _pay(modes, points, state, step, share, potential, answer)
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
+        for k in range(len(guide.most)):
+            braking += guide.force[k, 0]
         mean_gap = 0.5 * (least + smallest) if taken else least
         _finish(modes, state, step, record, taken, mean_gap, axial + answer + braking)
         smallest = least

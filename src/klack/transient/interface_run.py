@@ -74,7 +74,6 @@ _FAR = 200.0  # fine steps that end a segment without a touch
 _STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
 _FRESH = 0.04e-6  # gaps as good as new [m]
 _WARY_SHARE = 0.25  # of the safe time, while the guide may kick
-_SLIP_SPEED = 1e-3  # [m/s]
 _RIM_RESERVE = 1.1
 
 
@@ -680,10 +679,11 @@ def _bore(guide: Guide | None, modes: int) -> Bore:
     return Bore(
         np.ascontiguousarray(guide.traces),
         np.ascontiguousarray(guide.slide),
+        np.ascontiguousarray(guide.turn),
         np.ascontiguousarray(guide.offset),
+        guide.radius,
         guide.clearance,
         np.ascontiguousarray(guide.compliance),
         guide.friction,
         guide.viscous,
-        _SLIP_SPEED,
     )

@@ -550,8 +550,8 @@ def _guide() -> list[Check]:
             "shaft squeezed from two sides by 50 N, friction 0.2: speed halfway to rest [m/s]",
             expected=-0.5 * _SPEED,
             computed=float(slower[2]),
-            tolerance=1e-3,
-            source="Coulomb: 2 mu N/m; the first step has no side force yet",
+            tolerance=1e-6,
+            source="Coulomb: 2 mu N/m",
         ),
         compare(
             _GROUP,

@@ -199,6 +199,7 @@ def lateral_guide(
     offset: Sequence[tuple[float, float]] = ((0.0, 0.0),),
     friction: float = 0.0,
     viscous: float = 0.0,
+    radius: float = 0.0,
 ) -> Guide:
     """Guide of a :func:`rigid_body` at some heights above its centre of mass.
 
@@ -209,6 +210,8 @@ def lateral_guide(
     heights, offset : sequence of float, of (x, y) [m]
     friction, viscous : float [-], [N s/m]
         At each height.
+    radius : float [m]
+        Of the shaft, which friction turns.
     """
     translation, rotation = model.rigid[:3], model.rigid[3:]
     count = len(heights)
@@ -222,6 +225,8 @@ def lateral_guide(
         offset=np.array(offset, dtype=float),
         traces=traces,
         slide=np.repeat(translation[2:3], count, axis=0),
+        turn=np.repeat(rotation[None], count, axis=0),
+        radius=np.full(count, radius),
         compliance=np.repeat(np.eye(2)[None] / stiffness, count, axis=0),
         friction=np.full(count, friction),
         viscous=np.full(count, viscous),

@@ -1,0 +1,238 @@
+r"""Coulomb friction of a shaft in its guide, over one step.
+
+At a height where the bore presses with :math:`N`, the mean of both ends of the step, the rim of the
+shaft touches it at :math:`r n` from the axis, :math:`n` against the force.  Its slip within the
+step along the axis and around it (:math:`t = e_z \times n`) is
+
+.. math:: \Delta s = R\, (q_1 - q_0), \qquad
+    R = \begin{pmatrix} T_z + r\,(n_y \Theta_x - n_x \Theta_y) \\
+    t \cdot T + r\, \Theta_z \end{pmatrix}
+
+with the displacement :math:`T q` and the rotation :math:`\Theta q` of the section.  One force *f*
+over the step, set-valued, without a speed below which it fades out:
+
+.. math:: |f| \le \mu |N|, \qquad f = -|f| \frac{\Delta s}{|\Delta s|} \text{ where }
+    \Delta s \ne 0, \qquad f \cdot R v_1 \le 0 ,
+
+and of these the largest: friction holds the shaft as long as it can, slides against it with
+:math:`\mu |N|`, and in the step in which it comes to rest it stops the shaft and does not turn it
+round (a force that makes :math:`\Delta s` zero there leaves :math:`v_1 = -v_0`, and a shaft at rest
+would tremble).  So :math:`-f \cdot \Delta s \ge 0` in every step.
+
+With one height the slip follows from its force by two compliances,
+:math:`\Delta s = \Delta s_f + R B_1 R^T f` and :math:`R v_1 = R v_f + R B_2 R^T f`; heights take
+turns until no force changes.
+
+Limits: the section has no compliance along the axis and around it but that of the kept modes; how
+heights share the friction of a shaft that is held by several of them is not unique; the bore stays
+round and at rest.  Friction is found before the contact forces of the seat and once more after
+them, which leaves these with a gap of less than :math:`h^2 \mu N / m` in steps in which the shaft
+turns round; the payment of the energy debt of the seat comes last, some 1e-6 of its force.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.compiling.jit import inner, njit
+from klack.simulation.phase import phase
+from klack.transient.interface_arrays import Bore, Modes
+
+__all__ = ["GuideRub", "begin_rub", "no_rub", "rub_guide", "stopping_force"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Cube = NDArray[np.float64]
+Four = tuple[float, float, float, float]
+
+_NEWTON = 60
+_HALVINGS = 60
+_TURNS = 200
+_TINY = 1e-15  # of the compliance: a direction in which nothing moves
+_ROUND = 1e-14
+_STILL = 1e-13  # of the largest force: heights that take turns have settled
+
+
+class GuideRub(NamedTuple):
+    """Friction of the guide over the step that is being taken."""
+
+    most: Vector  # (k,) [N]
+    force: Matrix  # (k, 2) [N] on the shaft, along the axis and around it
+    rim: Cube  # (k, 2, M) displacement of the rim of the shaft in these directions
+
+
+@njit
+def no_rub(heights: int, modes: int) -> GuideRub:
+    """Room for the friction at some heights."""
+    return GuideRub(np.zeros(heights), np.zeros((heights, 2)), np.zeros((heights, 2, modes)))
+
+
+@inner
+def _on_disc(C: Four, s0: float, s1: float, most: float) -> tuple[float, float]:
+    """Force of at most so much whose slip s + C f vanishes, or is opposite to it."""
+    d = _TINY * (C[0] + C[3])
+    f0, f1, size, slips = 0.0, 0.0, 0.0, False
+    for _ in range(_NEWTON):
+        a, b = C[0] + d, C[3] + d
+        det = a * b - C[1] * C[1]
+        f0, f1 = (C[1] * s1 - b * s0) / det, (C[1] * s0 - a * s1) / det
+        size = np.sqrt(f0 * f0 + f1 * f1)
+        if size <= most * (1.0 + _ROUND):
+            break
+        # 1/|f| is concave over d: every step stays below the root
+        slips = True
+        soft = (b * f0 * f0 - 2.0 * C[1] * f0 * f1 + a * f1 * f1) / det
+        d += (size / most - 1.0) * size * size / soft
+    if slips and size > 0.0:
+        f0, f1 = f0 * most / size, f1 * most / size
+    return f0, f1
+
+
+@njit
+def stopping_force(
+    C: Four, s0: float, s1: float, D: Four, u0: float, u1: float, most: float
+) -> tuple[float, float]:
+    """Friction of one height over a step [N].
+
+    Parameters
+    ----------
+    C : four floats [m/N]
+        Slip per force, row by row; symmetric.
+    s0, s1 : float [m]
+        Slip without the force.
+    D : four floats [m/(N s)]
+        Speed at the end per force.
+    u0, u1 : float [m/s]
+        That speed without the force.
+    most : float [N]
+    """
+    if most <= 0.0:
+        return 0.0, 0.0
+    low, high = 0.0, most
+    f0, f1 = _on_disc(C, s0, s1, most)
+    for halving in range(_HALVINGS):
+        stops = f0 * (D[0] * f0 + D[1] * f1) + f1 * (D[2] * f0 + D[3] * f1)
+        turned = f0 * u0 + f1 * u1 + stops > _ROUND * stops
+        if halving == 0:
+            if not turned:
+                return f0, f1
+            high = np.sqrt(f0 * f0 + f1 * f1)
+        elif turned:
+            high = 0.5 * (low + high)
+        else:
+            low = 0.5 * (low + high)
+        f0, f1 = _on_disc(C, s0, s1, 0.5 * (low + high))
+    if low == 0.0:
+        return 0.0, 0.0
+    return _on_disc(C, s0, s1, low)
+
+
+@phase
+def begin_rub(bore: Bore, before: Matrix, after: Matrix, rub: GuideRub) -> bool:
+    """Take the normal forces at both ends of a step; returns whether any height rubs."""
+    rubs = False
+    for k in range(len(rub.most)):
+        x = 0.5 * (before[k, 0] + after[k, 0])
+        y = 0.5 * (before[k, 1] + after[k, 1])
+        normal = np.sqrt(x * x + y * y)
+        rub.most[k] = bore.friction[k] * normal
+        rub.force[k, 0] = rub.force[k, 1] = 0.0
+        if rub.most[k] > 0.0:
+            rubs = True
+            nx, ny, r = -x / normal, -y / normal, bore.radius[k]
+            for i in range(rub.rim.shape[2]):
+                turn = ny * bore.turn[k, 0, i] - nx * bore.turn[k, 1, i]
+                rub.rim[k, 0, i] = bore.slide[k, i] + r * turn
+                across = nx * bore.traces[k, 1, i] - ny * bore.traces[k, 0, i]
+                rub.rim[k, 1, i] = across + r * bore.turn[k, 2, i]
+    return rubs
+
+
+@inner
+def rub_guide(
+    modes: Modes,
+    share: float,
+    rub: GuideRub,
+    before: Vector,
+    known: Vector,
+    whole: Vector,
+    q: Vector,
+    v: Vector,
+) -> float:
+    """Let friction act on what the other forces make of a step; returns what the spring adds [N].
+
+    Called again, after other forces have come, it changes the friction by what they change.
+
+    Parameters
+    ----------
+    modes : Modes
+    share : float [N/m]
+        Force of the spring per displacement that the step would have without it.
+    rub : GuideRub
+    before : array, shape (M,)
+        Coordinates at the start of the step.
+    known, whole, q, v : array, shape (M,)
+        In and out: modal forces of the step and the state at its end.
+    """
+    push, B1, B2 = modes.push, modes.B1, modes.B2
+    answer = 0.0
+    largest = 0.0
+    for k in range(len(rub.most)):
+        largest = max(largest, rub.most[k])
+    for _ in range(_TURNS):
+        changed = 0.0
+        for k in range(len(rub.most)):
+            if rub.most[k] <= 0.0:
+                continue
+            along, around = rub.rim[k, 0], rub.rim[k, 1]
+            c00 = c01 = c11 = d00 = d01 = d11 = s0 = s1 = u0 = u1 = 0.0
+            p0 = p1 = w0 = w1 = 0.0  # of the spring
+            for i in range(len(q)):
+                a, b = along[i] * B1[i], around[i] * B1[i]
+                c00 += a * along[i]
+                c01 += a * around[i]
+                c11 += b * around[i]
+                p0 += a * push[i]
+                p1 += b * push[i]
+                a, b = along[i] * B2[i], around[i] * B2[i]
+                d00 += a * along[i]
+                d01 += a * around[i]
+                d11 += b * around[i]
+                w0 += a * push[i]
+                w1 += b * push[i]
+                s0 += along[i] * (q[i] - before[i])
+                s1 += around[i] * (q[i] - before[i])
+                u0 += along[i] * v[i]
+                u1 += around[i] * v[i]
+            C = (
+                c00 - share * p0 * p0,
+                c01 - share * p0 * p1,
+                c01 - share * p1 * p0,
+                c11 - share * p1 * p1,
+            )
+            D = (
+                d00 - share * w0 * p0,
+                d01 - share * w0 * p1,
+                d01 - share * w1 * p0,
+                d11 - share * w1 * p1,
+            )
+            f0, f1 = rub.force[k, 0], rub.force[k, 1]
+            s0 -= C[0] * f0 + C[1] * f1
+            s1 -= C[2] * f0 + C[3] * f1
+            u0 -= D[0] * f0 + D[1] * f1
+            u1 -= D[2] * f0 + D[3] * f1
+            rub.force[k, 0], rub.force[k, 1] = stopping_force(C, s0, s1, D, u0, u1, rub.most[k])
+            f0, f1 = rub.force[k, 0] - f0, rub.force[k, 1] - f1
+            pull = -share * (p0 * f0 + p1 * f1)
+            for i in range(len(q)):
+                kick = along[i] * f0 + around[i] * f1 + push[i] * pull
+                known[i] += kick
+                whole[i] += kick
+                q[i] += B1[i] * kick
+                v[i] += B2[i] * kick
+            answer += pull
+            changed = max(changed, abs(f0), abs(f1))
+        if changed <= _STILL * largest:
+            break
+    return answer
