@@ -18,6 +18,7 @@ __all__ = [
     "WORK",
     "ActiveSet",
     "Bore",
+    "Closed",
     "ContactPoints",
     "Modes",
     "Outside",
@@ -130,10 +131,48 @@ class ActiveSet(NamedTuple):
         return cls(np.zeros(points, dtype=bool), order, inverse, counts)
 
 
+class Closed(NamedTuple):
+    """Points that may carry with friction, and an inverse over what they do.
+
+    Directions of the point in place s are d s (normal), d s + 1 and, in 3-D, d s + 2 in ``block``;
+    unknown forces are numbered likewise: normal, along and across the slip.
+    """
+
+    points: NDArray[np.int64]  # (n,) the first ``counts[0]``
+    place: NDArray[np.int64]  # (n,) of a point among them, -1: it is not
+    block: Matrix  # (d n, d n) [m/N] compliance of those points
+    frame: Matrix  # (n, 2) direction of slip, as the inverse has it
+    bound: Vector  # (n,) [-] coefficients of friction, as the inverse has them
+    yields: Vector  # (n,) [m/N] further compliance across the slip, as the inverse has it
+    unknown: NDArray[np.int64]  # (d n,) numbers of the first ``counts[1]`` unknown forces
+    row: NDArray[np.int64]  # (d n,) of an unknown force in the inverse, -1: it is not one
+    inverse: Matrix  # (d n, d n) [N/m]
+    counts: NDArray[np.int64]  # points, unknown forces, rounds beyond two since a fresh inverse
+
+    @classmethod
+    def none(cls, points: int, ways: int) -> Self:
+        """Return no closed point."""
+        n, size = points, (1 + ways) * points
+        return cls(
+            np.zeros(n, dtype=np.int64),
+            np.full(n, -1, dtype=np.int64),
+            np.zeros((size, size)),
+            np.zeros((n, 2)),
+            np.zeros(n),
+            np.zeros(n),
+            np.zeros(size, dtype=np.int64),
+            np.full(size, -1, dtype=np.int64),
+            np.zeros((size, size)),
+            np.zeros(3, dtype=np.int64),
+        )
+
+
 class Rubbing(NamedTuple):
     """What friction remembers of the points, changed in place; empty without."""
 
-    forces: Vector  # (d n,) [N] last forces, normal ones first: the first guess
+    forces: Vector  # (d n,) [N] last forces, normal ones first
+    before: Vector  # (d n,) [N] those a step earlier: both make the first guess
+    closed: Closed
     across: Vector  # (ways n,) [N] tangential forces
     bent: Vector  # (ways n,) [m] tangential offset less that of the modes: residual compliance
     doing: NDArray[np.int64]  # (n,) see :mod:`klack.transient.rubbing`
@@ -145,6 +184,8 @@ class Rubbing(NamedTuple):
         n = points if ways else 0
         return cls(
             np.zeros((1 + ways) * n),
+            np.zeros((1 + ways) * n),
+            Closed.none(n, ways),
             np.zeros(ways * n),
             np.zeros(ways * n),
             np.zeros(n, dtype=np.int64),

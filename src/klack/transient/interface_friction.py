@@ -42,6 +42,20 @@ def offset_change(
     np.dot(points.tangents, way, moved)
 
 
+@phase
+def _guess(rubbing: Rubbing) -> None:
+    """Forces that change by as much as in the step before."""
+    n = len(rubbing.slip)
+    forces, before = rubbing.forces, rubbing.before
+    for k in range(n):
+        carries = forces[k] > 0.0 and before[k] > 0.0 and 2.0 * forces[k] > before[k]
+        for i in range(k, len(forces), n):
+            now = forces[i]
+            if carries:
+                forces[i] = 2.0 * now - before[i]
+            before[i] = now
+
+
 @inner
 def rub(
     points: ContactPoints,
@@ -69,7 +83,17 @@ def rub(
         mu[k] = points.kinetic[k] + fall * (points.static[k] - points.kinetic[k])
     for i in range(len(moved)):
         free[n + i] = moved[i] - rubbing.bent[i]
-    rounds = solve_rubbing(points.A, free, mu, rubbing.forces, motion, rubbing.doing, tolerance)
+    _guess(rubbing)
+    rounds = solve_rubbing(
+        points.A,
+        free,
+        mu,
+        rubbing.closed,
+        rubbing.forces,
+        motion,
+        rubbing.doing,
+        tolerance,
+    )
     carrying = 0
     for k in range(n):
         if rubbing.forces[k] > 0.0:

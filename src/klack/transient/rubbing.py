@@ -19,21 +19,38 @@ A slipping point has the force :math:`\mu \lambda_n` along :math:`e = \tau / |\t
 
 which is what turns its direction: directions that are iterated by :math:`\tau` alone take hundreds
 of rounds.  A point that would slip against the force it has sticks for one round: faces that turn
-round as a whole would else turn round again in the next one.  Two to four rounds from the solution
-of the step before.  Where they do not end, the points take turns (projected Gauss-Seidel), each
-with its own three equations.
+round as a whole would else turn round again in the next one.
+
+A round is two products, one with the compliance of the closed points and one with the inverse of
+Newton's matrix, which is carried along from step to step and follows what the points do
+(:mod:`klack.transient.closed_points`).  It lags behind *e* and *D*: what is missed then falls by a
+constant factor per round instead of its square, at a hundredth of the cost of solving afresh.  The
+first round of a step keeps what each point did in the step before: a guess of the forces is too
+rough to tell a slow slip from none.  Where the rounds do not end, the points take turns (projected
+Gauss-Seidel), each with its own equations.
 
 Friction makes the matrix unsymmetric; for a large coefficient on an eccentric body a solution may
-not be unique (jam).
+not be unique (jam), or taking turns may find none.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
+from klack.simulation.kernel import FAST
 from klack.simulation.phase import phase
+from klack.transient.closed_points import (
+    admit,
+    dismiss,
+    invert,
+    keep_what,
+    multiply,
+    multiply_even,
+    soften,
+)
+from klack.transient.interface_arrays import Closed
 
-__all__ = ["OPEN", "SLIP", "STICK", "rub_in_turn", "solve_rubbing"]
+__all__ = ["OPEN", "SLIP", "STICK", "solve_rubbing"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -42,29 +59,61 @@ States = NDArray[np.int64]
 OPEN, STICK, SLIP = 0, 1, 2
 """What a point does."""
 
-_ROUNDS = 60
-_SWEEPS = 4000
+_ROUNDS = 40
+_FRESH = 8
+"""Inverses computed afresh in one step before the points take turns."""
+
+_SWEEPS = 20
+_CALMS = 6
+"""Times that so many sweeps may bring Newton's method back on its way."""
+
+_STILL = 100
+"""Sweeps that take nothing off what is missed before they end."""
+
+_LEAST = 1e-3
+"""Share of what is missed below which the change of a force need not be felt within the round."""
+
+_TURNED = 0.98
+"""Cosine of the largest turn of a slip that the inverse is left with."""
+
+_SLOW = 0.2
+"""Share that a round leaves of what is missed above which the inverse has to follow *D*."""
+
+_SOFTER = 0.2
+"""Relative change of an entry of the inverse by *D* that makes it follow."""
+
+_MANY = 8
+"""The inverse is computed afresh where one unknown of so many comes or goes."""
+
+_PRICE, _PER_ROUND = 4, 10
+"""Rounds that cost as much as a fresh inverse: the first, and one for each so many unknowns."""
 
 
-@phase
-def _answer(A: Matrix, q: Vector, n: int, ways: int, lam: Vector, w: Vector) -> None:
-    """Gaps and slips under the forces: w = q + A lam."""
-    for i in range(len(q)):
+@inner(fastmath=FAST, _nrt=False, error_model="numpy")
+def _answer(A: Matrix, q: Vector, closed: Closed, lam: Vector, w: Vector) -> None:
+    """Gaps and slips of all points under the forces of the closed ones: w = q + A lam."""
+    n, size = len(closed.points), len(q)
+    for i in range(size):
         w[i] = q[i]
-    for j in range(len(q)):
-        a = lam[j]
-        if a != 0.0:
-            row = A[j]
-            for i in range(len(q)):
-                w[i] += a * row[i]
+    for s in range(closed.counts[0]):
+        k = closed.points[s]
+        if size == 2 * n:
+            a, b = lam[k], lam[n + k]
+            first, second = A[k], A[n + k]
+            for i in range(size):
+                w[i] += a * first[i] + b * second[i]
+        else:
+            a, b, c = lam[k], lam[n + k], lam[2 * n + k]
+            first, second, third = A[k], A[n + k], A[2 * n + k]
+            for i in range(size):
+                w[i] += a * first[i] + b * second[i] + c * third[i]
 
 
 @phase
 def _judge(
-    A: Matrix,
+    closed: Closed,
+    d: int,
     mu: Vector,
-    n: int,
-    ways: int,
     lam: Vector,
     w: Vector,
     doing: States,
@@ -73,122 +122,411 @@ def _judge(
 ) -> float:
     """What each point does by the projections, and how far its forces are from them [N]."""
     worst = 0.0
-    for k in range(n):
-        wanted = lam[k] - w[k] / A[k, k]
+    for s in range(closed.counts[0]):
+        i, block = d * s, closed.block
+        wanted = lam[i] - w[i] / block[i, i]
         if wanted <= 0.0:
-            doing[k] = OPEN
-            worst = max(worst, abs(lam[k]))
+            doing[s] = OPEN
+            for c in range(d):
+                worst = max(worst, abs(lam[i + c]))
             continue
-        worst = max(worst, abs(lam[k] - wanted))
-        most = mu[k] * wanted
-        own = 0.0
-        for c in range(ways):
-            own = max(own, A[(c + 1) * n + k, (c + 1) * n + k])
+        worst = max(worst, abs(lam[i] - wanted))
+        most = mu[s] * wanted
+        own = max(block[i + 1, i + 1], block[i + d - 1, i + d - 1])
         size = 0.0
-        for c in range(ways):
-            i = (c + 1) * n + k
-            along[k, c] = lam[i] - w[i] / own
-            size += along[k, c] ** 2
+        for c in range(1, d):
+            along[s, c - 1] = lam[i + c] - w[i + c] / own
+            size += along[s, c - 1] ** 2
         size = np.sqrt(size)
         if size <= most:
-            doing[k] = STICK
-            for c in range(ways):
-                worst = max(worst, abs(w[(c + 1) * n + k]) / own)
-            continue
-        doing[k], held = SLIP, 0.0
-        for c in range(ways):
-            along[k, c] /= size
-            held += lam[(c + 1) * n + k] * along[k, c]
-            worst = max(worst, abs(lam[(c + 1) * n + k] - most * along[k, c]))
-        if held < 0.0:
-            doing[k] = STICK
-        stiffer[k] = own * (size - most) / most if most > 0.0 else 0.0
+            doing[s] = STICK
+            for c in range(1, d):
+                worst = max(worst, abs(w[i + c]) / own)
+        else:
+            held = 0.0
+            for c in range(1, d):
+                held += lam[i + c] * along[s, c - 1]
+                worst = max(worst, abs(lam[i + c] - most * along[s, c - 1] / size))
+            doing[s] = SLIP if held >= 0.0 else STICK
+            stiffer[s] = own * (size - most) / most if most > 0.0 else 0.0
+        if size > 0.0:
+            for c in range(d - 1):
+                along[s, c] /= size
+        else:
+            along[s, 0], along[s, 1] = 1.0, 0.0
     return worst
 
 
 @phase
-def _unknowns(
-    n: int, ways: int, mu: Vector, doing: States, place: NDArray[np.int64], kind: States
-) -> int:
-    """List the unknown forces: normal ones, sticking ones (kind 1, 2), those across a slip (3)."""
-    m = 0
-    for k in range(n):
-        if doing[k] == OPEN:
-            continue
-        place[m], kind[m] = k, 0
-        m += 1
-        if doing[k] == STICK:
-            for c in range(ways):
-                place[m], kind[m] = k, c + 1
-                m += 1
-        elif ways == 2 and mu[k] > 0.0:
-            place[m], kind[m] = k, 3
-            m += 1
-    return m
+def _has(closed: Closed, d: int, s: int) -> int:
+    """The same as the inverse has them."""
+    known = 0
+    for kind in range(d):
+        if closed.row[d * s + kind] >= 0:
+            known += 1 << kind
+    return known
 
 
 @phase
-def _row(A: Matrix, n: int, k: int, kind: int, along: Matrix, i: int) -> float:
-    """Entry of the row of an equation in column i of the matrix."""
-    if kind < 3:
-        return float(A[kind * n + k, i])
-    return float(along[k, 0] * A[2 * n + k, i] - along[k, 1] * A[n + k, i])
+def _as_before(
+    closed: Closed, d: int, lam: Vector, doing: States, along: Matrix, stiffer: Vector
+) -> None:
+    """Let points that carried do what they did, as the inverse has it."""
+    for s in range(closed.counts[0]):
+        known = _has(closed, d, s)
+        if known & 1 == 0:
+            continue
+        doing[s] = STICK if known & 2 else SLIP
+        stiffer[s] = closed.yields[s]
+        along[s, 0], along[s, 1] = closed.frame[s, 0], closed.frame[s, 1]
+        size = 0.0
+        for c in range(1, d):
+            size += lam[d * s + c] ** 2
+        size = np.sqrt(size)
+        if size > 0.0 and not known & 2:
+            for c in range(1, d):
+                along[s, c - 1] = lam[d * s + c] / size
+
+
+@phase
+def _place(
+    closed: Closed,
+    d: int,
+    mu: Vector,
+    lam: Vector,
+    w: Vector,
+    doing: States,
+    along: Matrix,
+    least: float,
+    change: Vector,
+) -> None:
+    """Give open and slipping points the forces that they can have.
+
+    What the points do under changes below ``least`` waits for the product of the round.
+    """
+    size = d * closed.counts[0]
+    for s in range(closed.counts[0]):
+        i = d * s
+        x, y = along[s, 0], along[s, 1]
+        for c in range(d):
+            change[i + c] = 0.0
+        if doing[s] == OPEN:
+            for c in range(d):
+                change[i + c] = -lam[i + c]
+        elif doing[s] == SLIP:
+            missing = mu[s] * lam[i] - lam[i + 1] * x
+            if d == 3:
+                missing -= lam[i + 2] * y
+                change[i + 2] = missing * y
+            change[i + 1] = missing * x
+        for c in range(d):
+            a = change[i + c]
+            lam[i + c] += a
+            if abs(a) > least:
+                change[i + c] = 0.0
+                row = closed.block[i + c]
+                for j in range(size):
+                    w[j] += a * row[j]
+
+
+@phase
+def _wanted(d: int, mu: float, what: int) -> int:
+    """Unknown forces of a point, one bit each: normal, along and across its slip."""
+    if what == OPEN:
+        return 0
+    across = 4 if d == 3 and (what == STICK or mu > 0.0) else 0
+    return across + (3 if what == STICK else 1)
+
+
+@phase
+def _turned(closed: Closed, s: int, what: int, along: Matrix) -> bool:
+    """Whether the inverse has another direction of slip."""
+    if what == OPEN or closed.row[len(closed.row) // len(closed.points) * s] < 0:
+        return False
+    cosine = closed.frame[s, 0] * along[s, 0] + closed.frame[s, 1] * along[s, 1]
+    return what == SLIP and cosine < _TURNED
+
+
+@phase
+def _face(closed: Closed, s: int, mu: float, yields: float, along: Matrix) -> None:
+    """Set the frame of a point without unknown forces."""
+    closed.frame[s, 0], closed.frame[s, 1] = along[s, 0], along[s, 1]
+    closed.bound[s], closed.yields[s] = mu, yields
 
 
 @inner
-def _newton(
-    A: Matrix,
-    q: Vector,
+def _start_afresh(
+    closed: Closed, d: int, mu: Vector, doing: States, along: Matrix, stiffer: Vector
+) -> None:
+    """Compute the inverse for what the points do."""
+    m = 0
+    for s in range(closed.counts[0]):
+        wanted = _wanted(d, mu[s], doing[s])
+        _face(closed, s, mu[s], stiffer[s] if doing[s] == SLIP else 0.0, along)
+        for kind in range(d):
+            closed.row[d * s + kind] = -1
+            if wanted >> kind & 1:
+                closed.row[d * s + kind] = m
+                closed.unknown[m] = d * s + kind
+                m += 1
+    closed.counts[1], closed.counts[2] = m, 0
+    invert(closed)
+
+
+@inner
+def _follow(
+    closed: Closed,
+    d: int,
     mu: Vector,
-    n: int,
-    ways: int,
-    lam: Vector,
     doing: States,
     along: Matrix,
     stiffer: Vector,
-    place: NDArray[np.int64],
-    kind: States,
+    slow: bool,
+) -> bool:
+    """Let the inverse follow what the points do; False where it is to be computed afresh.
+
+    Its compliances across a slip follow only where the rounds take little off (``slow``).
+    """
+    changes = 0
+    for s in range(closed.counts[0]):
+        wanted, known = _wanted(d, mu[s], doing[s]), _has(closed, d, s)
+        if _turned(closed, s, doing[s], along):
+            changes += d
+        for kind in range(d):
+            changes += (wanted ^ known) >> kind & 1
+    if _MANY * changes > closed.counts[1] + _MANY:
+        return False
+    for s in range(closed.counts[0]):
+        wanted, known = _wanted(d, mu[s], doing[s]), _has(closed, d, s)
+        if _turned(closed, s, doing[s], along):
+            keep_what(closed, s, 0)
+            known = 0
+        yields = stiffer[s] if doing[s] == SLIP else 0.0
+        if known == 0:
+            _face(closed, s, mu[s], yields, along)
+        elif slow and wanted & known & 4:
+            row = closed.row[d * s + 2]
+            if abs(yields - closed.yields[s]) * closed.inverse[row, row] > _SOFTER:
+                soften(closed, s, yields)
+        if wanted != known and not keep_what(closed, s, wanted):
+            return False
+    return True
+
+
+@phase
+def _missed(
+    closed: Closed,
+    d: int,
+    lam: Vector,
+    w: Vector,
+    doing: States,
+    along: Matrix,
+    stiffer: Vector,
+    missed: Vector,
 ) -> None:
-    """Forces that satisfy the equations of what each point does."""
-    m = _unknowns(n, ways, mu, doing, place, kind)
-    block, right = np.zeros((m, m)), np.zeros((m, 1))
-    for r in range(m):
-        k, what = place[r], kind[r]
-        if what < 3:
-            right[r, 0] = -q[what * n + k]
+    """What the equations of the points are missed by."""
+    for r in range(closed.counts[1]):
+        s, kind = closed.unknown[r] // d, closed.unknown[r] % d
+        i = d * s
+        if kind == 0:
+            missed[r] = w[i]
+            continue
+        slips = doing[s] == SLIP
+        x = along[s, 0] if slips else closed.frame[s, 0]
+        y = along[s, 1] if slips else closed.frame[s, 1]
+        if kind == 1:
+            missed[r] = w[i + 1] * x + (w[i + 2] * y if d == 3 else 0.0)
         else:
-            right[r, 0] = along[k, 1] * q[n + k] - along[k, 0] * q[2 * n + k]
-        for s in range(m):
-            j, of = place[s], kind[s]
-            if of == 0:
-                entry = _row(A, n, k, what, along, j)
-                if doing[j] == SLIP:
-                    for c in range(ways):
-                        pull = mu[j] * along[j, c]
-                        entry += pull * _row(A, n, k, what, along, (c + 1) * n + j)
-            elif of < 3:
-                entry = _row(A, n, k, what, along, of * n + j)
-            else:
-                entry = along[j, 0] * _row(A, n, k, what, along, 2 * n + j)
-                entry -= along[j, 1] * _row(A, n, k, what, along, n + j)
-            block[r, s] = entry
-        if what == 3:
-            block[r, r] += stiffer[k]
-    found = np.linalg.solve(block, right)
-    for i in range(len(lam)):
-        lam[i] = 0.0
-    for r in range(m):
-        k, what, force = place[r], kind[r], found[r, 0]
-        if what == 0:
-            lam[k] = force
-            if doing[k] == SLIP:
-                for c in range(ways):
-                    lam[(c + 1) * n + k] += mu[k] * force * along[k, c]
-        elif what < 3:
-            lam[what * n + k] = force
-        else:
-            lam[2 * n + k] += force * along[k, 0]
-            lam[n + k] -= force * along[k, 1]
+            missed[r] = w[i + 2] * x - w[i + 1] * y
+            if slips:
+                missed[r] += stiffer[s] * (lam[i + 2] * x - lam[i + 1] * y)
+
+
+@phase
+def _change(
+    closed: Closed,
+    d: int,
+    mu: Vector,
+    doing: States,
+    along: Matrix,
+    found: Vector,
+    change: Vector,
+    lam: Vector,
+) -> None:
+    """Add the forces that the inverse finds."""
+    for r in range(closed.counts[1]):
+        s, kind = closed.unknown[r] // d, closed.unknown[r] % d
+        i, a = d * s, -found[r]
+        slips = doing[s] == SLIP
+        x = along[s, 0] if slips else closed.frame[s, 0]
+        y = along[s, 1] if slips else closed.frame[s, 1]
+        if kind == 0:
+            change[i] += a
+            lam[i] += a
+            a *= mu[s] if slips else closed.bound[s]
+        if kind == 2:
+            x, y = -y, x
+        change[i + 1] += a * x
+        lam[i + 1] += a * x
+        if d == 3:
+            change[i + 2] += a * y
+            lam[i + 2] += a * y
+
+
+@inner
+def _sweep(closed: Closed, d: int, mu: Vector, lam: Vector, w: Vector) -> None:
+    """Let every point satisfy its own law in turn (projected Gauss-Seidel)."""
+    block, size = closed.block, d * closed.counts[0]
+    for s in range(closed.counts[0]):
+        i = d * s
+        for kind in range(min(d, 2)):
+            first, after = (i, i + 1) if kind == 0 else (i + 1, i + d)
+            own = block[first, first]
+            if kind:
+                own = max(own, block[after - 1, after - 1])
+            length = 0.0
+            for c in range(first, after):
+                length += (lam[c] - w[c] / own) ** 2
+            length = np.sqrt(length)
+            for c in range(first, after):
+                new = lam[c] - w[c] / own
+                if kind == 0:
+                    new = max(0.0, new)
+                elif length > mu[s] * lam[i]:
+                    new *= mu[s] * lam[i] / length
+                a = new - lam[c]
+                lam[c] = new
+                if a != 0.0:
+                    for j in range(size):
+                        w[j] += a * block[c, j]
+
+
+@inner
+def _rounds(
+    closed: Closed,
+    mu: Vector,
+    lam: Vector,
+    w: Vector,
+    doing: States,
+    along: Matrix,
+    stiffer: Vector,
+    tolerance: float,
+) -> int:
+    """Newton's method over the closed points; returns the rounds, negative where they stand still.
+
+    The inverse is computed afresh where a round did not halve what is missed, and where the rounds
+    beyond two since the last time have cost as much.
+    """
+    d = len(closed.row) // len(closed.points)
+    size = d * closed.counts[0]
+    change, moved = np.empty(size), np.empty(size)
+    missed, found = np.empty(size), np.empty(size)
+    last, fresh = 1e300, 0
+    for rounds in range(1, _ROUNDS):
+        worst = _judge(closed, d, mu, lam, w, doing, along, stiffer)
+        if worst <= tolerance:
+            closed.counts[2] += max(0, rounds - 3)
+            return rounds
+        if rounds == 1:
+            _as_before(closed, d, lam, doing, along, stiffer)
+        _place(closed, d, mu, lam, w, doing, along, _LEAST * worst, change)
+        ratio = worst / last if rounds > 2 else 0.0
+        lost = worst * ratio ** (2 + closed.counts[1] // 40) > tolerance
+        paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
+        slow = ratio > _SLOW
+        if lost or paid or not _follow(closed, d, mu, doing, along, stiffer, slow):
+            _start_afresh(closed, d, mu, doing, along, stiffer)
+            fresh += 1
+            if fresh > _FRESH:
+                return -rounds
+        last = worst
+        _missed(closed, d, lam, w, doing, along, stiffer, missed)
+        multiply(closed.inverse, closed.counts[1], missed, found)
+        _change(closed, d, mu, doing, along, found, change, lam)
+        multiply_even(closed.block, size, change, moved)
+        for i in range(size):
+            w[i] += moved[i]
+    return -_ROUNDS
+
+
+@inner
+def _tame(closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
+    """Begin with no force where Newton's method has found none; gaps and slips anew."""
+    size = len(closed.row) // len(closed.points) * closed.counts[0]
+    total = 0.0
+    for i in range(size):
+        total += abs(lam[i])
+    for i in range(size):
+        if not total < 1e300:
+            lam[i] = 0.0
+    multiply_even(closed.block, size, lam, w)
+    for i in range(size):
+        w[i] += q[i]
+
+
+@inner
+def _settle(
+    closed: Closed,
+    q: Vector,
+    mu: Vector,
+    lam: Vector,
+    w: Vector,
+    doing: States,
+    along: Matrix,
+    stiffer: Vector,
+    tolerance: float,
+) -> int:
+    """Forces of the closed points by Newton's method, or in turn; returns as the solver does.
+
+    A few sweeps first bring Newton's method back on its way.
+    """
+    d = len(closed.row) // len(closed.points)
+    sweeps, rounds = 0, 0
+    _tame(closed, q, lam, w)
+    for _ in range(_CALMS):
+        more = _rounds(closed, mu, lam, w, doing, along, stiffer, tolerance)
+        rounds += abs(more)
+        if more > 0:
+            return -rounds - sweeps if sweeps else rounds
+        _tame(closed, q, lam, w)
+        for _ in range(_SWEEPS):
+            _sweep(closed, d, mu, lam, w)
+        sweeps += _SWEEPS
+    best, since = 1e300, 0
+    while since < _STILL:
+        _sweep(closed, d, mu, lam, w)
+        sweeps += 1
+        worst = _judge(closed, d, mu, lam, w, doing, along, stiffer)
+        if worst <= tolerance:
+            return -rounds - sweeps
+        since += 1
+        if worst < 0.9 * best:
+            best, since = worst, 0
+    return 0
+
+
+@inner
+def _solve_closed(
+    closed: Closed, q: Vector, mu: Vector, lam: Vector, doing: States, tolerance: float
+) -> int:
+    """Forces of the closed points alone; returns as :func:`solve_rubbing`."""
+    n, m = len(closed.points), closed.counts[0]
+    d = len(q) // n
+    mine, forces, own, w = np.empty(d * m), np.empty(d * m), np.empty(m), np.empty(d * m)
+    what, along, stiffer = np.empty(m, dtype=np.int64), np.zeros((m, 2)), np.zeros(m)
+    for s in range(m):
+        k = closed.points[s]
+        own[s] = mu[k]
+        for c in range(d):
+            mine[d * s + c], forces[d * s + c] = q[c * n + k], lam[c * n + k]
+    rounds = _settle(closed, mine, own, forces, w, what, along, stiffer, tolerance)
+    for s in range(m):
+        k = closed.points[s]
+        doing[k] = what[s]
+        for c in range(d):
+            lam[c * n + k] = forces[d * s + c] if what[s] != OPEN else 0.0
+        lam[k] = max(0.0, lam[k])
+    return int(rounds)
 
 
 @njit
@@ -196,12 +534,13 @@ def solve_rubbing(
     A: Matrix,
     q: Vector,
     mu: Vector,
+    closed: Closed,
     lam: Vector,
     w: Vector,
     doing: States,
     tolerance: float,
 ) -> int:
-    """Forces of contact points with friction; returns the rounds, negative: those in turn.
+    """Forces of contact points with friction; returns the rounds, negative where some took turns.
 
     Parameters
     ----------
@@ -211,6 +550,8 @@ def solve_rubbing(
     q : array, shape (d n,) [m]
         Gaps and slips without these forces.
     mu : array, shape (n,) [-]
+    closed : Closed
+        Of the step before, for the same A; changed in place.
     lam : array, shape (d n,) [N]
         In: first guess, out: the solution.
     w : array, shape (d n,) [m]
@@ -223,67 +564,32 @@ def solve_rubbing(
     Returns
     -------
     rounds : int
-        0 where not even taking turns has ended.
+        And sweeps; 0 where not even taking turns has ended.
     """
-    n = len(mu)
-    ways = len(q) // n - 1
-    along, stiffer = np.zeros((n, ways)), np.zeros(n)
-    place, kind = np.empty(len(q), dtype=np.int64), np.empty(len(q), dtype=np.int64)
+    n, total, in_turn = len(mu), 0, False
+    d = len(q) // n
+    for s in range(closed.counts[0] - 1, -1, -1):
+        if lam[closed.points[s]] <= 0.0:
+            dismiss(closed, s)
     for k in range(n):
         if lam[k] <= 0.0:
-            for c in range(ways + 1):
+            doing[k] = OPEN
+            for c in range(d):
                 lam[c * n + k] = 0.0
-    for rounds in range(1, _ROUNDS):
-        _answer(A, q, n, ways, lam, w)
-        if _judge(A, mu, n, ways, lam, w, doing, along, stiffer) <= tolerance:
-            return rounds
-        _newton(A, q, mu, n, ways, lam, doing, along, stiffer, place, kind)
-    return -rub_in_turn(A, q, mu, lam, w, doing, tolerance)
-
-
-@njit
-def rub_in_turn(
-    A: Matrix,
-    q: Vector,
-    mu: Vector,
-    lam: Vector,
-    w: Vector,
-    doing: States,
-    tolerance: float,
-) -> int:
-    """The same by taking turns, point by point, direction by direction; returns the sweeps or 0.
-
-    Parameters
-    ----------
-    A, q, mu, lam, w, doing, tolerance
-        See :func:`solve_rubbing`.
-    """
-    n = len(mu)
-    ways = len(q) // n - 1
-    along, stiffer = np.zeros((n, ways)), np.zeros(n)
-    for i in range(len(lam)):
-        lam[i] = 0.0
-    for sweep in range(1, _SWEEPS):
+        elif closed.place[k] < 0:
+            admit(A, closed, k)
+    more = True
+    while more:
+        if closed.counts[0] > 0:
+            rounds = _solve_closed(closed, q, mu, lam, doing, tolerance)
+            if rounds == 0:
+                return 0
+            total += abs(rounds)
+            in_turn = in_turn or rounds < 0
+        _answer(A, q, closed, lam, w)
+        more = False
         for k in range(n):
-            moved = q[k]
-            for i in range(len(q)):
-                moved += A[k, i] * lam[i]
-            lam[k] = max(0.0, lam[k] - moved / A[k, k])
-            most, size, own = mu[k] * lam[k], 0.0, 0.0
-            for c in range(ways):
-                own = max(own, A[(c + 1) * n + k, (c + 1) * n + k])
-            for c in range(ways):
-                r = (c + 1) * n + k
-                moved = q[r]
-                for i in range(len(q)):
-                    moved += A[r, i] * lam[i]
-                along[k, c] = lam[r] - moved / own
-                size += along[k, c] ** 2
-            size = np.sqrt(size)
-            for c in range(ways):
-                lam[(c + 1) * n + k] = along[k, c] * (min(1.0, most / size) if size > 0.0 else 0.0)
-        if sweep % 10 == 0:
-            _answer(A, q, n, ways, lam, w)
-            if _judge(A, mu, n, ways, lam, w, doing, along, stiffer) <= tolerance:
-                return sweep
-    return 0
+            if closed.place[k] < 0 and w[k] < -tolerance * A[k, k]:
+                admit(A, closed, k)
+                more = True
+    return -total if in_turn else max(total, 1)
