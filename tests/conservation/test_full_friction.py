@@ -90,7 +90,7 @@ def test_friction_takes_energy_in_every_step(law):
     assert np.min(np.diff(energy.friction)) >= 0.0
     assert energy.friction[-1] > 0.01 * scale
     assert np.min(np.diff(energy.contact)) > -1e-11 * scale
-    assert np.max(np.diff(energy.total)) <= 1e-11 * scale
+    assert np.max(np.diff(energy.total)) <= 5e-11 * scale
 
 
 def test_massless_scheme_agrees():

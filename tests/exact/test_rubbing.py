@@ -231,13 +231,13 @@ def test_faces_that_close_and_turn_round_as_a_whole_take_few_rounds():
     gap = 1.0 * (at - 0.45) ** 2
     q = np.concatenate([gap - 0.5, np.full(16, -0.5)])
     lam, w, doing = np.zeros(32), np.empty(32), np.zeros(16, dtype=np.int64)
-    assert 0 < solve_rubbing(A, q, mu, lam, w, doing, 1e-12) < 10
+    assert 0 < solve_rubbing(A, q, mu, Closed.none(16, 1), lam, w, doing, 1e-12) < 10
     closed = lam[:16] > 0
     assert 4 < closed.sum() < 16  # the rest opens on the way
     np.testing.assert_allclose(lam[16:], mu * lam[:16], atol=1e-12)
     for move, state in ((0.01, STICK), (1.0, SLIP)):
         again, back = lam.copy(), np.concatenate([q[:16], move - kernel @ lam[16:]])
-        assert 0 < solve_rubbing(A, back, mu, again, w, doing, 1e-12) < 10
+        assert 0 < solve_rubbing(A, back, mu, Closed.none(16, 1), again, w, doing, 1e-12) < 10
         assert np.any(doing == state)
         if state == SLIP:
             np.testing.assert_allclose(again[16:], -mu * again[:16], atol=1e-12)

@@ -30,6 +30,7 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.rubbing_fit import Loop
 from klack.contact.statics import StaticContact, check_rim
 from klack.errors import ConvergenceError, InputError
+from klack.transient.interface_arrays import Closed
 from klack.transient.rubbing import solve_rubbing
 
 __all__ = ["LockedError", "RubbingContact", "TangentialRows", "rubbing_contact"]
@@ -225,7 +226,8 @@ class _State:
         q[self.count :] -= self.offset
         w, doing = np.empty_like(q), np.zeros(self.count, dtype=np.int64)
         for lam in (self.lam.copy(), self._without_friction(q)):
-            if solve_rubbing(self.C, q, self.mu, lam, w, doing, self.tolerance) != 0:
+            closed = Closed.none(self.count, len(q) // self.count - 1)
+            if solve_rubbing(self.C, q, self.mu, closed, lam, w, doing, self.tolerance) != 0:
                 break
         else:
             raise ConvergenceError(

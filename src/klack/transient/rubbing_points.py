@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError
+from klack.transient.interface_arrays import Closed
 from klack.transient.rubbing import OPEN, SLIP, solve_rubbing
 
 __all__ = ["RubbingPoints"]
 
-_PRECISION = 1e-12
+_PRECISION = 1e-13
 """Residual of the law over the largest force that one point would need by itself."""
 
 _LEAST_GAP = 1e-18
@@ -45,6 +46,7 @@ class RubbingPoints:
         self.turns = 0
         self._points = np.empty(0, dtype=np.int64)
         self._A = np.empty((0, 0))
+        self._closed = Closed.none(0, ways)
 
     def watch(self, points: NDArray[np.int64], A: NDArray[np.float64]) -> None:
         """Watch these points, shape (n,), from now on.
@@ -62,6 +64,7 @@ class RubbingPoints:
         """
         # factors in single precision leave it symmetric to 1e-7 only
         self._points, self._A = points, np.ascontiguousarray(0.5 * (A + A.T))
+        self._closed = Closed.none(len(points), self._ways)
         own = np.diag(self._A).reshape(self._ways + 1, -1)
         self._own = own[0]
         fixed = np.flatnonzero(own[1:].max(axis=0) <= _RIGID * own[0])
@@ -107,7 +110,9 @@ class RubbingPoints:
         needed = max(float(np.max(-q[:n] / self._own)), float(np.max(guess[:n])))
         least = _LEAST_GAP / float(np.mean(self._own))
         try:
-            rounds = solve_rubbing(self._A, q, mu, lam, w, doing, max(_PRECISION * needed, least))
+            rounds = solve_rubbing(
+                self._A, q, mu, self._closed, lam, w, doing, max(_PRECISION * needed, least)
+            )
         except np.linalg.LinAlgError:
             rounds = 0
         if rounds == 0:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.contact.friction import Friction
 from klack.materials import Material
+from klack.transient.interface_arrays import Closed
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface
 from klack.transient.rubbing import solve_rubbing
@@ -214,13 +215,13 @@ def _cattaneo() -> list[Check]:
     n = len(points)
     C = half_space_compliance(points, size, STEEL, STEEL)
     lam, w, doing = np.zeros(3 * n), np.zeros(3 * n), np.zeros(n, dtype=np.int64)
-    coefficient, bent = np.full(n, mu), np.zeros(2 * n)
+    coefficient, bent, closed = np.full(n, mu), np.zeros(2 * n), Closed.none(n, 2)
     gap = np.sum(points**2, axis=1) / (2.0 * radius) - approach
 
     def moved_by(way: float) -> float:
         """Tangential force against the next part of the way of the upper body."""
         q = np.concatenate([gap, np.full(n, way) - bent[:n], -bent[n:]])
-        solve_rubbing(C, q, coefficient, lam, w, doing, 1e-9 * max(lam.max(), 1.0))
+        solve_rubbing(C, q, coefficient, closed, lam, w, doing, 1e-9 * max(lam.max(), 1.0))
         bent[:] = (C @ lam)[n:]
         return -float(lam[n : 2 * n].sum())
 
