@@ -31,6 +31,12 @@ __all__ = ["friction_work", "offset_change", "push_across", "remember", "rub", "
 
 Vector = NDArray[np.float64]
 
+_SHARE = 1e-2
+"""Of a force that counts as zero, what the law may be missed by.
+
+It is energy that the contact owes, and where the bodies turn round they travel too little for a
+small change of the forces to pay it."""
+
 
 @inner
 def offset_change(
@@ -92,7 +98,7 @@ def rub(
         rubbing.forces,
         motion,
         rubbing.doing,
-        tolerance,
+        _SHARE * tolerance,
     )
     carrying = 0
     for k in range(n):
