@@ -7,6 +7,7 @@ import numpy as np
 from klack.case.bodies import CaseFile, SurfaceName
 from klack.case.given_consistency import check_given, check_port
 from klack.case.impact_sections import ImpactSections
+from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
@@ -258,12 +259,40 @@ def _check_shots(case: ImpactSections) -> None:
             hint=f"add '{other}' (0 is possible), or remove '{given}'.",
             on_key=True,
         )
-    drawn = ("eccentricity", "tilt", "force", "waviness")
+    _check_drawn_friction(case)
+    drawn = ("eccentricity", "tilt", "force", "contact_friction", "waviness")
     if case.guide is None and all(getattr(shots, name) is None for name in drawn):
         raise CaseProblem(
             ("shots",),
             got="identical shots",
             expected=f"a section 'guide', or at least one of: {one_of(drawn)}",
             hint="'guide' draws placements within its clearance.",
+            on_key=True,
+        )
+
+
+def _check_drawn_friction(case: ImpactSections) -> None:
+    """Check that the static coefficient of the faces can follow the drawn kinetic one."""
+    faces = case.contact.faces
+    drawn = case.shots.contact_friction if case.shots is not None else None
+    if drawn is None or faces.is_constant:
+        return
+    if faces.kinetic == 0.0:
+        raise CaseProblem(
+            ("shots", "contact_friction"),
+            got=f"drawn friction with contact.static_friction {faces.static:g} and contact.friction"
+            " 0",
+            expected="contact.friction above 0: the static coefficient keeps its ratio to it",
+            hint="give contact.friction, or remove contact.static_friction.",
+            on_key=True,
+        )
+    ratio = faces.static / faces.kinetic
+    if ratio * drawn.largest > MOST_FRICTION:
+        raise CaseProblem(
+            ("shots", "contact_friction"),
+            got=f"static coefficients up to {ratio * drawn.largest:.3g}, {ratio:.3g} times the "
+            "drawn one as in 'contact'",
+            expected=f"at most {MOST_FRICTION:g} in every shot",
+            hint="draw smaller coefficients, or remove contact.static_friction.",
             on_key=True,
         )

@@ -73,6 +73,11 @@ class Distribution:
         return self.first
 
     @property
+    def largest(self) -> float:
+        """Value that one draw in 1e12 exceeds; the end of a distribution that has one."""
+        return self.quantile(1.0 - _RARE) if self.kind != "uniform" else self.second
+
+    @property
     def is_fixed(self) -> bool:
         """True if every draw gives the same."""
         return self.kind == "fixed" or (self.kind == "uniform" and self.first == self.second)
@@ -96,6 +101,7 @@ class Distribution:
         }[self.kind]
 
 
+_RARE = 1e-12
 _NUMBERS = {"uniform": 2, "normal": 2, "rayleigh": 1}
 _MEANING = {
     "uniform": "[lowest, highest]",

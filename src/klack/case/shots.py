@@ -2,14 +2,16 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
 from klack.case.distribution import (
     AngleDistribution,
+    Distribution,
     ForceDistribution,
     LengthDistribution,
     RatioDistribution,
 )
+from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Section
 from klack.units import Time, format_si
@@ -73,9 +75,25 @@ class Shots(Section):
     friction: RatioDistribution | None = Field(
         default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
     )
+    contact_friction: RatioDistribution | None = Field(
+        default=None,
+        description="Coulomb's coefficient between the faces; default that of 'contact'.",
+    )
     waviness: Waviness | None = Field(
         default=None, description="Out-of-roundness of the contact ring; default none."
     )
+
+    @field_validator("contact_friction", mode="after")
+    @classmethod
+    def _most_friction(cls, drawn: Distribution | None) -> Distribution | None:
+        if drawn is not None and drawn.largest > MOST_FRICTION:
+            raise CaseProblem(
+                (),
+                got=f"coefficients up to {drawn.largest:.3g}",
+                expected=f"at most {MOST_FRICTION:g} in every shot",
+                hint="dry clean metals reach 1; {uniform: [0.1, 0.2]} ends where it says.",
+            )
+        return drawn
 
     @model_validator(mode="after")
     def _steps(self) -> Self:

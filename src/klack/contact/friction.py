@@ -68,6 +68,29 @@ class Friction:
         """One coefficient, whether the faces stick or slip."""
         return cls(kinetic=coefficient, static=coefficient)
 
+    def scaled(self, kinetic: float) -> "Friction":
+        """Faces of another kinetic coefficient [-], the static one in the same ratio to it.
+
+        Raises
+        ------
+        InputError
+            Where the ratio is not known: for a kinetic coefficient of 0 below a static one.
+        """
+        if kinetic == self.kinetic:
+            return self
+        if self.is_constant:
+            return Friction(kinetic=kinetic, static=kinetic, speed=self.speed)
+        if self.kinetic == 0.0:
+            raise InputError(
+                "friction: kinetic",
+                got=f"0, below a static coefficient of {self.static:g}",
+                expected="a ratio of both coefficients",
+                hint="give the kinetic coefficient of these faces.",
+            )
+        return Friction(
+            kinetic=kinetic, static=kinetic * (self.static / self.kinetic), speed=self.speed
+        )
+
     @property
     def is_none(self) -> bool:
         """True where the faces hold nothing across their normal."""

@@ -20,7 +20,7 @@ from klack.analyses.shots.figures import (
     rebound_chart,
 )
 from klack.analyses.shots.map import shots_map
-from klack.analyses.shots.measures import DRAWN, FIRST_IMPACT, ROCKING, Shot
+from klack.analyses.shots.measures import DRAWN, FIRST_IMPACT, FRICTION_LOSS, ROCKING, Shot
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
 from klack.analyses.shots.wording import (
     largest_size,
@@ -62,8 +62,8 @@ def shots_content(study: ShotsStudy) -> Content:
         answer=shots_answer(study),
         numbers=_number_table(study),
         sections=sections,
-        definitions=_DEFINITIONS,
-        limits=_LIMITS,
+        definitions=_definitions(study),
+        limits=_limits(study),
     )
 
 
@@ -100,6 +100,7 @@ def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
         Shown("tilt", "tilt", "°", np.degrees(1.0)),
         Shown("force", "closing force", "N", 1.0),
         Shown("friction", "friction in the guide", "", 1.0),
+        Shown("contact_friction", "friction between the faces", "", 1.0),
         Shown("waviness", "out-of-roundness, rms", "nm", 1e9),
     )
     varying = [shown for shown in candidates if _varies(study.shots, shown.column)]
@@ -152,6 +153,7 @@ def _drawn(study: ShotsStudy) -> Section:
     facts = [
         ("seed", str(study.seed)),
         ("guide", study.guide or "none"),
+        ("friction between the faces", study.faces or "none"),
         ("surfaces", study.surfaces),
         ("moving mass", quantity(1e3 * study.mass, "g")),
         (
@@ -206,11 +208,18 @@ def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
         ("towards\n[°]", _angle("tilt_direction"), "tilt_direction", False),
         ("force\n[N]", _plain("force", 1.0, 2), "force", False),
         ("friction", _plain("friction", 1.0, 3), "friction", False),
+        (
+            "friction\nof the faces",
+            _plain("contact_friction", 1.0, 3),
+            "contact_friction",
+            False,
+        ),
         ("waviness\n[nm]", _plain("waviness", 1e9, 0), "waviness", False),
         ("restitution", _plain("restitution", 1.0, 4), "restitution", True),
         (f"rebound\n[{unit}]", _plain("rebound_height", factor, 3), "rebound_height", True),
         ("peak\n[N]", _plain("peak_force", 1.0, 1), "peak_force", True),
         ("contact\n[µs]", _plain("contact_time", 1e6, 2), "contact_time", True),
+        ("lost in\nfriction [%]", _plain("friction_loss", 100.0, 2), "friction_loss", False),
     )
 
 
@@ -235,16 +244,7 @@ def _plain(column: str, factor: float, decimals: int) -> _ShotText:
 def _number_table(study: ShotsStudy) -> Table:
     """Centred, highest, and the spread of all shots."""
     rows = [_number_row(study, measure) for measure in FIRST_IMPACT]
-    rows.append(
-        (
-            ROCKING.name,
-            ROCKING.printed(float(study.centric.rocking[0])),
-            ROCKING.printed(float(study.shots.rocking[study.highest])),
-            ROCKING.printed(float(np.nanmean(study.shots.rocking))),
-            ROCKING.printed(float(np.nanstd(study.shots.rocking))),
-            _range_of(study.shots.rocking, ROCKING.printed),
-        )
-    )
+    rows += [_share_row(study, measure) for measure in _shares(study)]
     worst = largest_size(study.shots.energy_residual)
     rows.append(("energy residual, largest", "", "", "", "", f"{worst:.1e}".replace("-", "−")))
     return Table(
@@ -281,48 +281,80 @@ def _number_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
     )
 
 
+def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
+    """Shares of the energy of approach that a page of this study has."""
+    return (ROCKING, FRICTION_LOSS) if study.faces else (ROCKING,)
+
+
+def _share_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
+    values = np.asarray(getattr(study.shots, measure.key))
+    return (
+        measure.name,
+        measure.printed(float(getattr(study.centric, measure.key)[0])),
+        measure.printed(float(values[study.highest])),
+        measure.printed(float(np.nanmean(values))),
+        measure.printed(float(np.nanstd(values))),
+        _range_of(values, measure.printed),
+    )
+
+
 def _range_of(values: NDArray[np.float64], text: Callable[[float], str]) -> str:
     return f"{text(float(np.nanmin(values)))} to {text(float(np.nanmax(values)))}"
 
 
 # --------------------------------------------------------------------------- words
 
-_DEFINITIONS: tuple[tuple[str, str], ...] = (
-    (
-        "shot",
-        "One drop of the moving body onto its seat, with its bounces, at the interface "
-        "level: both bodies as modes, a point-resolved contact, six rigid degrees of freedom of "
-        "the moving body. Only what is listed under 'Distributions' differs between shots.",
-    ),
-    (
-        "centred impact",
-        "The same drop without eccentricity, tilt, out-of-roundness and Coulomb friction, with the "
-        "mean closing force.",
-    ),
-    (
-        "the rule, its bias",
-        "Rebounds of dry shots scatter, and the highest one is usually taken as that of a centred "
-        "impact. The bias is the highest value minus the centred one: the error of the rule "
-        "for this valve. It depends on the number of shots and on the distributions.",
-    ),
-    *glossary((*DRAWN, *FIRST_IMPACT, ROCKING)),
-    (
-        "pressure",
-        "Force of a contact point, normal to the surface, over its area. Sums such as the line "
-        "load are far more accurate than the pressure at one point.",
-    ),
+_CENTRED_RUBS = (
+    " Friction between the faces stays, with the mean coefficient: those of a centred valve slip "
+    "on each other, too."
 )
 
-_LIMITS: tuple[tuple[str, str], ...] = (
-    (
-        "Physics",
-        "Linear elastic bodies with small deformations; frictionless contact of smooth surfaces at "
-        "the seat; no fluid, no plastic flow. Out-of-roundness is a fixed shape of the ring that "
-        "differs from shot to shot.",
-    ),
-    (
-        "Chance",
-        "Another seed draws other shots: the highest of so many is itself a random number. The "
-        "answer holds for the distributions stated, not for others.",
-    ),
-)
+
+def _definitions(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
+    drawn = [item for item in DRAWN if study.faces or item.key != "contact_friction"]
+    return (
+        (
+            "shot",
+            "One drop of the moving body onto its seat, with its bounces, at the interface "
+            "level: both bodies as modes, a point-resolved contact, six rigid degrees of freedom "
+            "of the moving body. Only what is listed under 'Distributions' differs between shots.",
+        ),
+        (
+            "centred impact",
+            "The same drop without eccentricity, tilt, out-of-roundness and Coulomb friction in "
+            "the guide, with the mean closing force." + (_CENTRED_RUBS if study.faces else ""),
+        ),
+        (
+            "the rule, its bias",
+            "Rebounds of dry shots scatter, and the highest one is usually taken as that of a "
+            "centred impact. The bias is the highest value minus the centred one: the error of the "
+            "rule for this valve. It depends on the number of shots and on the distributions.",
+        ),
+        *glossary((*drawn, *FIRST_IMPACT, *_shares(study))),
+        (
+            "pressure",
+            "Force of a contact point, normal to the surface, over its area. Sums such as the line "
+            "load are far more accurate than the pressure at one point.",
+        ),
+    )
+
+
+def _limits(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
+    contact = (
+        "contact of smooth surfaces with Coulomb friction, whose coefficient is the same at every "
+        "point and in every impact of a shot"
+        if study.faces
+        else "frictionless contact of smooth surfaces"
+    )
+    return (
+        (
+            "Physics",
+            f"Linear elastic bodies with small deformations; {contact}; no fluid, no plastic "
+            "flow. Out-of-roundness is a fixed shape of the ring that differs from shot to shot.",
+        ),
+        (
+            "Chance",
+            "Another seed draws other shots: the highest of so many is itself a random number. The "
+            "answer holds for the distributions stated, not for others.",
+        ),
+    )

@@ -2,7 +2,8 @@ r"""Random draws of the quantities that vary between drops of one valve.
 
 Each shot has its own stream of numbers, seeded by (seed, index): its draw depends neither on how
 many shots there are nor on who computes them.  Every quantity always takes the same members of that
-stream, so a change of one distribution leaves the draws of all others as they were.
+stream, so a change of one distribution leaves the draws of all others as they were; a new quantity
+takes a member behind all others.
 
 With a guide and no stated distribution, the axis of the moving body passes through one point of the
 clearance disc at the lowest guiding height, and one at the highest, each uniform over its disc:
@@ -30,6 +31,7 @@ __all__ = [
     "closing_force",
     "draw_shot",
     "extreme_placements",
+    "face_friction",
     "polar",
     "shots_of",
 ]
@@ -39,7 +41,8 @@ _HIGHEST_HARMONIC = 40
 # Members of the stream of a shot.
 _PLACE, _TILT = slice(0, 2), slice(2, 4)
 _FORCE, _FRICTION, _WAVINESS, _HARMONICS = 4, 5, 6, 7
-_NUMBERS = _HARMONICS + 2 * _HIGHEST_HARMONIC
+_FACES = _HARMONICS + 2 * _HIGHEST_HARMONIC
+_NUMBERS = _FACES + 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,6 +60,9 @@ class ShotDraw:
     force : float [N]
         Closing force at first touch.
     friction : float [-]
+        Coulomb's coefficient in the guide.
+    contact_friction : float [-]
+        That between the faces, while they slip.
     waviness : float [m]
         Root mean square.
     waves : array, shape (h, 2) [m]
@@ -69,6 +75,7 @@ class ShotDraw:
     lean: NDArray[np.float64]
     force: float
     friction: float
+    contact_friction: float
     waviness: float
     waves: NDArray[np.float64]
     harmonics: NDArray[np.int64]
@@ -83,6 +90,12 @@ def closing_force(case: Case) -> Distribution:
     """Distribution of the closing force at first touch."""
     stated = case.shots.force if case.shots is not None else None
     return stated if stated is not None else Distribution("fixed", case.motion.closing_force)
+
+
+def face_friction(case: Case) -> Distribution:
+    """Distribution of the kinetic coefficient of friction between the faces."""
+    stated = case.shots.contact_friction if case.shots is not None else None
+    return stated if stated is not None else Distribution("fixed", case.contact.friction)
 
 
 def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
@@ -122,6 +135,7 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
         lean=lean,
         force=force,
         friction=friction,
+        contact_friction=face_friction(case).quantile(stream[_FACES]),
         waviness=waviness,
         waves=waves * (waviness / scale) if scale > 0.0 else waves,
         harmonics=harmonics,
@@ -131,7 +145,9 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
 def centric_draw(case: Case) -> ShotDraw:
     """Return the shot that all others scatter around: centred, upright, round, with the mean force.
 
-    It has no Coulomb friction; viscous drag in the guide is no scatter and stays.
+    It has no Coulomb friction in the guide, which a centred body does not touch; viscous drag there
+    is no scatter and stays.  Friction between the faces belongs to the valve: they slip on each
+    other in a centred impact, too, with the mean coefficient.
     """
     return ShotDraw(
         index=-1,
@@ -139,6 +155,7 @@ def centric_draw(case: Case) -> ShotDraw:
         lean=np.zeros(2),
         force=closing_force(case).mean,
         friction=0.0,
+        contact_friction=face_friction(case).mean,
         waviness=0.0,
         waves=np.zeros((0, 2)),
         harmonics=np.zeros(0, dtype=np.int64),

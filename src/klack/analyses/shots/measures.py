@@ -8,6 +8,7 @@ from klack.analyses.shots.record import RuleVerdict
 __all__ = [
     "DRAWN",
     "FIRST_IMPACT",
+    "FRICTION_LOSS",
     "RESULTS",
     "ROCKING",
     "RULE_MEASURES",
@@ -59,6 +60,13 @@ DRAWN: tuple[Measure[Shot], ...] = described_in(
         name="friction in the guide",
         symbol="mu",
         definition="Coulomb's coefficient in the guide.",
+        form="fixed",
+    ),
+    Measure(
+        key="contact_friction",
+        name="friction between the faces",
+        symbol="mu_f",
+        definition="Coulomb's coefficient between the faces in contact, while they slip.",
         form="fixed",
     ),
     Measure(
@@ -122,6 +130,17 @@ ROCKING = Measure[Shot](
     note="The loss of rebound by an eccentric or tilted impact.",
 )
 
+FRICTION_LOSS = Measure[Shot](
+    key="friction_loss",
+    name="lost in friction between the faces",
+    symbol="E_f/E_0",
+    definition="Energy that friction between the faces takes in the first impact, over the energy "
+    "of approach.",
+    form="share",
+    digits=2,
+)
+"""0 for faces without friction."""
+
 SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
     _THEORY,
     *DRAWN,
@@ -139,6 +158,7 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
         kind="whole",
     ),
     ROCKING,
+    FRICTION_LOSS,
     Measure(
         key="second_impact",
         symbol="t_2",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.impact.run import ImpactBodies, impact_bodies
-from klack.analyses.shots.draw import extreme_placements, shots_of
+from klack.analyses.shots.draw import extreme_placements, face_friction, shots_of
 from klack.analyses.shots.one_shot import ShotSetup, rigid_placement
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.placement import Placement
@@ -60,10 +60,14 @@ class ShotModel:
 def centred_case(case: Case) -> Case:
     """Return the case with the moving body centred, upright and in first touch.
 
-    Transfer functions, which take more modes, are left to ``klack impact``.
+    Between the faces acts the mean friction of the shots, as in the centred one.  Transfer
+    functions, which take more modes, are left to ``klack impact``.
     """
     motion = case.motion.model_copy(update={"placement": Placement()})
-    contact = case.contact.model_copy(update={"gap": 0.0})
+    faces = case.contact.faces.scaled(face_friction(case).mean)
+    contact = case.contact.model_copy(
+        update={"gap": 0.0, "friction": faces.kinetic, "static_friction": faces.static}
+    )
     opposite = case.opposite
     if opposite is not None:  # its way counts from the start
         way = opposite.gap + (case.contact.gap or 0.0)
@@ -119,10 +123,12 @@ def _model(
     drawn_height = height - pair.shift
     space = _candidates(case, problem, height, drawn_height)
     progress("interface", 0.2)
-    compliance = extended_compliance(
-        space, problem.static, problem.flexibility_upper, problem.flexibility_lower
-    )
-    progress("interface", 0.8)
+    compliance = None
+    if problem.case.contact.faces.is_none:  # else the model needs that of all directions
+        compliance = extended_compliance(
+            space, problem.static, problem.flexibility_upper, problem.flexibility_lower
+        )
+        progress("interface", 0.8)
     model = build_interface(problem, bodies.pools, space=space, compliance=compliance)
     guide = build_guide(problem, model, bodies.pools)
     progress("interface", 1.0)

@@ -1,7 +1,7 @@
 """One drop of a valve at the interface level, from a draw to its numbers."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class ShotSetup:
     Parameters
     ----------
     model : InterfaceModel
-        Centred, in first touch.
+        Centred, in first touch, with the mean friction between the faces.
     guide : Guide or None
     gaps : RigidGaps
     about : array, shape (3,) [m]
@@ -90,6 +90,16 @@ class ShotSetup:
     def force_time(self) -> NDArray[np.float64]:
         """Grid of the force of the first impact, from first touch [s]."""
         return np.linspace(0.0, self.force_span, _FORCE_POINTS + 1)
+
+    def model_of(self, draw: ShotDraw) -> InterfaceModel:
+        """Model with the friction between the faces of this draw, at all contacts.
+
+        A static coefficient keeps its ratio to the kinetic one; speeds of slip stay.
+        """
+        if not self.model.ways:
+            return self.model
+        faces = tuple(friction.scaled(draw.contact_friction) for friction in self.model.friction)
+        return replace(self.model, friction=faces)
 
     def gaps_of(self, draw: ShotDraw) -> "ShotGaps":
         """Gaps as a function of the placement, with the ring of this draw."""
@@ -176,7 +186,7 @@ def simulate_shot(
     """
     guide = setup.guide.with_friction(draw.friction) if setup.guide is not None else None
     return simulate_interface(
-        setup.model,
+        setup.model_of(draw),
         speed=setup.speed,
         duration=setup.duration,
         step=setup.step,
@@ -212,6 +222,7 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
         "tilt_direction": tilt_direction,
         "force": draw.force,
         "friction": draw.friction,
+        "contact_friction": draw.contact_friction,
         "waviness": draw.waviness,
         "approach_speed": first.approach_speed,
         "restitution": first.restitution,
@@ -221,6 +232,7 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
         "impulse": first.impulse,
         "sub_contacts": float(first.sub_contacts),
         "rocking": _rocking(setup, result, release, first),
+        "friction_loss": _friction_loss(setup, result, first),
         "second_impact": second - first.first_touch,
         "impacts": float(len(result.impacts)),
         "energy_residual": result.energy.residual,
@@ -318,3 +330,9 @@ def _rocking(
     v = motion.velocity[after]
     energy = setup.model.mass * float(v[:2] @ v[:2]) + float(v[3:] @ setup.inertia @ v[3:])
     return energy / (setup.model.mass * first.approach_speed**2)
+
+
+def _friction_loss(setup: ShotSetup, result: InterfaceResult, first: ImpactMeasures) -> float:
+    """Energy that the first impact loses between the faces, over that of approach."""
+    lost = result.impacts[0].history.ledger.friction
+    return lost / (0.5 * setup.model.mass * first.approach_speed**2)

@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,11 @@ __all__ = [
 ]
 
 Column = NDArray[np.float64]
+
+
+def _not_kept() -> Column:
+    """Column of a result that has none."""
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,6 +45,8 @@ class ShotColumns:
         Closing force at first touch.
     friction : array [-]
         Coulomb's coefficient in the guide.
+    contact_friction : array [-]
+        That between the faces, while they slip; 0 in results without it.
     waviness : array [m]
         Root mean square out-of-roundness of the ring.
     approach_speed : array [m/s]
@@ -55,6 +62,9 @@ class ShotColumns:
     rocking : array [-]
         Kinetic energy of rotation and lateral motion right after the first impact, over the energy
         of approach.
+    friction_loss : array [-]
+        Energy that friction between the faces takes in the first impact, over the energy of
+        approach; 0 in results without it.
     second_impact : array [s]
         Time from the first touch to that of the second impact; nan if there was none.
     impacts : array [-]
@@ -69,6 +79,7 @@ class ShotColumns:
     tilt_direction: Column
     force: Column
     friction: Column
+    contact_friction: Column = field(default_factory=_not_kept)
     waviness: Column
     approach_speed: Column
     restitution: Column
@@ -78,9 +89,16 @@ class ShotColumns:
     impulse: Column
     sub_contacts: Column
     rocking: Column
+    friction_loss: Column = field(default_factory=_not_kept)
     second_impact: Column
     impacts: Column
     energy_residual: Column
+
+    def __post_init__(self) -> None:
+        """Fill in what results of klack up to 0.1 do not have: their faces had no friction."""
+        for name in ("contact_friction", "friction_loss"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.zeros(self.count))
 
     @property
     def count(self) -> int:
@@ -89,7 +107,7 @@ class ShotColumns:
 
     def row(self, index: int) -> dict[str, float]:
         """Return all numbers of one shot by the name of their column."""
-        return {field.name: float(getattr(self, field.name)[index]) for field in fields(self)}
+        return {item.name: float(getattr(self, item.name)[index]) for item in fields(self)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -165,6 +183,8 @@ class ShotsStudy(CaseRecord):
         For example ``"needle.tip on housing.seat"``.
     guide : str
         The guide in words; empty without one.
+    faces : str
+        Friction between the faces in words; empty without.
     mass : float [kg]
         Of the moving body.
     modes : tuple of int
@@ -175,7 +195,8 @@ class ShotsStudy(CaseRecord):
         Largest approach of any shot.
     shots : ShotColumns
     centric : ShotColumns
-        One row: no eccentricity, tilt, waviness or Coulomb friction, and the mean force.
+        One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
+        and the mean coefficient of friction between the faces.
     shot_traces, centric_traces : ShotTraces
     highest : int
         Row of the shot with the highest rebound.
@@ -206,3 +227,4 @@ class ShotsStudy(CaseRecord):
     highest: int
     rule: RuleVerdict
     pressures: Mapping[str, PressureRecord]
+    faces: str = ""

@@ -18,6 +18,7 @@ from klack.analyses.shots.draw import (
     centric_draw,
     closing_force,
     draw_shot,
+    face_friction,
     shots_of,
 )
 from klack.analyses.shots.log import ShotLog, shot_log, shots_mark
@@ -136,6 +137,7 @@ def run_shots(
         distributions=_distributions(case),
         surfaces=f"{case.contact.moving} on {case.contact.stop}",
         guide=_guide_in_words(case.guide),
+        faces=_faces_in_words(case),
         mass=model.setup.model.mass,
         modes=model.modes,
         points=model.setup.model.count,
@@ -294,10 +296,31 @@ def _distributions(case: Case) -> dict[str, str]:
         words["friction"] = shots.friction.text("")
     elif case.guide is not None:
         words["friction"] = format_si(case.guide.friction, "")
+    if shots.contact_friction is not None:
+        words["friction between the faces"] = shots.contact_friction.text("")
     if shots.waviness is not None:
         low, high = shots.waviness.harmonics
         words["waviness"] = f"{shots.waviness.rms.text('m')}; {low} to {high} waves round the ring"
     return words
+
+
+def _faces_in_words(case: Case) -> str:
+    """Friction between the faces; empty where no shot has any."""
+    faces = case.contact.faces.scaled(face_friction(case).mean)
+    if faces.is_none:
+        return ""
+    drawn = shots_of(case).contact_friction
+    if drawn is None or drawn.is_fixed:
+        text = f"coefficient {faces.kinetic:.4g}"
+    else:
+        text = f"coefficient drawn, mean {faces.kinetic:.4g}"
+    if faces.is_constant:
+        return text
+    share = "" if faces.kinetic == 0.0 else f" ({faces.static / faces.kinetic:.3g} times)"
+    text += f"; {faces.static:.4g}{share} while they stick"
+    if faces.speed > 0.0:
+        text += f", fading over {format_si(faces.speed, 'm/s')}"
+    return text
 
 
 def _guide_in_words(guide: CaseGuide | None) -> str:
