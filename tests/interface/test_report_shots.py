@@ -189,6 +189,17 @@ def test_only_what_varies_is_on_an_axis(content: Content, study: ShotsStudy) -> 
     assert names(shots_content(replace(pushed, shots=heights)))[-1] == "rebound-force"
 
 
+def test_friction_of_the_faces_is_related_to_the_rebound(study: ShotsStudy) -> None:
+    coefficients = np.linspace(0.1, 0.2, COUNT)
+    shots = replace(study.shots, contact_friction=coefficients, rebound_height=1e-5 / coefficients)
+    rubbing = replace(study, shots=shots, pressures={}, faces="coefficient drawn, mean 0.15")
+
+    first = shots_content(rubbing).sections[0]
+
+    assert "correlates most with the friction between the faces: it falls" in first.paragraphs[0]
+    assert first.charts[-1].name == "rebound-contact_friction"
+
+
 def test_the_bias_is_a_line_from_the_highest_to_the_centred_value(content: Content) -> None:
     chart = content.sections[0].charts[0]
     assert isinstance(chart, Chart)

@@ -122,6 +122,8 @@ def test_every_point_has_the_bits_of_klack_shots(needle, tmp_path):
         ("shots.duration", "[0.9 ms, 1 ms]"),
         ("shots.step", "[45 ns, 50 ns]"),
         ("shots.friction", "[0, 0.3]"),
+        ("shots.contact_friction", "[0, 0.2]"),
+        ("contact.friction", "[0, 0.2]"),
         ("shots.waviness.harmonics.1", "[8, 12]"),
         ("guide.friction", "[0, 0.2]"),
         ("guide.viscous", "[0 N s/m, 0.02 N s/m]"),
