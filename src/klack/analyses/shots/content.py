@@ -207,19 +207,14 @@ def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
         ("tilt\n[°]", _plain("tilt", np.degrees(1.0), 4), "tilt", True),
         ("towards\n[°]", _angle("tilt_direction"), "tilt_direction", False),
         ("force\n[N]", _plain("force", 1.0, 2), "force", False),
-        ("friction", _plain("friction", 1.0, 3), "friction", False),
-        (
-            "friction\nof the faces",
-            _plain("contact_friction", 1.0, 3),
-            "contact_friction",
-            False,
-        ),
+        ("friction\nguide", _plain("friction", 1.0, 3), "friction", False),
+        ("friction\nfaces", _plain("contact_friction", 1.0, 3), "contact_friction", False),
         ("waviness\n[nm]", _plain("waviness", 1e9, 0), "waviness", False),
         ("restitution", _plain("restitution", 1.0, 4), "restitution", True),
         (f"rebound\n[{unit}]", _plain("rebound_height", factor, 3), "rebound_height", True),
         ("peak\n[N]", _plain("peak_force", 1.0, 1), "peak_force", True),
         ("contact\n[µs]", _plain("contact_time", 1e6, 2), "contact_time", True),
-        ("lost in\nfriction [%]", _plain("friction_loss", 100.0, 2), "friction_loss", False),
+        ("rubbed\n[%]", _plain("friction_loss", 100.0, 1), "friction_loss", False),
     )
 
 

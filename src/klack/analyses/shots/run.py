@@ -293,9 +293,9 @@ def _distributions(case: Case) -> dict[str, str]:
             "the lowest and the highest guiding height"
         )
     if shots.friction is not None:
-        words["friction"] = shots.friction.text("")
+        words["friction in the guide"] = shots.friction.text("")
     elif case.guide is not None:
-        words["friction"] = format_si(case.guide.friction, "")
+        words["friction in the guide"] = format_si(case.guide.friction, "")
     if shots.contact_friction is not None:
         words["friction between the faces"] = shots.contact_friction.text("")
     if shots.waviness is not None:
