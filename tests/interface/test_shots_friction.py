@@ -221,7 +221,7 @@ def test_the_columns_are_in_json_measures_and_report(study):
         "coefficient drawn, mean 0.125"
     )
     heads = tables["All shots"][0].columns
-    assert {"friction\nfaces", "rubbed\n[%]"} <= set(heads)
+    assert {"friction\nfaces", "lost\n[%]"} <= set(heads)
     assert content.numbers.rows[-2][0] == "lost in friction between the faces"
     limits = dict(content.limits)["Physics"]
     assert "Coulomb friction" in limits

@@ -214,7 +214,7 @@ def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
         (f"rebound\n[{unit}]", _plain("rebound_height", factor, 3), "rebound_height", True),
         ("peak\n[N]", _plain("peak_force", 1.0, 1), "peak_force", True),
         ("contact\n[µs]", _plain("contact_time", 1e6, 2), "contact_time", True),
-        ("rubbed\n[%]", _plain("friction_loss", 100.0, 1), "friction_loss", False),
+        ("lost\n[%]", _plain("friction_loss", 100.0, 1), "friction_loss", False),
     )
 
 
