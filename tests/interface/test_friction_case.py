@@ -108,3 +108,16 @@ def test_a_seat_that_holds_the_needle_ends_with_an_answer(tmp_path):
     assert abs(level.energy_residual) < 1e-9
     assert level.energies["friction"] < 1e-3 * level.energies["initial kinetic"]
     assert np.isfinite(level.measures.peak_force)
+
+
+def test_flat_faces_round_the_axis_rub_too(tmp_path):
+    """A hat at the axis cannot slip; Poisson's ratio 0 and flat faces: there is nothing to lose."""
+    text = find_case("two-rods").read_text().replace("contact:\n", "contact:\n  friction: 0.2\n", 1)
+    path = tmp_path / "case.yaml"
+    path.write_text(text)
+    case = load_case(path)
+    study = run_impact(case, levels=("interface",), certify=False)
+    level = study.levels["interface"]
+    smooth = level.frictionless
+    assert level.energies.get("friction", 0.0) < 1e-6 * level.energies["initial kinetic"]
+    assert level.measures.impulse == pytest.approx(smooth.impulse, rel=1e-4)

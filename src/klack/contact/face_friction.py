@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.mesh.mesh import Mesh, Surface
 
-__all__ = ["FaceFriction"]
+__all__ = ["FaceFriction", "with_still_directions"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,3 +64,21 @@ class FaceFriction:
         """
         T_a, T_b = tangent_rows(space, mesh_a, surface_a, mesh_b, surface_b)
         return cls(law=law, T_a=T_a, T_b=T_b)
+
+
+def with_still_directions(C: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compliance in which directions that cannot move have the mean one, without coupling.
+
+    They never slip, and so never carry a force: the law stays solvable, and no answer changes.
+
+    Parameters
+    ----------
+    C : array, shape (m, m) [m/N]
+    """
+    own = np.diag(C)
+    still = own == 0.0
+    if not np.any(still):
+        return C
+    filled = C.copy()
+    filled[still, still] = own[~still].mean()
+    return filled

@@ -30,7 +30,7 @@ from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from klack.contact.pairing import (
     FaceGeometry,
@@ -66,6 +66,9 @@ _CENTRAL = 3.0
 
 _LOWEST = 32
 """Hats that give the excess of the mean gap over a hat over the gap at its node."""
+
+_ON_AXIS = 1e-6
+"""Of the element size: distance from the axis at which a hat is on it."""
 
 COVERED = 0.05
 """Least share of a hat's area that has to face the master."""
@@ -480,7 +483,8 @@ def tangent_rows(
     (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
     Axisymmetric bodies have one direction *t*, along the meridian and away from the axis of motion
     (along it on walls); solids have a second one round it (the first is along x where hats surround
-    it).  Each is taken in the tangential plane of every integration point.
+    it).  Each is taken in the tangential plane of every integration point.  The hat at the axis of
+    bodies of revolution has an empty row: it cannot slip.
 
     Parameters
     ----------
@@ -533,6 +537,9 @@ def tangent_rows(
                 )
     area = np.tile(space.area, mesh.dimension - 1)
     T_a, T_b = (_scaled(entries[side], area, sides[side][0].dof_count) for side in ("a", "b"))
+    if mesh.dimension == 2:
+        still = diags_array((space.points[:, 0] > _ON_AXIS * space.size).astype(float))
+        T_a, T_b = csr_array(still @ T_a), csr_array(still @ T_b)
     return T_a, T_b
 
 

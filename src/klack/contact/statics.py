@@ -23,7 +23,7 @@ from scipy.sparse import csr_array, vstack
 
 from klack.cache.entry import Entry
 from klack.contact.complementarity import ComplementaritySolver
-from klack.contact.face_friction import FaceFriction
+from klack.contact.face_friction import FaceFriction, with_still_directions
 from klack.contact.mortar import ContactSpace
 from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
@@ -83,7 +83,8 @@ def contact_compliance(
             csr_array(vstack([rows[0], faces.T_a])),
             csr_array(vstack([rows[1], faces.T_b])),
         )
-    return condensed_compliance(*rows, flexibility_a, flexibility_b)
+    C = condensed_compliance(*rows, flexibility_a, flexibility_b)
+    return C if faces is None else with_still_directions(C)
 
 
 def condensed_compliance(

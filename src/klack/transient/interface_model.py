@@ -466,6 +466,10 @@ def _fresh_statics(
 ) -> tuple[float, float]:
     """Two uneven loads on the whole bodies, solved anew: reciprocity, deviation of ``whole``."""
     loads = np.random.default_rng(5).uniform(0.0, 1.0, (len(whole), 2))
+    for contact, place in zip(contacts, places, strict=True):
+        upper = contact.rows(contact.upper)
+        if upper is not None and contact.ways:  # directions in which a point cannot move
+            loads[place[np.diff(upper.indptr) == 0]] = 0.0
     answers = np.zeros(loads.shape)
     for item in bodies:
         parts = [

@@ -27,6 +27,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
 
 from klack.contact.complementarity import ComplementaritySolver
+from klack.contact.face_friction import with_still_directions
 from klack.contact.rubbing_fit import Loop
 from klack.contact.statics import StaticContact, check_rim
 from klack.errors import ConvergenceError, InputError
@@ -202,7 +203,7 @@ class _State:
     ) -> None:
         space = static.space
         self.count = space.count
-        self.C = np.ascontiguousarray((C + C.T) / 2.0)
+        self.C = np.ascontiguousarray(with_still_directions((C + C.T) / 2.0))
         self.axial = np.concatenate([space.axial, rows.axial])
         self.start = min(space.clearance, space.touch)
         self.gap = np.append(space.gap, np.zeros(len(rows.axial)))

@@ -8,6 +8,7 @@ speed, the static one where it stuck or was open.
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.face_friction import with_still_directions
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_arrays import Closed
@@ -63,7 +64,8 @@ class RubbingPoints:
             When a point cannot move across its normal.
         """
         # factors in single precision leave it symmetric to 1e-7 only
-        self._points, self._A = points, np.ascontiguousarray(0.5 * (A + A.T))
+        self._points = points
+        self._A = np.ascontiguousarray(with_still_directions(0.5 * (A + A.T)))
         self._closed = Closed.none(len(points), self._ways)
         own = np.diag(self._A).reshape(self._ways + 1, -1)
         self._own = own[0]
