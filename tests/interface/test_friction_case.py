@@ -81,8 +81,8 @@ def test_static_friction_holds_more_than_kinetic(tmp_path):
     ).levels["interface"]
     static = impact(case(tmp_path, friction=0.3)).levels["interface"]
     assert held.measures.restitution != plain.measures.restitution
-    assert slow.measures.restitution == pytest.approx(static.measures.restitution, abs=1e-5)
-    assert slow.measures.peak_force == pytest.approx(static.measures.peak_force, rel=1e-5)
+    assert slow.measures.restitution == pytest.approx(static.measures.restitution, abs=1e-4)
+    assert slow.measures.peak_force == pytest.approx(static.measures.peak_force, rel=1e-3)
 
 
 @pytest.mark.parametrize(

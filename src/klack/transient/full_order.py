@@ -302,7 +302,10 @@ class _Run:
         self.scheme, self.pool, self.axial_force = scheme, pool, axial_force
         count = self.count = len(space.gap)
         ways = 0 if friction is None else friction.T_a.shape[0] // count
-        self.rubbing = None if friction is None else RubbingPoints(friction.law, step, count, ways)
+        self.rubbing = None
+        if friction is not None:
+            still = np.diff(friction.T_a.indptr)[:count] == 0
+            self.rubbing = RubbingPoints(friction.law, step, count, ways, still)
         # contact forces of the last step (massless: at its end), along, then across the normals
         self.lam = np.zeros((ways + 1) * count)
         self.at_rest = np.concatenate([space.gap, np.zeros(ways * count)])  # gaps and offsets

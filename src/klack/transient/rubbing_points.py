@@ -37,9 +37,14 @@ class RubbingPoints:
         Number of all contact points, nc.
     ways : int
         Tangential directions, 1 or 2.
+    still : bool array, shape (nc,)
+        Points that cannot slip: hats at the axis of bodies of revolution.
     """
 
-    def __init__(self, law: Friction, step: float, count: int, ways: int) -> None:
+    def __init__(
+        self, law: Friction, step: float, count: int, ways: int, still: NDArray[np.bool_]
+    ) -> None:
+        self._still = still
         self._law, self._step, self._ways = law, step, ways
         self._speed = np.zeros(count)  # of slip at the end of the last step
         self.doing = np.full(count, OPEN, dtype=np.int8)
@@ -65,11 +70,12 @@ class RubbingPoints:
         """
         # factors in single precision leave it symmetric to 1e-7 only
         self._points = points
-        self._A = np.ascontiguousarray(with_still_directions(0.5 * (A + A.T)))
+        even = 0.5 * (A + A.T)
+        self._A = np.ascontiguousarray(with_still_directions(even))
         self._closed = Closed.none(len(points), self._ways)
-        own = np.diag(self._A).reshape(self._ways + 1, -1)
+        own = np.diag(even).reshape(self._ways + 1, -1)
         self._own = own[0]
-        fixed = np.flatnonzero(own[1:].max(axis=0) <= _RIGID * own[0])
+        fixed = np.flatnonzero((own[1:].max(axis=0) <= _RIGID * own[0]) & ~self._still[points])
         if len(fixed):
             raise InputError(
                 "friction of the faces",
