@@ -57,7 +57,6 @@ def draw(seed: int) -> str:
         parts["guide"] = {
             "type": "guide-friction",
             "coulomb": f"{_log(rng, 0.01, 1.0)} N",
-            "smoothing_speed": "20 mm/s",
         }
         top.append("guide.body")
     if rng.random() < 0.3:

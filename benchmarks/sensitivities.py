@@ -16,7 +16,7 @@ KEYS = tuple(
     NETWORK + key
     for key in (
         *("spring.preload", "spring.stiffness", "guide.coulomb", "opening.gap"),
-        *("opening.film.cut_off", "coil.resistance", "guide.smoothing_speed"),
+        *("opening.film.cut_off", "coil.resistance", "guide.viscous"),
         *("opening.film.inner_radius", "opening.film.outer_radius", "seat.film.width"),
         *("seat.film.mean_radius", "driver.boost_voltage", "driver.peak_current"),
         *("driver.hold_current", "armature_gap.clearance", "bores.diameter", "nozzle.diameter"),

@@ -23,7 +23,7 @@ network:
     seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
     stop: {type: end-stop, gap: 80 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
     spring: {type: spring, stiffness: 10 N/mm, preload: 11 N}
-    guide: {type: guide-friction, coulomb: 0.8 N, smoothing_speed: 10 mm/s}
+    guide: {type: guide-friction, coulomb: 0.8 N}
     magnet:
       type: force-over-time
       time: [0 us, 50 us, 900 us, 950 us]

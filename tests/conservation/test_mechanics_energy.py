@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.force_over_stroke import ForceOverStroke
-from klack.mechanics.friction import GuideFriction
 from klack.mechanics.gravity import Gravity
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
@@ -26,7 +25,6 @@ PARTS = {
     "force over stroke": ForceOverStroke(
         stroke=(-20e-6, 0.0, 30e-6, 80e-6), force=(5.0, -12.0, 3.0, 40.0)
     ),
-    "friction": GuideFriction(coulomb=0.2, breakaway=0.5, viscous=0.1),
     "gravity": Gravity(inclination=0.3),
 }
 

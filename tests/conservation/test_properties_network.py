@@ -28,6 +28,7 @@ from klack.network.network import Network
 from klack.network.step_function import evaluate
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
+from klack.simulation.slider_step import slider_force
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 
@@ -49,7 +50,6 @@ PARTS: dict[str, tuple[st.SearchStrategy[dict], tuple[str, ...]]] = {
         st.fixed_dictionaries(
             {
                 "coulomb": st.floats(0.0, 2.0),
-                "smoothing_speed": log_range(5e-3, 0.1),
                 "viscous": st.floats(0.0, 2.0),
             }
         ),
@@ -285,18 +285,16 @@ def test_friction_opposes_and_is_odd(given_friction, h, speed, more):
     network = Network(
         {"needle": RigidMass(mass=1e-3), "guide": part}, [["needle.body", "guide.body"]]
     )
-    row = network.rows().elements[0]
+    row = network.rows().sliders[0]
+    numbers = (row.coulomb, row.breakaway - row.coulomb, row.stribeck_speed, row.viscous)
     forces = []
     for v in (speed, -speed):
-        inputs = [0.0, h, 0.0, h * v, 0.0, 0.0]
-        status, out = evaluate(row.step, row.parameters, row.state, inputs, 3)
-        assert status == 0
-        assert out[0] * v <= 0.0
-        assert out[0] == -out[1]
-        assert out[2] >= 0.0  # heat
-        forces.append(out[0])
+        force, slip = slider_force(*numbers, h, h**2 / 2e-3, h / 1e-3, h * v, v)
+        assert force * v <= 0.0
+        assert force * slip <= 0.0
+        forces.append(force)
     assert forces[0] == -forces[1]
-    most = given_friction["coulomb"] * more + given_friction["viscous"] * abs(speed)
+    most = row.breakaway + row.viscous * abs(speed)
     assert abs(forces[0]) <= most * (1.0 + 1e-12)
 
 

@@ -1,13 +1,12 @@
 """Forces of the mechanical components against their formulas, at the scale of a valve."""
 
-from math import cos, exp, pi, tanh
+from math import cos, pi
 
 import numpy as np
 import pytest
 
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.force_over_stroke import ForceOverStroke
-from klack.mechanics.friction import GuideFriction
 from klack.mechanics.gravity import STANDARD_GRAVITY, Gravity
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
@@ -86,23 +85,6 @@ def test_force_over_stroke_is_the_mean_over_the_way(way):
     mean = np.trapezoid(np.interp(fine, x, force), fine) / (fine[-1] - fine[0])
 
     assert force_of(latch, *way) == pytest.approx(mean, rel=1e-13)
-
-
-@pytest.mark.parametrize("speed", [-0.5, -2e-3, 1e-6, 3e-4, 5e-3, 0.04, 1.0])
-def test_friction_follows_stribeck(speed):
-    friction = GuideFriction(
-        coulomb=0.2, breakaway=0.5, stribeck_speed=0.01, smoothing_speed=1e-3, viscous=0.1
-    )
-    level = 0.2 + 0.3 * exp(-((speed / 0.01) ** 2))
-
-    force = force_of(friction, 0.0, speed * H)
-
-    exact = -level * tanh(speed / 1e-3) - 0.1 * speed
-    assert force == pytest.approx(exact, rel=1e-12)  # the branches drop terms below exp(-40)
-
-
-def test_friction_at_rest_is_zero():
-    assert force_of(GuideFriction(coulomb=0.2), 3e-6, 3e-6) == 0.0
 
 
 def test_weight_counts_the_inclination():

@@ -67,7 +67,7 @@ def valve(kind: str, s: float) -> Network:
         "seat": EndStop(gap=0.0, law=hertz, **extra),
         "stop": EndStop(gap=40e-6 * s, law=linear, **extra),
         "spring": Spring(stiffness=1e4 * s, preload=12.0 * s**2, damping=0.2 * s**2),
-        "guide": GuideFriction(coulomb=0.3 * s**2, smoothing_speed=0.01),
+        "guide": GuideFriction(coulomb=0.3 * s**2),
         "magnet": ForceOverTime(
             time=tuple(t * s for t in (0.0, 30e-6, 250e-6, 260e-6)),
             force=tuple(f * s**2 for f in (0.0, 40.0, 40.0, 0.0)),

@@ -1,54 +1,32 @@
 """Friction of a needle in its guide."""
 
+import warnings
 from collections.abc import Mapping
-from math import exp, tanh
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import Field, model_validator
 
+from klack.errors import AccuracyWarning
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
-from klack.network.rows import Book, Rows
-from klack.network.step_function import step_function
+from klack.network.rows import Rows
 from klack.units import DampingCoefficient, Force, Speed, format_si
 
 __all__ = ["GuideFriction"]
 
 
-@step_function
-def friction_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Friction at the mean velocity of the step; never gives energy."""
-    coulomb, excess, stribeck, smoothing, viscous = par[0], par[1], par[2], par[3], par[4]
-    out[0] = out[1] = out[2] = 0.0
-    moved = (inp[3] - inp[2]) - (inp[5] - inp[4])
-    if inp[1] <= 0.0 or moved == 0.0:
-        return 0
-    speed = moved / inp[1]
-    # far from rest both transcendental functions are constants
-    level, x = coulomb, speed / stribeck
-    if excess != 0.0 and x * x < 40.0:
-        level += excess * exp(-x * x)
-    x = speed / smoothing
-    sign = tanh(x) if abs(x) < 20.0 else (1.0 if x > 0.0 else -1.0)
-    force = level * sign + viscous * speed
-    out[0] = -force
-    out[1] = force
-    out[2] = force * moved
-    return 0
-
-
 class GuideFriction(Component):
-    r"""Stribeck friction, smooth at rest.
+    r"""Stribeck friction that sticks.
 
-    .. math:: F = -\Bigl[F_c + (F_s - F_c)\, e^{-(v/v_s)^2}\Bigr] \tanh\frac{v}{v_d} - b v
+    .. math:: F = -\Bigl[F_c + (F_s - F_c)\, e^{-(v/v_s)^2}\Bigr] \mathrm{sign}\, v - b v,
+              \qquad |F| \le F_s \text{ at rest}
 
-    Taken at the mean velocity of the step: the loss ``-F v h`` is never negative.  ``tanh``
-    replaces the jump at rest, so a body under a force below ``F_s`` does not stick but creeps with
-    less than ``v_d``; an opening delay by sticking needs a model with memory.
+    Set-valued at rest: a body under a force below ``F_s`` stays where it is, however long, and
+    breaks away above it.  The loss of a step is never negative.
 
-    Limit: the time step, the coarse one too, must stay below ``2 m v_d/F_s`` (5 us for 1 g, 1 mm/s
-    and 0.4 N), or the forces of a step do not settle near rest.
+    Limits: no displacement while it sticks (pre-sliding), and no friction that grows with the time
+    at rest.
     """
 
     type: ClassVar[str] = "guide-friction"
@@ -59,15 +37,15 @@ class GuideFriction(Component):
 
     coulomb: Force = Field(ge=0, description="Sliding friction Fc; 0.05 to 1 N in small valves.")
     breakaway: Force | None = Field(
-        default=None, ge=0, description="Largest friction Fs near rest; default Fc."
+        default=None, ge=0, description="Largest friction Fs at rest; default Fc."
     )
     stribeck_speed: Speed = Field(
         default=0.01, gt=0, description="Speed vs at which the excess of Fs has decayed to 1/e."
     )
-    smoothing_speed: Speed = Field(
-        default=1e-3, gt=0, description="Speed vd below which friction falls to zero."
-    )
     viscous: DampingCoefficient = Field(default=0.0, ge=0, description="Viscous part b.")
+    smoothing_speed: Speed | None = Field(
+        default=None, gt=0, description="Without meaning since friction sticks; remove it."
+    )
 
     @model_validator(mode="after")
     def _excess(self) -> "GuideFriction":
@@ -78,17 +56,22 @@ class GuideFriction(Component):
                 expected=f"at least the sliding friction, {format_si(self.coulomb, 'N')}",
                 hint="remove it for equal values.",
             )
+        if self.smoothing_speed is not None:
+            warnings.warn(
+                "guide-friction: smoothing_speed has no meaning since friction sticks at rest. "
+                "Remove it.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         return self
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one element; without ``guide`` the guide is the ground."""
-        breakaway = self.coulomb if self.breakaway is None else self.breakaway
-        rows.element(
-            friction_step,
-            ports=(rows.port("body"), rows.port("guide")),
-            parameters=(
-                *(self.coulomb, breakaway - self.coulomb),
-                *(self.stribeck_speed, self.smoothing_speed, self.viscous),
-            ),
-            books=(Book("loss", "loss"),),
+        """Add one slider; without ``guide`` the guide is the ground."""
+        rows.slider(
+            upper=rows.port("body"),
+            lower=rows.port("guide"),
+            coulomb=self.coulomb,
+            breakaway=self.coulomb if self.breakaway is None else self.breakaway,
+            stribeck_speed=self.stribeck_speed,
+            viscous=self.viscous,
         )

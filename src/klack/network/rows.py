@@ -34,6 +34,7 @@ __all__ = [
     "LineRow",
     "NodeRow",
     "Rows",
+    "SliderRow",
     "WallRow",
 ]
 
@@ -212,6 +213,36 @@ class InterfaceRow:
     film: FilmRow | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderRow:
+    """Dry and viscous friction between two ports: see :mod:`klack.simulation.slider_step`.
+
+    Parameters
+    ----------
+    component : str
+    upper, lower : int
+        Handles; the friction on the upper port is opposite to its way relative to the lower one.
+    names : tuple of str
+        What the component calls them.
+    coulomb : float [N]
+        Friction at high speeds of slip, beside the viscous one.
+    breakaway : float [N]
+        Largest friction at rest, not below ``coulomb``.
+    stribeck_speed : float [m/s]
+        At which the difference of both has decayed to 1/e.
+    viscous : float [N s/m]
+    """
+
+    component: str
+    upper: int
+    lower: int
+    names: tuple[str, ...]
+    coulomb: float
+    breakaway: float
+    stribeck_speed: float
+    viscous: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LineRow:
     """Delay line between two nodes, in segments with friction between them.
@@ -321,6 +352,7 @@ class Rows:
     nodes: dict[int, NodeRow] = field(default_factory=dict)
     walls: list[WallRow] = field(default_factory=list)
     interfaces: list[InterfaceRow] = field(default_factory=list)
+    sliders: list[SliderRow] = field(default_factory=list)
     lines: list[LineRow] = field(default_factory=list)
     limits: list[LimitRow] = field(default_factory=list)
 
@@ -476,6 +508,30 @@ class Rows:
                 law=law,
                 series_compliance=series_compliance,
                 film=film,
+            )
+        )
+
+    def slider(
+        self,
+        *,
+        upper: int,
+        lower: int,
+        coulomb: float,
+        breakaway: float,
+        stribeck_speed: float,
+        viscous: float = 0.0,
+    ) -> None:
+        """Add friction between two ports; its forces are recorded by component and port."""
+        self.sliders.append(
+            SliderRow(
+                component=self.component,
+                upper=upper,
+                lower=lower,
+                names=self._names((upper, lower)),
+                coulomb=coulomb,
+                breakaway=breakaway,
+                stribeck_speed=stribeck_speed,
+                viscous=viscous,
             )
         )
 

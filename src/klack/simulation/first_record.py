@@ -36,7 +36,7 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
     -------
     acting : array
         Forces of elements [N], flows of branches [kg/s], contact and film force of every
-        interface [N], then their sums [N].
+        interface [N], those of sliders [N], then the sums of each interface [N].
     states : array
         Recorded states of elements, then of branches.
     """
@@ -49,7 +49,9 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
     pressing = _interfaces(network, speeds, h)
     states = [*_states(elements, rows.elements), *_states(branches, rows.branches)]
     return (
-        np.concatenate([*forces, flows, pressing.ravel(), pressing.sum(axis=1)]),
+        np.concatenate(
+            [*forces, flows, pressing.ravel(), _sliders(network, speeds), pressing.sum(axis=1)]
+        ),
         np.array(states, dtype=float),
     )
 
@@ -78,3 +80,12 @@ def _interfaces(network: CompiledNetwork, speeds: Vector, h: float) -> Vector:
         if max(film[:2]) > 0.0 and min(before, gap) >= 0.0:
             found[c, 1] = max(film_force(*film, h, before, gap), -float(at.suction[c]))
     return found
+
+
+def _sliders(network: CompiledNetwork, speeds: Vector) -> Vector:
+    """Friction of every slider [N] on its two ports, flat; none where nothing slips."""
+    at = network.sliders
+    speed = speeds[at.upper] - speeds[at.lower]
+    dry = at.coulomb + at.excess * np.exp(-((speed / at.stribeck) ** 2))
+    force = -np.sign(speed) * dry - at.viscous * speed
+    return np.column_stack([force, -force]).ravel()

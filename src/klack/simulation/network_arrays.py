@@ -23,6 +23,7 @@ __all__ = [
     "FREE",
     "GUESS",
     "KEPT",
+    "KEPT_SLIDER",
     "LAST",
     "LOSS",
     "MIDDLE",
@@ -54,6 +55,10 @@ __all__ = [
     "Nodes",
     "Recording",
     "Scratch",
+    "SliderState",
+    "SliderTrial",
+    "Sliders",
+    "Sliding",
     "Step",
     "StepRows",
     "scratch_memory",
@@ -219,6 +224,31 @@ class InterfaceState(NamedTuple):
     far: Vector  # 1 of an interface whose film acts among elements
 
 
+class Sliders(NamedTuple):
+    """Friction between ports."""
+
+    sliders: int
+    upper: Index
+    lower: Index
+    coulomb: Vector
+    excess: Vector
+    stribeck: Vector
+    viscous: Vector
+    G: Vector  # (SIZES n,) way of slip per unit force during a step
+    D: Vector  # (SIZES n,) speed of slip at its end
+    kick: Vector  # (SIZES n, PORTS) the same per unit force at each port
+    block0: Index  # (2 n,) blocks of the bodies of upper and lower port, none of the ground
+    block1: Index
+    row: Index  # of the shape of the port in its blocks
+
+
+class SliderState(NamedTuple):
+    """Friction at the end of a step."""
+
+    seen: Vector  # displacement of the upper port relative to the lower one
+    force: Vector
+
+
 class Accounts(NamedTuple):
     """Energies [J] since the start of a run."""
 
@@ -228,6 +258,7 @@ class Accounts(NamedTuple):
     supply: Vector  # (prescribed nodes,)
     contact: Vector  # (interfaces,) losses
     film: Vector
+    friction: Vector  # (sliders,) losses
 
 
 class NetworkArrays(NamedTuple):
@@ -242,6 +273,8 @@ class NetworkArrays(NamedTuple):
     line_state: LineState
     interfaces: Interfaces
     interface_state: InterfaceState
+    sliders: Sliders
+    slider_state: SliderState
     accounts: Accounts
     account_kind: Index
 
@@ -303,25 +336,47 @@ KEPT = 16
 """Numbers of an interface that a repeated macro step begins with."""
 
 
+class SliderTrial(NamedTuple):
+    """Friction in the step that is tried."""
+
+    force: Vector
+    way: Vector  # of slip
+    speed: Vector  # at the end of the step without its forces
+    least: Vector  # force in this macro step and at its start
+    most: Vector
+    first: Vector  # force in the first sub-step
+    kept: Vector  # at the start of the macro step: seen, force, loss, sums of both ports
+
+
+KEPT_SLIDER = 5
+"""Numbers of a slider that a repeated macro step begins with."""
+
+
 class Scratch(NamedTuple):
     """Memory of the time loop: it cannot ask for any itself."""
 
     nodes: NodeTrial
     flows: FlowTrial
     interfaces: InterfaceTrial
+    sliders: SliderTrial
     sums: Vector  # of a record: what its means are made of
     peaks: Vector
 
 
-def scratch_memory(*, interfaces: int, nodes: int, branches: int, ends: int, sums: int) -> Scratch:
+def scratch_memory(
+    *, interfaces: int, sliders: int, nodes: int, branches: int, ends: int, sums: int
+) -> Scratch:
     """Memory for a network of these sizes."""
     vectors = np.zeros((len(NodeTrial._fields) - 1, nodes))
     of_interfaces = [*np.zeros((len(InterfaceTrial._fields) - 1, interfaces))]
     of_interfaces.append(np.zeros(KEPT * interfaces))
+    of_sliders = [*np.zeros((len(SliderTrial._fields) - 1, sliders))]
+    of_sliders.append(np.zeros(KEPT_SLIDER * sliders))
     return Scratch(
         nodes=NodeTrial(*[*vectors, np.zeros(nodes * nodes)]),
         flows=FlowTrial(*np.zeros((3, branches)), *np.zeros((3, ends))),
         interfaces=InterfaceTrial(**dict(zip(InterfaceTrial._fields, of_interfaces, strict=True))),
+        sliders=SliderTrial(**dict(zip(SliderTrial._fields, of_sliders, strict=True))),
         sums=np.zeros(sums),
         peaks=np.zeros(interfaces),
     )
@@ -356,10 +411,18 @@ class Contacts(NamedTuple):
     trial: InterfaceTrial
 
 
+class Sliding(NamedTuple):
+    """Friction as pointers, for the phases of a step."""
+
+    rows: Sliders
+    state: SliderState
+    trial: SliderTrial
+
+
 class Recording(NamedTuple):
     """What is kept: means over records, states at their ends, and every fine step in contact."""
 
-    means: Matrix  # (records, element forces + branches + 2 interfaces)
+    means: Matrix  # (records, element forces + branches + 2 interfaces + 2 sliders)
     peaks: Matrix  # (records, interfaces)
     points: Matrix  # (records, columns), see the compile step
     states: Index  # which states of elements are recorded

@@ -39,6 +39,8 @@ from klack.simulation.network_arrays import (
     NetworkArrays,
     Nodes,
     NodeState,
+    Sliders,
+    SliderState,
     StepRows,
 )
 from klack.simulation.propagator import modal_propagator
@@ -79,9 +81,9 @@ class CompiledNetwork:
 
     Parameters
     ----------
-    bodies, elements, branches, nodes, lines, interfaces
+    bodies, elements, branches, nodes, lines, interfaces, sliders
         What stays, with the states of bodies, elements and branches.
-    node_state, line_state, interface_state
+    node_state, line_state, interface_state, slider_state
         What changes from step to step.
     accounts : Accounts
     account_kind : array of int
@@ -104,6 +106,8 @@ class CompiledNetwork:
     line_state: LineState
     interfaces: Interfaces
     interface_state: InterfaceState
+    sliders: Sliders
+    slider_state: SliderState
     accounts: Accounts
     account_kind: Index
     account_names: tuple[str, ...]
@@ -145,6 +149,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
     if nodes.ends:
         start_lines(lines, line_state, nodes.density * node_state.g[nodes.end_node])
     interfaces, interface_state = _interfaces(rows, port_of, bodies)
+    sliders, slider_state = _sliders(rows, port_of, bodies, blocks, sizes.seconds)
     return CompiledNetwork(
         rows=rows,
         bodies=bodies,
@@ -156,6 +161,8 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
         line_state=line_state,
         interfaces=interfaces,
         interface_state=interface_state,
+        sliders=sliders,
+        slider_state=slider_state,
         accounts=Accounts(
             rows=np.zeros(len(accounts.kinds)),
             lines=np.zeros((max(len(rows.lines), 1), 3)),
@@ -163,6 +170,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
             supply=np.zeros(nodes.nodes - nodes.volumes),
             contact=np.zeros(interfaces.interfaces),
             film=np.zeros(interfaces.interfaces),
+            friction=np.zeros(sliders.sliders),
         ),
         account_kind=np.array(accounts.kinds, dtype=np.int64),
         account_names=tuple(accounts.names),
@@ -462,11 +470,66 @@ def _interfaces(
     return interfaces, state
 
 
-def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
-    """Opening of each gap per unit force during a step of each size, flat."""
+def _sliders(
+    rows: Rows,
+    port_of: Mapping[int, int],
+    bodies: Bodies,
+    body_blocks: Index,
+    steps: Sequence[float],
+) -> tuple[Sliders, SliderState]:
+    count = len(rows.sliders)
+    upper = np.array([port_of[row.upper] for row in rows.sliders], dtype=np.int64)
+    lower = np.array([port_of[row.lower] for row in rows.sliders], dtype=np.int64)
+    owner = [b for b, row in enumerate(rows.bodies) for _ in row.ports]
+    place = [i for row in rows.bodies for i in range(len(row.ports))]
+    places = [port for ends in zip(upper, lower, strict=True) for port in ends]
+    joined = [(p, owner[p], place[p]) if p < bodies.ports else (p, 0, 0) for p in places]
+    kick = _speed_per_force(rows.bodies, steps) @ _jumps(upper, lower).T  # (SIZES, PORTS, n)
+    sliders = Sliders(
+        sliders=count,
+        upper=upper,
+        lower=lower,
+        coulomb=np.array([row.coulomb for row in rows.sliders], dtype=float),
+        excess=np.array([row.breakaway - row.coulomb for row in rows.sliders], dtype=float),
+        stribeck=np.array([row.stribeck_speed for row in rows.sliders], dtype=float),
+        viscous=np.array([row.viscous for row in rows.sliders], dtype=float),
+        G=interface_compliance(bodies, upper, lower),
+        D=np.einsum("cj,ljc->lc", _jumps(upper, lower), kick).ravel(),
+        kick=np.ascontiguousarray(kick.transpose(0, 2, 1)).ravel(),
+        block0=np.array([body_blocks[b] for _, b, _ in joined], dtype=np.int64),
+        block1=np.array(
+            [body_blocks[b + (p < bodies.ports)] for p, b, _ in joined], dtype=np.int64
+        ),
+        row=np.array([FIXED_ROWS + i for _, _, i in joined], dtype=np.int64),
+    )
+    return sliders, SliderState(seen=np.zeros(count), force=np.zeros(count))
+
+
+def _speed_per_force(rows: Sequence[BodyRow], steps: Sequence[float]) -> Vector:
+    """Speed of each port at the end of a step per force at another, shape (SIZES, PORTS, PORTS)."""
+    found = np.zeros((len(steps), PORTS, PORTS))
+    for level, h in enumerate(steps):
+        first = 0
+        for row in rows:
+            here = slice(first, first + len(row.ports))
+            shapes = np.asarray(row.body.port_shapes).T
+            pending = modal_propagator(row.body.omega, row.body.damping, h).B2
+            found[level, here, here] = (shapes * pending) @ shapes.T
+            first += len(row.ports)
+    return found
+
+
+def _jumps(upper: Index, lower: Index) -> Vector:
+    """Displacement between two ports per displacement of each port, shape (n, PORTS)."""
     jump = np.zeros((len(upper), PORTS))
     jump[np.arange(len(upper)), upper] += 1.0
     jump[np.arange(len(lower)), lower] -= 1.0
+    return jump
+
+
+def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
+    """Opening of each gap per unit force during a step of each size, flat."""
+    jump = _jumps(upper, lower)
     return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(-1, PORTS, PORTS), jump).ravel()
 
 

@@ -47,6 +47,11 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
         upper, lower = rows.upper[c], rows.lower[c]
         behind = rows.gap0[c] + end[upper] - end[lower] - state.gap[c]
         unseen[upper if upper < ground else lower] += state.force[c] * behind
+    sliders, slid = network.sliders, network.slider_state
+    for s in range(sliders.sliders):
+        upper, lower = sliders.upper[s], sliders.lower[s]
+        behind = end[upper] - end[lower] - slid.seen[s]
+        unseen[upper if upper < ground else lower] += slid.force[s] * behind
     return unseen
 
 
@@ -111,6 +116,8 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
     for c, contact in enumerate(rows.interfaces):
         losses[f"{contact.component} contact"] = float(accounts.contact[c])
         losses[f"{contact.component} film"] = float(accounts.film[c])
+    for s, slider in enumerate(rows.sliders):
+        losses[f"{slider.component} loss"] = float(accounts.friction[s])
     for k, line in enumerate(rows.lines):
         for j, what in enumerate(LINE_LOSSES):
             losses[f"{line.component} {what}"] = float(accounts.lines[k, j])

@@ -13,11 +13,12 @@ from klack.simulation.network_arrays import (
     FORCE,
     GUESS,
     KEPT,
-    PORTS,
     Y1,
     Recording,
     Step,
 )
+from klack.simulation.network_ports import move_body
+from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
 
 __all__ = [
@@ -106,8 +107,8 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
 
 
 @phase
-def push_by_guess(contacts: Any, bodies: Any) -> None:
-    """Forces of the ports: the guess of elements and fluid, and those of the interfaces so far."""
+def push_by_guess(contacts: Any, sliding: Any, bodies: Any) -> None:
+    """Forces of the ports: the guess of elements and fluid, and those of the sub-step so far."""
     rows, force, S = contacts.rows, contacts.trial.force, bodies.at
     for p in range(bodies.ports + 1):
         S[FORCE + p] = S[GUESS + p]
@@ -115,6 +116,7 @@ def push_by_guess(contacts: Any, bodies: Any) -> None:
         if force[c] != 0.0:
             S[FORCE + rows.upper[c]] += force[c]
             S[FORCE + rows.lower[c]] -= force[c]
+    push_by_last_friction(sliding, S)
 
 
 @phase
@@ -124,11 +126,11 @@ def gap_between(rows: Any, S: Any, c: int) -> float:
 
 
 @phase
-def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
-    """Forces of all interfaces, one after another, again until they agree with each other.
+def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Step) -> bool:
+    """Forces of all interfaces and sliders, one after another, until they agree with each other.
 
-    Each moves the ports of its two bodies.  Films and contacts live on the gaps that they saw,
-    which the last change of the others moved; they catch up in the next step.
+    Each moves the ports of its two bodies.  All live on the gaps and ways that they saw, which the
+    last change of the others moved; they catch up in the next step.
 
     Returns
     -------
@@ -148,9 +150,14 @@ def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
                 trial.force[c] += change
                 S[FORCE + u] += change
                 S[FORCE + low] -= change
-                moved = _move_body(bodies, G, u, change, moved)
-                moved = _move_body(bodies, G, low, -change, moved)
-        left, work, distance = 0.0, 0.0, 0.0
+                moved = move_body(bodies, G, u, change, moved)
+                moved = move_body(bodies, G, low, -change, moved)
+        moved = slip(sliding, bodies, G, step, moved)
+        left, work = slip_seen_late(sliding, S)
+        distance = 0.0
+        for s in range(sliding.rows.sliders):
+            upper, lower = sliding.rows.upper[s], sliding.rows.lower[s]
+            distance = max(distance, abs(S[Y1 + upper]), abs(S[Y1 + lower]))
         for c in range(rows.interfaces):
             if trial.force[c] != 0.0:
                 gap = gap_between(rows, S, c)
@@ -161,17 +168,6 @@ def solve_interfaces(contacts: Any, bodies: Any, G: Any, step: Step) -> bool:
         if left <= _ENERGY_LEFT * work or moved <= _ROUND_OFF * distance:
             return True
     return False
-
-
-@phase
-def _move_body(bodies: Any, G: Any, port: int, change: float, moved: float) -> float:
-    """Move the ports of a body by a change of the force at one of them; the largest move so far."""
-    S = bodies.at
-    for i in range(bodies.first[port], bodies.last[port]):
-        way = G[i * PORTS + port] * change
-        S[Y1 + i] += way
-        moved = max(moved, abs(way))
-    return moved
 
 
 @phase

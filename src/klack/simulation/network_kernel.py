@@ -3,9 +3,9 @@
 One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 
 1. **Guess** the forces of elements and fluid, constant over the macro step.
-2. **Act**: modes move exactly, contacts and films find their mean forces.  Far from each other or
-   at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of one where films
-   change fast.  A sub-step in which a contact closes or opens is cut into parts.
+2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far from
+   each other or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of
+   one where films change fast.  A sub-step in which a contact closes or opens is cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the way that their ports went.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
    are linear, so that adding the response is exact.  Elements, fluid and interfaces see the
@@ -14,7 +14,7 @@ One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 5. **Judge**: where that is more than a small share of the work of the step, the macro step is
    repeated with the answer as the guess.
 
-Where the answer does not settle (a stiff friction, a switch), ``M`` fine steps follow each other
+Where the answer does not settle (a stiff spring, a switch), ``M`` fine steps follow each other
 with elements and fluid in each of them, repeated until nothing moves any more.
 """
 
@@ -44,6 +44,7 @@ from klack.simulation.network_arrays import (
     NetworkArrays,
     Recording,
     Scratch,
+    Sliding,
     Step,
     StepRows,
 )
@@ -105,6 +106,15 @@ from klack.simulation.network_pressures import (
     solve_pressures,
 )
 from klack.simulation.network_record import record_means, record_points
+from klack.simulation.network_sliders import (
+    begin_macro_sliders,
+    begin_sub_sliders,
+    cost_of_late_sliders,
+    end_macro_sliders,
+    end_sliders,
+    sliders_hold,
+    take_back_sliders,
+)
 from klack.simulation.phase import phase, unfolded
 from klack.simulation.step_status import (
     STATUS_DONE,
@@ -140,6 +150,7 @@ class _Loop(NamedTuple):
     elements: StepRows
     fluid: Fluid
     contacts: Contacts
+    sliding: Sliding
     lines: Lines
     line_state: LineState
     ends: FlowTrial
@@ -147,7 +158,7 @@ class _Loop(NamedTuple):
     kind: Index
     line_losses: Matrix
     recording: Recording
-    sums: Vector  # of elements, then branches, then interfaces
+    sums: Vector  # of elements, then branches, interfaces, sliders
     peaks: Vector
 
 
@@ -209,6 +220,7 @@ def run_network(
             begin_macro_interfaces(
                 contacts, loop.accounts, recording, _interface_sums(loop), loop.peaks
             )
+            begin_macro_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
             if together:
                 keep_modes(bodies, of_sub)
             straight = level == last_level
@@ -227,6 +239,7 @@ def run_network(
                 take_back_interfaces(
                     contacts, loop.accounts, recording, _interface_sums(loop), loop.peaks
                 )
+                take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
                 if status == STATUS_REFUSED:
                     together = False
                 elif flight:
@@ -299,6 +312,9 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
             pointers(network.interface_state),
             pointers(scratch.interfaces),
         ),
+        sliding=Sliding(
+            pointers(network.sliders), pointers(network.slider_state), pointers(scratch.sliders)
+        ),
         lines=network.lines,
         line_state=network.line_state,
         ends=scratch.flows,
@@ -340,6 +356,7 @@ def _settle(
             take_back_interfaces(
                 contacts, loop.accounts, loop.recording, _interface_sums(loop), loop.peaks
             )
+            take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
             guess_answer(bodies)
             clock[7] += 1
         status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop, report)
@@ -349,7 +366,8 @@ def _settle(
             return status
         miss(bodies, G)
         left, work = cost_of_catching_up(contacts, bodies.at)
-        if not matters(bodies, step.level, share, energy, left, work):
+        late, rubbed = cost_of_late_sliders(loop.sliding, bodies.at)
+        if not matters(bodies, step.level, share, energy, left + late, work + rubbed):
             return STATUS_DONE
         if not finite(bodies):
             break
@@ -375,7 +393,7 @@ def _act(
         ``STATUS_DONE``; ``STATUS_MET``; ``STATUS_REFUSED``; ``STATUS_FORCES`` where contacts do not
         settle in a fine step.
     """
-    bodies, contacts = loop.bodies, loop.contacts
+    bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
     done, cut, kept = 0, 0, False
     all_parts = PARTS * sub.steps
     while done < parts:
@@ -391,12 +409,13 @@ def _act(
         G = shift(bodies.G, now.level * PORTS * PORTS)
         if move:
             move_free(bodies, now.level)
-        push_by_guess(contacts, bodies)
+            begin_sub_sliders(sliding, bodies, now.level)
+        push_by_guess(contacts, sliding, bodies)
         move_ports_by_guess(bodies, G)
-        if not solve_interfaces(contacts, bodies, G, now):
+        if not solve_interfaces(contacts, sliding, bodies, G, now):
             report[0], report[2] = 0.0, now.t
             return STATUS_FORCES if fine else STATUS_REFUSED
-        if flight and not coarse_step_holds(contacts):
+        if flight and not (coarse_step_holds(contacts) and sliders_hold(sliding)):
             return STATUS_MET
         if parts > 1 and cut == 0 and not contacts_hold(contacts):
             if not kept:
@@ -405,16 +424,18 @@ def _act(
             begin_cut_contacts(contacts)
             cut = all_parts
             continue
+        begins = done == 0 and (cut == 0 or cut == all_parts)
         end_interfaces(
             contacts,
             bodies.at,
             now,
-            done == 0 and (cut == 0 or cut == all_parts),
+            begins,
             loop.accounts,
             loop.recording,
             _interface_sums(loop),
             loop.peaks,
         )
+        end_sliders(sliding, now, begins, loop.accounts, _slider_sums(loop))
         end_sub_step(bodies)
         if cut == 0:
             done += 1
@@ -444,6 +465,7 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
     catch_up(bodies, level, step.level, parts == 1)
     bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at)
+    bodies.at[EXCESS] += end_macro_sliders(loop.sliding, bodies.at)
     end_ports(bodies)
 
 
@@ -452,6 +474,12 @@ def _interface_sums(loop: Any) -> Any:
     """Sums of interfaces behind those of elements and branches."""
     elements, branches = loop.elements, loop.fluid.branches
     return shift(loop.sums, elements.port0[elements.rows] + branches.rows)
+
+
+@phase
+def _slider_sums(loop: Any) -> Any:
+    """Sums of sliders behind those of interfaces."""
+    return shift(_interface_sums(loop), 2 * loop.contacts.rows.interfaces)
 
 
 @phase

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from klack.network.step_function import shift
-from klack.simulation.modal_step import advance, apply_forces, copy_state, kick
+from klack.simulation.modal_step import ROW, ROW_V, advance, apply_forces, copy_state, kick, watch
 from klack.simulation.network_arrays import (
     AHEAD,
     ANSWER,
@@ -50,8 +50,10 @@ __all__ = [
     "largest_missed",
     "matters",
     "miss",
+    "move_body",
     "move_free",
     "move_ports_by_guess",
+    "port_speed",
     "repay",
     "respace_forces",
     "row_length",
@@ -230,6 +232,32 @@ def move_ports_by_guess(bodies: Any, G: Any) -> None:
     S = bodies.at
     for p in range(bodies.ports):
         S[Y1 + p] = S[FREE + p] + _port_end(bodies, G, p, FORCE)
+
+
+@phase
+def move_body(bodies: Any, G: Any, port: int, change: float, moved: float) -> float:
+    """Move the ports of a body by a change of the force at one of them; the largest move so far."""
+    S = bodies.at
+    for i in range(bodies.first[port], bodies.last[port]):
+        way = G[i * PORTS + port] * change
+        S[Y1 + i] += way
+        moved = max(moved, abs(way))
+    return moved
+
+
+@phase
+def port_speed(bodies: Any, level: int, block0: int, block1: int, row: int) -> float:
+    """Velocity of a row of the shapes [m/s], of the last one for -1, over the blocks of a body.
+
+    That of the modes as they are, without the forces that are pending.
+    """
+    total = 0.0
+    for k in range(block0, block1):
+        shape = row
+        if row < 0:
+            shape += (bodies.start[k + 1] - bodies.start[k]) // ROW
+        total += watch(block_of(bodies, k, level), bodies.modes[k], ROW_V, shape)
+    return total
 
 
 @phase

@@ -4,9 +4,8 @@ from typing import Any
 
 from klack.compiling.jit import njit
 from klack.network.step_function import pointers
-from klack.simulation.modal_step import ROW, ROW_V, watch
 from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
-from klack.simulation.network_ports import block_of
+from klack.simulation.network_ports import port_speed
 from klack.simulation.phase import phase
 
 __all__ = ["record_means", "record_points", "record_start"]
@@ -45,10 +44,12 @@ def record_points(
     for i in range(bodies.ports):
         block0, block1 = recording.port_block0[i], recording.port_block1[i]
         out[i] = bodies.at[i]
-        out[bodies.ports + i] = _speed(bodies, level, block0, block1, recording.port_row[i])
+        out[bodies.ports + i] = port_speed(bodies, level, block0, block1, recording.port_row[i])
     place += 2 * bodies.ports
     for b in range(recording.cm_block0.size):
-        out[place + b] = _speed(bodies, level, recording.cm_block0[b], recording.cm_block1[b], -1)
+        out[place + b] = port_speed(
+            bodies, level, recording.cm_block0[b], recording.cm_block1[b], -1
+        )
     place += recording.cm_block0.size
     for i in range(nodes):
         out[place + i] = pressures[i]
@@ -78,15 +79,3 @@ def record_start(recording: Recording, network: NetworkArrays) -> None:
         network.interface_state.gap,
         network.interfaces.interfaces,
     )
-
-
-@phase
-def _speed(bodies: Any, level: int, block0: int, block1: int, row: int) -> float:
-    """Velocity of a row of the shapes [m/s], of the last one for -1, over the blocks of a body."""
-    total = 0.0
-    for k in range(block0, block1):
-        shape = row
-        if row < 0:
-            shape += (bodies.start[k + 1] - bodies.start[k]) // ROW
-        total += watch(block_of(bodies, k, level), bodies.modes[k], ROW_V, shape)
-    return total

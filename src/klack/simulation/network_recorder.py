@@ -82,6 +82,11 @@ class Recorder:
                 for row in rows.interfaces
                 for kind in ("contact", "film")
             ),
+            *(
+                _Column(f"{row.component}.{port} force", "N")
+                for row in rows.sliders
+                for port in row.names
+            ),
         ]
         ports = [f"{name.component}.{name.port}" for name in network.ports]
         nodes = [rows.nodes[handle].component for handle in network.node_order]
@@ -145,7 +150,8 @@ class Recorder:
         Parameters
         ----------
         acting : array
-            Forces of elements [N], flows [kg/s], forces of interfaces [N], then their peaks [N].
+            Forces of elements [N], flows [kg/s], forces of interfaces and of sliders [N], then
+            peaks of interfaces [N].
         states : array, optional
             Recorded states of elements, then of branches; those that the rows hold by default.
         """
@@ -248,6 +254,7 @@ def recorded_columns(rows: Rows) -> int:
     states = sum(len(row.channels) for row in rows.elements)
     states += sum(len(row.channels) for row in rows.branches)
     forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)
+    forces += 2 * len(rows.sliders)
     return 2 * ports + free + len(rows.nodes) + states + forces + 4 * len(rows.interfaces)
 
 

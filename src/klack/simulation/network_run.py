@@ -398,6 +398,7 @@ def _advance(
 def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
     return scratch_memory(
         interfaces=network.interfaces.interfaces,
+        sliders=network.sliders.sliders,
         nodes=network.nodes.nodes,
         branches=network.branches.rows,
         ends=network.nodes.ends,
@@ -463,6 +464,9 @@ def _not_finite_part(network: CompiledNetwork) -> str:
     for c, contact in enumerate(network.rows.interfaces):
         if not np.isfinite(network.interface_state.force[c]):
             return f"{contact.component} force"
+    for s, slider in enumerate(network.rows.sliders):
+        if not np.isfinite(network.slider_state.force[s]):
+            return f"{slider.component} force"
     for i, port in enumerate(network.ports):
         if not np.isfinite(network.bodies.at[Y1 + i]):
             return f"{port.component}.{port.port} displacement"
@@ -487,6 +491,7 @@ def _not_finite_account(network: CompiledNetwork) -> str:
         (network.accounts.implicit, "energy of a chamber"),
         (network.accounts.contact, "energy of a contact"),
         (network.accounts.film, "energy of a film"),
+        (network.accounts.friction, "energy of a friction"),
     ):
         if not np.all(np.isfinite(values)):
             return what
@@ -541,6 +546,7 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
         "nodes": network.node_state._asdict(),
         "line_state": {name: getattr(line, name) for name in LINE_MEMORY},
         "interfaces": network.interface_state._asdict(),
+        "sliders": network.slider_state._asdict(),
     }
     arrays = {
         f"{owner}.{name}": array for owner, group in groups.items() for name, array in group.items()

@@ -660,6 +660,8 @@ class _Balance:
             at[row : row + ports] = state.y[:-1]
         for row in (LAST, BEFORE, BEFORE_2, BEFORE_3):
             at[row : row + ports] = self.elements[:-1]
+        sliders = network.sliders
+        network.slider_state.seen[:] = state.y[sliders.upper] - state.y[sliders.lower]
         begin, mode = 0, 0
         for b, body_row in enumerate(network.rows.bodies):
             body, r = body_row.body, body_row.body.rigid_count

@@ -240,6 +240,7 @@ def state_arrays(numbers: NetworkArrays) -> list[Any]:
         numbers.node_state,
         numbers.line_state,
         numbers.interface_state,
+        numbers.slider_state,
         numbers.accounts,
     )
     return found + arrays_of(groups)

@@ -337,6 +337,7 @@ class _Running:
         self.scratch = lifted(
             scratch_memory(
                 interfaces=network.interfaces.interfaces,
+                sliders=network.sliders.sliders,
                 nodes=network.nodes.nodes,
                 branches=network.branches.rows,
                 ends=network.nodes.ends,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import exp, log, pi, sqrt
+from math import exp, log, sqrt
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -135,17 +135,29 @@ def _rubs() -> list[Check]:
     v, b = 0.5, 0.5
     viscous = _alone(GuideFriction(coulomb=0.0, viscous=b), speed=v, duration=6e-3)
     slowed = v * exp(-b * viscous.time[-1] / MASS)
-    v_d = 1e-3
-    dry = _alone(GuideFriction(coulomb=0.8, smoothing_speed=v_d), speed=v, duration=4e-3)
-    # m v dv/dx = -F tanh(v/v_d), and int_0^v u coth(u/v_d) du = v^2/2 + pi^2 v_d^2/12
-    way = MASS / 0.8 * (0.5 * v**2 + pi**2 / 12.0 * v_d**2)
+    dry = _alone(GuideFriction(coulomb=0.8), speed=v, duration=4e-3)
+    way = MASS * v**2 / (2.0 * 0.8)
     lost = dry.books.losses["part loss"]
+    parts = {
+        "mass": RigidMass(mass=MASS),
+        "spring": Spring(stiffness=5e3, preload=10.0),
+        "pull": ForceOverTime(time=(0.0, 1e-5), force=(0.0, 0.4999)),
+        "guide": GuideFriction(coulomb=0.3, breakaway=0.5),
+    }
+    held = _place(_run(parts, [["mass.body", "spring.end", "pull.end", "guide.body"]], 4e-3))
     return [
         _check(
             "viscous friction, speed after 6 ms [m/s]", slowed, _speed(viscous)[-1], 1e-9, NEWTON
         ),
         _check("dry friction, way to rest [m]", way, float(_place(dry)[-1]), 5e-9, NEWTON),
         _check("dry friction, loss [J]", 0.5 * MASS * v**2, lost, 5e-12, "all of it"),
+        _check(
+            "creep under 0.9998 of the breakaway friction in 4 ms [m]",
+            0.0,
+            float(np.ptp(held)),
+            1e-15,
+            "Coulomb: none",
+        ),
     ]
 
 

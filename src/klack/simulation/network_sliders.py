@@ -1,0 +1,198 @@
+"""Phases of a step for friction between ports, found in each sub-step with the interfaces."""
+
+from typing import Any
+
+from klack.simulation.network_arrays import (
+    AHEAD,
+    BEGIN,
+    FORCE,
+    KEPT_SLIDER,
+    PORTS,
+    Y1,
+    Step,
+)
+from klack.simulation.network_ports import move_body, port_speed
+from klack.simulation.phase import phase
+from klack.simulation.slider_step import slider_force
+
+__all__ = [
+    "begin_macro_sliders",
+    "begin_sub_sliders",
+    "cost_of_late_sliders",
+    "end_macro_sliders",
+    "end_sliders",
+    "push_by_last_friction",
+    "sliders_hold",
+    "slip",
+    "slip_seen_late",
+    "take_back_sliders",
+]
+
+_SHAKEN = 0.25  # of the largest friction: its change in a coarse step
+_ROUND_OFF = 4e-16  # of a force
+_LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
+
+
+@phase
+def _apart(rows: Any, S: Any, row: int, s: int) -> float:
+    """Displacement of the upper port relative to the lower one in a row of the ports."""
+    return S[row + rows.upper[s]] - S[row + rows.lower[s]]
+
+
+@phase
+def begin_macro_sliders(sliding: Any, accounts: Any, sums: Any) -> None:
+    """Keep what a repeated macro step begins with."""
+    state, trial = sliding.state, sliding.trial
+    for s in range(sliding.rows.sliders):
+        k = KEPT_SLIDER * s
+        trial.kept[k] = state.seen[s]
+        trial.kept[k + 1] = state.force[s]
+        trial.kept[k + 2] = accounts.friction[s]
+        trial.kept[k + 3] = sums[2 * s]
+        trial.kept[k + 4] = sums[2 * s + 1]
+        _begin_attempt(sliding, s)
+
+
+@phase
+def _begin_attempt(sliding: Any, s: int) -> None:
+    force = sliding.state.force[s]
+    trial = sliding.trial
+    trial.force[s] = trial.least[s] = trial.most[s] = force
+    trial.first[s] = 0.0
+
+
+@phase
+def take_back_sliders(sliding: Any, accounts: Any, sums: Any) -> None:
+    """Go back to the start of the macro step."""
+    state, kept = sliding.state, sliding.trial.kept
+    for s in range(sliding.rows.sliders):
+        k = KEPT_SLIDER * s
+        state.seen[s] = kept[k]
+        state.force[s] = kept[k + 1]
+        accounts.friction[s] = kept[k + 2]
+        sums[2 * s] = kept[k + 3]
+        sums[2 * s + 1] = kept[k + 4]
+        _begin_attempt(sliding, s)
+
+
+@phase
+def begin_sub_sliders(sliding: Any, bodies: Any, level: int) -> None:
+    """Speeds of slip at the end of a step without its forces, once the modes have moved freely."""
+    rows, state, trial = sliding.rows, sliding.state, sliding.trial
+    for s in range(rows.sliders):
+        u, low = 2 * s, 2 * s + 1
+        upper = port_speed(bodies, level, rows.block0[u], rows.block1[u], rows.row[u])
+        lower = port_speed(bodies, level, rows.block0[low], rows.block1[low], rows.row[low])
+        trial.speed[s] = upper - lower
+        trial.force[s] = state.force[s]
+
+
+@phase
+def push_by_last_friction(sliding: Any, S: Any) -> None:
+    """Add the friction so far to the forces of the ports."""
+    rows, force = sliding.rows, sliding.trial.force
+    for s in range(rows.sliders):
+        S[FORCE + rows.upper[s]] += force[s]
+        S[FORCE + rows.lower[s]] -= force[s]
+
+
+@phase
+def slip(sliding: Any, bodies: Any, G: Any, step: Step, moved: float) -> float:
+    """Friction of all sliders for the other forces so far; the largest move of a port."""
+    rows, state, trial, S = sliding.rows, sliding.state, sliding.trial, bodies.at
+    for s in range(rows.sliders):
+        u, low = rows.upper[s], rows.lower[s]
+        at = step.level * rows.sliders + s
+        own, drive = rows.G[at], rows.D[at]
+        force = trial.force[s]
+        speed = trial.speed[s] - drive * force
+        for j in range(bodies.first[u], bodies.last[u]):
+            speed += rows.kick[at * PORTS + j] * S[FORCE + j]
+        if bodies.first[low] != bodies.first[u]:
+            for j in range(bodies.first[low], bodies.last[low]):
+                speed += rows.kick[at * PORTS + j] * S[FORCE + j]
+        way = _apart(rows, S, Y1, s) - state.seen[s] - own * force
+        trial.force[s], trial.way[s] = slider_force(
+            rows.coulomb[s],
+            rows.excess[s],
+            rows.stribeck[s],
+            rows.viscous[s],
+            step.H,
+            own,
+            drive,
+            way,
+            speed,
+        )
+        change = trial.force[s] - force
+        if abs(change) <= _ROUND_OFF * abs(force):
+            trial.force[s], trial.way[s] = force, way + own * force
+        else:
+            S[FORCE + u] += change
+            S[FORCE + low] -= change
+            moved = move_body(bodies, G, u, change, moved)
+            moved = move_body(bodies, G, low, -change, moved)
+    return moved
+
+
+@phase
+def slip_seen_late(sliding: Any, S: Any) -> tuple[float, float]:
+    """Energy that it costs to see the last change of the others late, and the work [J]."""
+    rows, state, trial = sliding.rows, sliding.state, sliding.trial
+    left, work = 0.0, 0.0
+    for s in range(rows.sliders):
+        way = _apart(rows, S, Y1, s) - state.seen[s]
+        change = abs(trial.force[s] - state.force[s]) + _LEAST_CHANGE * abs(trial.force[s])
+        left += change * abs(way - trial.way[s])
+        work += abs(trial.force[s] * way)
+    return left, work
+
+
+@phase
+def sliders_hold(sliding: Any) -> bool:
+    """Whether friction changed so little in a coarse step that nothing turned or came to rest."""
+    rows, state, trial = sliding.rows, sliding.state, sliding.trial
+    holds = True
+    for s in range(rows.sliders):
+        most = rows.coulomb[s] + rows.excess[s]
+        if abs(trial.force[s] - state.force[s]) > _SHAKEN * max(most, abs(trial.force[s])):
+            holds = False
+    return holds
+
+
+@phase
+def end_sliders(sliding: Any, step: Step, first: bool, accounts: Any, sums: Any) -> None:
+    """Take over ways and forces; ``first`` is for the first step of a macro step."""
+    rows, state, trial = sliding.rows, sliding.state, sliding.trial
+    for s in range(rows.sliders):
+        force = trial.force[s]
+        state.seen[s] += trial.way[s]
+        state.force[s] = force
+        accounts.friction[s] -= force * trial.way[s]
+        sums[2 * s] += step.H * force
+        sums[2 * s + 1] -= step.H * force
+        if first:
+            trial.first[s] = force
+        trial.least[s] = min(trial.least[s], force)
+        trial.most[s] = max(trial.most[s], force)
+
+
+@phase
+def cost_of_late_sliders(sliding: Any, S: Any) -> tuple[float, float]:
+    """Energy that it costs sliders to see the missed force a step late, and their work [J]."""
+    rows, state, trial = sliding.rows, sliding.state, sliding.trial
+    left, work = 0.0, 0.0
+    for s in range(rows.sliders):
+        left += abs(_apart(rows, S, AHEAD, s)) * (trial.most[s] - trial.least[s])
+        work += abs(trial.force[s] * (state.seen[s] - trial.kept[KEPT_SLIDER * s]))
+    return left, work
+
+
+@phase
+def end_macro_sliders(sliding: Any, S: Any) -> float:
+    """Energy that bodies got before beyond what sliders give [J]: these were behind."""
+    rows, trial = sliding.rows, sliding.trial
+    excess = 0.0
+    for s in range(rows.sliders):
+        k = KEPT_SLIDER * s
+        excess += (trial.kept[k + 1] - trial.first[s]) * (_apart(rows, S, BEGIN, s) - trial.kept[k])
+    return excess

@@ -1,0 +1,196 @@
+"""Friction in a guide that sticks, in the time loop of networks."""
+
+from math import exp, pi, sqrt
+
+import numpy as np
+import pytest
+
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.simulation.slider_step import slider_force
+
+MASS = 2e-3
+BALANCE = 1e-12
+
+
+def run(
+    parts: dict, *, duration: float, speed: float = 0.0, step: float = 1e-7, coarse: int = 16, **at
+) -> NetworkResult:
+    parts = {"mass": RigidMass(mass=MASS, speed=speed), **parts}
+    ports = [f"{name}.{'body' if name == 'guide' else 'end'}" for name in parts if name != "mass"]
+    network = Network(parts, [["mass.body", *ports]])
+    return simulate_network(
+        network.rows(), duration=duration, step=step, coarse=coarse, record=10e-6, **at
+    )
+
+
+def place(result: NetworkResult) -> np.ndarray:
+    return result.channels["mass.body displacement"].values
+
+
+def velocity(result: NetworkResult) -> np.ndarray:
+    return result.channels["mass velocity"].values
+
+
+@pytest.mark.parametrize("coarse", [1, 16, 64])
+def test_a_sliding_mass_stops_where_its_energy_ends(coarse):
+    """Truth, exact: way m v^2 / (2 F), and it stays there."""
+    result = run({"guide": GuideFriction(coulomb=0.8)}, speed=0.5, duration=4e-3, coarse=coarse)
+
+    way = MASS * 0.5**2 / (2.0 * 0.8)
+    stopped = MASS * 0.5 / 0.8
+    assert place(result)[-1] == pytest.approx(way, rel=1e-4 if coarse == 64 else 1e-5)
+    still = result.time > stopped + 20e-6
+    assert np.ptp(place(result)[still]) < 1e-15
+    assert np.abs(velocity(result)[still]).max() < 1e-12
+    assert result.books.losses["guide loss"] == pytest.approx(0.5 * MASS * 0.5**2, rel=1e-9)
+    assert result.books.relative_residual < BALANCE
+
+
+def test_a_held_mass_does_not_creep():
+    """Truth, exact: a steady force below the breakaway friction moves nothing, however long."""
+    parts = {
+        "pull": ForceOverTime(time=(0.0, 1e-5), force=(0.0, 0.4999)),
+        "guide": GuideFriction(coulomb=0.3, breakaway=0.5),
+        "spring": Spring(stiffness=5e3, preload=10.0),
+    }
+
+    result = run(parts, duration=20e-3)
+
+    assert np.ptp(place(result)) < 1e-16
+    np.testing.assert_allclose(result.channels["guide.body force"].values[3:], -0.4999, rtol=1e-9)
+
+
+def test_a_rising_force_breaks_away_where_it_reaches_the_breakaway_friction():
+    """Truth, exact: at rest until 1.2 ms; then m a = F(t) - Fc with a step down to Fc.
+
+    With a Stribeck speed near 0 friction falls to its sliding value at once.
+    """
+    ramp = ForceOverTime(time=(0.0, 4e-3), force=(0.0, 2.0))
+    guide = GuideFriction(coulomb=0.3, breakaway=0.6, stribeck_speed=1e-6)
+
+    result = run({"pull": ramp, "guide": guide}, duration=3e-3, coarse=1)
+
+    before = result.time < 1.2e-3 - 1e-6
+    assert np.abs(place(result)[before]).max() < 1e-16
+    t = result.time - 1.2e-3
+    exact = np.where(t > 0, (0.5 * (0.6 - 0.3) * t**2 + 500.0 * t**3 / 6.0) / MASS, 0.0)
+    assert np.abs(place(result) - exact).max() < 1e-3 * exact[-1]
+
+
+@pytest.mark.parametrize("coarse", [1, 16])
+def test_an_oscillator_loses_four_friction_lengths_in_a_period_and_sticks(coarse):
+    """Truth, exact: half-periods of pi/omega, amplitudes falling by 2 F/k, then it sticks."""
+    k, friction = 5e3, 0.8
+    parts = {"spring": Spring(stiffness=k, preload=0.0), "guide": GuideFriction(coulomb=friction)}
+
+    result = run(parts, speed=1.8, duration=12e-3, coarse=coarse)
+
+    omega, band = sqrt(k / MASS), friction / k
+    reach = -band + sqrt(band**2 + (1.8 / omega) ** 2)  # 0.5 k y^2 + F y = 0.5 m v^2
+    turns = [reach]
+    while abs(turns[-1]) > band:
+        turns.append(-np.sign(turns[-1]) * (abs(turns[-1]) - 2.0 * band))
+    first = np.arctan2(1.8 / omega, band) / omega
+    assert abs(turns[-1]) < band < abs(turns[-2])
+    for n, turn in enumerate(turns):
+        at = first + n * pi / omega
+        assert np.interp(at, result.time, place(result)) == pytest.approx(turn, abs=2e-4 * reach)
+    assert np.ptp(place(result)[result.time > at + 50e-6]) < 1e-15
+    assert result.books.relative_residual < BALANCE
+
+
+def test_stick_slip_on_a_moving_guide():
+    """Truth, exact: a mass on a spring, carried until the spring pulls Fs, slips to Fc and back.
+
+    Slip with Fc: y = Fc/k + (Fs - Fc)/k cos(omega t) + v/omega sin(omega t) until the speed is that
+    of the guide again.
+    """
+    k, v = 5e3, 0.05
+    parts = {
+        "mass": RigidMass(mass=MASS, speed=v),
+        "belt": RigidMass(mass=1e6, speed=v),
+        "spring": Spring(stiffness=k, preload=0.0),
+        "guide": GuideFriction(coulomb=0.5, breakaway=1.0, stribeck_speed=1e-6),
+    }
+    network = Network(
+        parts, [["mass.body", "spring.end", "guide.body"], ["belt.body", "guide.guide"]]
+    )
+
+    result = simulate_network(network.rows(), duration=9e-3, step=1e-7, coarse=1, record=5e-6)
+
+    y = result.channels["mass.body displacement"].values
+    away = 1.0 / k / v  # 4 ms
+    omega = sqrt(k / MASS)
+    stuck = result.time < away - 5e-6
+    np.testing.assert_allclose(y[stuck], v * result.time[stuck], atol=1e-9)
+    t = result.time - away
+    caught = 2.0 / omega * (pi - np.arctan(0.5 / k * omega / v))  # speed of the belt again
+    slips = (t > 0) & (t < caught)
+    exact = 0.5 / k + 0.5 / k * np.cos(omega * t) + v / omega * np.sin(omega * t)
+    np.testing.assert_allclose(y[slips], exact[slips], atol=2e-3 / k)
+    carried = (t > caught + 5e-6) & (t < caught + 1e-3)
+    np.testing.assert_allclose(np.diff(y[carried]), v * 5e-6, rtol=1e-4)
+
+
+def test_viscous_friction_alone_is_a_dashpot():
+    """Truth, exact: v = v0 exp(-b t / m)."""
+    result = run({"guide": GuideFriction(coulomb=0.0, viscous=0.5)}, speed=0.5, duration=6e-3)
+
+    exact = 0.5 * exp(-0.5 * 6e-3 / MASS)
+    assert velocity(result)[-1] == pytest.approx(exact, rel=1e-7)
+
+
+@pytest.mark.parametrize("stribeck", [0.02, 0.2])
+def test_stribeck_friction_slows_by_its_curve(stribeck):
+    """Truth, reference: m dv/dt = -L(v), by a fine Runge-Kutta rule."""
+    result = run(
+        {"guide": GuideFriction(coulomb=0.4, breakaway=1.0, stribeck_speed=stribeck)},
+        speed=0.5,
+        duration=0.5e-3,
+        coarse=1,
+    )
+
+    def slope(v: float) -> float:
+        return -(0.4 + 0.6 * exp(-((v / stribeck) ** 2))) / MASS
+
+    v, h = 0.5, 1e-7
+    for _ in range(5000):
+        a = slope(v)
+        b = slope(v + 0.5 * h * a)
+        c = slope(v + 0.5 * h * b)
+        d = slope(v + h * c)
+        v += h / 6.0 * (a + 2 * b + 2 * c + d)
+    assert velocity(result)[-1] == pytest.approx(v, abs=1e-6)
+
+
+def test_the_force_of_a_step_never_gives_energy():
+    """Truth, conservation: 2000 random steps; the law holds in each."""
+    rng = np.random.default_rng(5)
+    for _ in range(2000):
+        coulomb, excess, viscous = rng.uniform(0, 2, 3) * (rng.uniform(size=3) > 0.2)
+        h, mass, stribeck = 10.0 ** rng.uniform([-8, -4, -3], [-5, -1, 0])
+        G, D = h * h / (2 * mass), h / mass
+        way = rng.normal() * 10.0 ** rng.uniform(-3, 3) * G
+        speed = rng.normal() * 10.0 ** rng.uniform(-3, 3) * D
+
+        force, slip = slider_force(coulomb, excess, stribeck, viscous, h, G, D, way, speed)
+
+        assert force * slip <= 0.0
+        assert slip == pytest.approx(way + G * force, rel=1e-9, abs=1e-12 * abs(way))
+        dry = -force - viscous * slip / h
+        u = abs(slip) / h
+        most = coulomb + excess * exp(-min((u / stribeck) ** 2, 700.0))
+        assert abs(dry) <= most * (1 + 1e-9) + 1e-12 * abs(force)
+        if abs(dry) < most * (1 - 1e-9) - 1e-12 * abs(
+            force
+        ):  # it stops, or turns without the dry part
+            after = speed + D * force
+            turned = way * (speed - D * viscous / h * way / (1 + G * viscous / h)) <= 0.0
+            still = min(abs(slip) / abs(way), abs(after) / (abs(speed) + D))
+            assert turned or still < 1e-9
