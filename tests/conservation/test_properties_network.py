@@ -28,7 +28,7 @@ from klack.network.network import Network
 from klack.network.step_function import evaluate
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.simulation.slider_step import slider_force
+from klack.simulation.slider_step import largest_friction, slider_force
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 
@@ -287,9 +287,11 @@ def test_friction_opposes_and_is_odd(given_friction, h, speed, more):
     )
     row = network.rows().sliders[0]
     numbers = (row.coulomb, row.breakaway - row.coulomb, row.stribeck_speed, row.viscous)
+    G = h**2 / 2e-3
     forces = []
     for v in (speed, -speed):
-        force, slip = slider_force(*numbers, h, h**2 / 2e-3, h / 1e-3, h * v, v)
+        largest = largest_friction(*numbers, h, G, h * v)
+        force, slip = slider_force(largest, row.viscous, h, G, h / 1e-3, h * v, v)
         assert force * v <= 0.0
         assert force * slip <= 0.0
         forces.append(force)

@@ -5,6 +5,7 @@ from math import exp, pi, sqrt
 import numpy as np
 import pytest
 
+from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.friction import GuideFriction
 from klack.mechanics.rigid_mass import RigidMass
@@ -12,7 +13,7 @@ from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.simulation.slider_step import slider_force
+from klack.simulation.slider_step import largest_friction, slider_force
 
 MASS = 2e-3
 BALANCE = 1e-12
@@ -138,6 +139,31 @@ def test_stick_slip_on_a_moving_guide():
     np.testing.assert_allclose(np.diff(y[carried]), v * 5e-6, rtol=1e-4)
 
 
+def test_a_needle_breaks_away_from_a_stiff_seat():
+    """Truth, conservation: friction that falls at once when it slips, on a contact that answers.
+
+    Stick and slip are both possible in the step of breaking away; they must not take turns.
+    """
+    law = {"kind": "linear", "stiffness": 8e9}
+    parts = {
+        "needle": RigidMass(mass=0.66e-3),
+        "spring": Spring(stiffness=3e3, preload=5.7),
+        "magnet": ForceOverTime(time=(0.0, 1e-4, 5e-4, 6e-4), force=(0.0, 35.3, 35.3, 0.0)),
+        "guide": GuideFriction(coulomb=6.6, breakaway=15.7, stribeck_speed=0.125e-3, viscous=0.5),
+        "seat": EndStop(gap=0.0, law=law),
+        "stop": EndStop(gap=34.5e-6, law=law, restitution=0.6),
+    }
+    at = ["spring.end", "magnet.end", "guide.body", "seat.upper", "stop.lower"]
+    grounded = [["seat.lower", "ground"], ["stop.upper", "ground"]]
+    network = Network(parts, [["needle.body", *at], *grounded])
+
+    result = simulate_network(network.rows(), duration=1.5e-3, step=5e-8, coarse=16, record=2e-6)
+
+    opened = result.channels["needle.body displacement"].values.max()
+    assert opened == pytest.approx(34.5e-6, rel=2e-3)
+    assert result.books.relative_residual < BALANCE
+
+
 def test_viscous_friction_alone_is_a_dashpot():
     """Truth, exact: v = v0 exp(-b t / m)."""
     result = run({"guide": GuideFriction(coulomb=0.0, viscous=0.5)}, speed=0.5, duration=6e-3)
@@ -179,7 +205,8 @@ def test_the_force_of_a_step_never_gives_energy():
         way = rng.normal() * 10.0 ** rng.uniform(-3, 3) * G
         speed = rng.normal() * 10.0 ** rng.uniform(-3, 3) * D
 
-        force, slip = slider_force(coulomb, excess, stribeck, viscous, h, G, D, way, speed)
+        largest = largest_friction(coulomb, excess, stribeck, viscous, h, G, way)
+        force, slip = slider_force(largest, viscous, h, G, D, way, speed)
 
         assert force * slip <= 0.0
         assert slip == pytest.approx(way + G * force, rel=1e-9, abs=1e-12 * abs(way))

@@ -342,6 +342,7 @@ class SliderTrial(NamedTuple):
     force: Vector
     way: Vector  # of slip
     speed: Vector  # at the end of the step without its forces
+    largest: Vector  # dry friction at most
     least: Vector  # force in this macro step and at its start
     most: Vector
     first: Vector  # force in the first sub-step

@@ -138,7 +138,7 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
         Whether what is left of that change matters no more.
     """
     rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
-    for _sweep in range(_MOST_SWEEPS):
+    for sweep in range(_MOST_SWEEPS):
         moved = 0.0
         for c in range(rows.interfaces):
             if state.far[c] != 0.0:
@@ -152,7 +152,7 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
                 S[FORCE + low] -= change
                 moved = move_body(bodies, G, u, change, moved)
                 moved = move_body(bodies, G, low, -change, moved)
-        moved = slip(sliding, bodies, G, step, moved)
+        moved = slip(sliding, bodies, G, step, sweep == 0, moved)
         left, work = slip_seen_late(sliding, S)
         distance = 0.0
         for s in range(sliding.rows.sliders):

@@ -13,7 +13,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_ports import move_body, port_speed
 from klack.simulation.phase import phase
-from klack.simulation.slider_step import slider_force
+from klack.simulation.slider_step import largest_friction, slider_force
 
 __all__ = [
     "begin_macro_sliders",
@@ -97,8 +97,11 @@ def push_by_last_friction(sliding: Any, S: Any) -> None:
 
 
 @phase
-def slip(sliding: Any, bodies: Any, G: Any, step: Step, moved: float) -> float:
-    """Friction of all sliders for the other forces so far; the largest move of a port."""
+def slip(sliding: Any, bodies: Any, G: Any, step: Step, first: bool, moved: float) -> float:
+    """Friction of all sliders for the other forces so far; the largest move of a port.
+
+    In the ``first`` sweep of a step it is decided which of them hold.
+    """
     rows, state, trial, S = sliding.rows, sliding.state, sliding.trial, bodies.at
     for s in range(rows.sliders):
         u, low = rows.upper[s], rows.lower[s]
@@ -112,16 +115,13 @@ def slip(sliding: Any, bodies: Any, G: Any, step: Step, moved: float) -> float:
             for j in range(bodies.first[low], bodies.last[low]):
                 speed += rows.kick[at * PORTS + j] * S[FORCE + j]
         way = _apart(rows, S, Y1, s) - state.seen[s] - own * force
+        viscous = rows.viscous[s]
+        if first:
+            trial.largest[s] = largest_friction(
+                rows.coulomb[s], rows.excess[s], rows.stribeck[s], viscous, step.H, own, way
+            )
         trial.force[s], trial.way[s] = slider_force(
-            rows.coulomb[s],
-            rows.excess[s],
-            rows.stribeck[s],
-            rows.viscous[s],
-            step.H,
-            own,
-            drive,
-            way,
-            speed,
+            trial.largest[s], viscous, step.H, own, drive, way, speed
         )
         change = trial.force[s] - force
         if abs(change) <= _ROUND_OFF * abs(force):

@@ -16,41 +16,66 @@ holds a body at rest against any force up to :math:`F_s`, without creep; slides 
 :math:`\Delta` vanish would leave :math:`v_1 = -v_0`, and a body at rest would tremble.)  The loss
 :math:`-f \Delta` is never negative.
 
+Where *L* falls with the speed, a body may stick or slip in the same step.  Which of both is decided
+once in a step, before the contacts answer: else these and the friction would take turns for ever.
+
 Where *v* turns round within the step by other forces, *C* is 0 for this step: an error of the
 impulse below :math:`F_s h`.
 """
 
 from math import exp
 
-from klack.compiling.jit import inner, njit
+from klack.compiling.jit import njit
 
-__all__ = ["slider_force"]
+__all__ = ["largest_friction", "slider_force"]
 
 _TURNS = 60
 _LEFT = 1e-14  # of the way without friction
 
 
-@inner(error_model="numpy", _nrt=False)
-def _slipping(
-    coulomb: float, excess: float, stribeck: float, h: float, G: float, a: float
+@njit(error_model="numpy", _nrt=False)
+def largest_friction(
+    coulomb: float,
+    excess: float,
+    stribeck: float,
+    viscous: float,
+    h: float,
+    G: float,
+    way: float,
 ) -> float:
-    """Friction while it slips, ``L(u)`` with ``h u + G L(u) = a`` and ``a > G L(0)``."""
-    if excess == 0.0:
-        return coulomb
-    low, high = (a - G * (coulomb + excess)) / h, (a - G * coulomb) / h
+    """Dry friction [N] of a step at most: ``Fs`` where it holds, else ``L`` at its speed of slip.
+
+    Parameters
+    ----------
+    coulomb, excess : float [N]
+        ``Fc`` and ``Fs - Fc``, not negative.
+    stribeck : float [m/s]
+    viscous : float [N s/m]
+    h : float [s]
+    G : float [m/N]
+        Way per force, above 0.
+    way : float [m]
+        Without the force.
+    """
+    yielding = 1.0 / (1.0 + G * viscous / h)
+    g, a = G * yielding, abs(way) * yielding
+    if excess == 0.0 or a <= g * (coulomb + excess):
+        return coulomb + excess
+    # h u + g L(u) = a
+    low, high = (a - g * (coulomb + excess)) / h, (a - g * coulomb) / h
     u, level = high, coulomb
     for _ in range(_TURNS):
         x = u / stribeck
         part = excess * exp(-x * x) if x * x < 40.0 else 0.0
         level = coulomb + part
-        left = h * u + G * level - a
+        left = h * u + g * level - a
         if abs(left) <= _LEFT * a:
             break
         if left > 0.0:
             high = u
         else:
             low = u
-        slope = h - 2.0 * G * part * x / stribeck
+        slope = h - 2.0 * g * part * x / stribeck
         u = u - left / slope if slope > 0.0 else low
         if not low < u < high:
             u = 0.5 * (low + high)
@@ -59,23 +84,14 @@ def _slipping(
 
 @njit(error_model="numpy", _nrt=False)
 def slider_force(
-    coulomb: float,
-    excess: float,
-    stribeck: float,
-    viscous: float,
-    h: float,
-    G: float,
-    D: float,
-    way: float,
-    speed: float,
+    most: float, viscous: float, h: float, G: float, D: float, way: float, speed: float
 ) -> tuple[float, float]:
     """Friction of one slider over a step, and the way that it slips.
 
     Parameters
     ----------
-    coulomb, excess : float [N]
-        ``Fc`` and ``Fs - Fc``, not negative.
-    stribeck : float [m/s]
+    most : float [N]
+        Dry friction at most, see :func:`largest_friction`.
     viscous : float [N s/m]
     h : float [s]
     G : float [m/N]
@@ -97,16 +113,8 @@ def slider_force(
     way *= yielding
     g = G * yielding
     speed -= D * drag * way
-    d = D * (1.0 - drag * g)
-    dry = 0.0
     sign = 1.0 if way > 0.0 else -1.0
-    onward = sign * speed
-    if onward > 0.0 and way != 0.0:
-        a = abs(way)
-        dry = a / g
-        if dry > coulomb + excess:
-            dry = _slipping(coulomb, excess, stribeck, h, g, a)
-        dry = min(dry, onward / d)
+    dry = min(most, abs(way) / g, max(sign * speed / (D * (1.0 - drag * g)), 0.0))
     slip = way - sign * g * dry
     if sign * slip < 0.0:
         slip = 0.0  # round-off
