@@ -74,6 +74,8 @@ class CalculixImpact:
         Of the upper body at the place where it is.
     closing_force : float [N]
         Constant force on the upper body, positive in -z, spread over it like its weight.
+    friction : float [-]
+        Coulomb's coefficient between the faces, whether they stick or slip.
     """
 
     title: str
@@ -84,6 +86,7 @@ class CalculixImpact:
     materials: Mapping[str, Mapping[str, Material]]
     speed: float
     closing_force: float = 0.0
+    friction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +112,7 @@ class CalculixSettings:
     penalty: float
     alpha: float = -0.05
     solver: CalculixSolver = "ITERATIVE SCALING"
+    stick_slope: float | None = None
 
     def __post_init__(self) -> None:
         require_positive("CalculiX: step", self.step, "s")
@@ -229,7 +233,7 @@ def deck_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[s
         yield from _section_lines(role, mesh, impact.materials[body.name])
         node += mesh.node_count
         element += mesh.element_count
-    yield from _contact_lines(settings)
+    yield from _contact_lines(settings, impact.friction)
     for role, body in ((UPPER, impact.upper), (LOWER, impact.lower)):
         if len(body.fixed):
             yield from ("*BOUNDARY", f"{role}_FIXED, 1, 3")
@@ -323,10 +327,14 @@ def _section_lines(role: str, mesh: Mesh, materials: Mapping[str, Material]) -> 
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"
 
 
-def _contact_lines(settings: CalculixSettings) -> Iterator[str]:
+def _contact_lines(settings: CalculixSettings, friction: float) -> Iterator[str]:
     yield "*SURFACE INTERACTION, NAME=CONTACT"
     yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
     yield f"{settings.penalty * _MM / _MPA:.12g},"
+    if friction > 0.0:
+        slope = settings.stick_slope or friction * settings.penalty
+        yield "*FRICTION"
+        yield f"{friction:.12g}, {slope * _MM / _MPA:.12g}"
     yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
     yield f"{UPPER}_CONTACT, {LOWER}_CONTACT"
 
