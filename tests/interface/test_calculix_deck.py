@@ -208,6 +208,7 @@ def test_the_proposed_penalty_adds_a_three_hundredth():
     [
         ({"step": 0.0}, "step"),
         ({"penalty": float("nan")}, "penalty"),
+        ({"stick": 0.0}, "stick"),
         ({"duration": 1e-9}, "one step"),
         ({"alpha": -0.4}, "-1/3"),
         ({"alpha": 0.1}, "-1/3"),
@@ -244,11 +245,45 @@ def test_a_guide_is_left_out_with_a_note():
         calculix_impact(case.model_copy(update={"guide": guide}), silent)
 
 
-def test_friction_is_left_out_with_a_note():
+@pytest.mark.parametrize(
+    ("contact", "words"),
+    [
+        ({"friction": 0.1}, r"friction 0\.1 is regularised .* every speed of slip\.$"),
+        (
+            {"friction": 0.1, "static_friction": 0.2, "stribeck_speed": 0.01},
+            r"left out: contact\.static_friction 0\.2, stribeck_speed 10 mm/s\.$",
+        ),
+        ({"static_friction": 0.2}, r"the deck has no friction, .*static_friction 0\.2\.$"),
+    ],
+)
+def test_friction_says_what_is_another_law(contact, words):
     case = load_case(find_case("witness"))
-    rough = case.contact.model_copy(update={"friction": 0.1})
-    with pytest.warns(AccuracyWarning, match=r"left out of the deck: contact\.friction 0\.1"):
-        calculix_impact(case.model_copy(update={"contact": rough}), silent)
+    rough = case.contact.model_copy(update=contact)
+    with pytest.warns(AccuracyWarning, match=words):
+        bodies = calculix_impact(case.model_copy(update={"contact": rough}), silent)
+    assert bodies.friction == contact.get("friction", 0.0)
+
+
+def test_friction_adds_its_lines_alone():
+    """Stick slope by hand, 1e8 MPa/mm / 20; all other lines are those without friction."""
+    settings = replace(SETTINGS, stick=0.05)
+    smooth, rough = (list(deck_lines(impact(friction=mu), settings)) for mu in (0.0, 0.1))
+
+    at = rough.index("*FRICTION")
+    assert rough[at + 1] == "0.1, 5000000"
+    assert rough[at - 4].startswith("** stick slope: penalty times 0.05")
+    assert "by up to 2 times their overclosure" in rough[at - 3]
+    solver = next(i for i, line in enumerate(smooth) if line.startswith("*DYNAMIC"))
+    assert smooth[solver].endswith("SOLVER=ITERATIVE SCALING")
+    smooth[solver] = smooth[solver].replace("ITERATIVE SCALING", "SPOOLES")
+    assert rough[: at - 4] + rough[at + 2 :] == smooth
+
+
+def test_friction_needs_a_solver_of_unsymmetric_systems():
+    with pytest.raises(InputError, match="ITERATIVE CHOLESKY with friction"):
+        list(deck_lines(impact(friction=0.1), replace(SETTINGS, solver="ITERATIVE CHOLESKY")))
+    other = list(deck_lines(impact(friction=0.1), replace(SETTINGS, solver="PARDISO")))
+    assert any(line.endswith("SOLVER=PARDISO") for line in other)
 
 
 def test_the_witness_case_becomes_a_deck(tmp_path):

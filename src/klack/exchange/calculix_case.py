@@ -4,9 +4,11 @@ import warnings
 
 from klack.assembling.bodies import build_bodies
 from klack.case.schema import Case
+from klack.contact.friction import Friction
 from klack.errors import AccuracyWarning, InputError
 from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
 from klack.progress import Progress
+from klack.units import format_si
 
 __all__ = ["calculix_impact", "calculix_settings"]
 
@@ -25,7 +27,7 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     -----
     AccuracyWarning
         If the case has a guide or an upper stop, which only the interface level supports, or
-        friction of the faces.
+        friction between the faces, whose law in CalculiX is another.
     """
     if case.dimension != 3:
         raise InputError(
@@ -43,13 +45,8 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             AccuracyWarning,
             stacklevel=2,
         )
-    if not case.contact.faces.is_none:
-        warnings.warn(
-            f"left out of the deck: contact.friction {case.contact.faces.static:g}. Try: compare "
-            "with the level 'full' of the case without friction.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
+    if said := _other_friction(case.contact.faces):
+        warnings.warn(said, AccuracyWarning, stacklevel=2)
     pair = build_bodies(case, progress)
     return CalculixImpact(
         title=case.title,
@@ -63,6 +60,24 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
         },
         speed=case.motion.speed,
         closing_force=case.motion.closing_force,
+        friction=case.contact.faces.kinetic,
+    )
+
+
+def _other_friction(faces: Friction) -> str:
+    """What the friction of CalculiX has not of that of the case; empty without friction."""
+    if faces.is_none:
+        return ""
+    left_out = ""
+    if not faces.is_constant:
+        left_out = f"; left out: contact.static_friction {faces.static:g}"
+        if faces.speed:
+            left_out += f", stribeck_speed {format_si(faces.speed, 'm/s')}"
+    if not faces.kinetic:
+        return f"the deck has no friction, contact.friction is 0{left_out}."
+    return (
+        f"contact.friction {faces.kinetic:g} is regularised in the deck: faces that stick give way "
+        f"like a spring (stick slope), and one coefficient holds at every speed of slip{left_out}."
     )
 
 

@@ -6,7 +6,12 @@ face-to-face penalty: at every integration point of the upper (slave) surface th
 
 .. math:: p = K \max(0, -g)
 
-with the overclosure :math:`-g` on the curved faces.  The Hilber-Hughes-Taylor rule of ccx takes
+with the overclosure :math:`-g` on the curved faces.  With friction they hold
+:math:`\min(\lambda s, \mu p)` across, *s* the elastic part of the slip: a spring of the stick slope
+:math:`\lambda` before the slider, where klack's faces stick without giving way.  The system is
+then unsymmetric, which the iterative solvers of ccx do not take.
+
+The Hilber-Hughes-Taylor rule of ccx takes
 fixed steps (``DIRECT``): its automatic steps would also cut at impacts, but no two runs could then
 be compared step by step.
 
@@ -102,21 +107,25 @@ class CalculixSettings:
     alpha : float [-]
         Of Hilber, Hughes & Taylor (1977), -1/3 to 0: 0 is the trapezoidal rule without any
         numerical damping, -0.05 the default of ccx.
-    solver : str
+    solver : str, optional
         Equation solver.  At time steps that resolve an impact the mass dominates: ``ITERATIVE
-        SCALING`` gave the printed digits of SPOOLES in a third of the time.
+        SCALING`` gave the printed digits of SPOOLES in a third of the time, and is the choice
+        without friction; with friction it is ``SPOOLES``.
+    stick : float [-]
+        Stick slope over penalty.
     """
 
     step: float
     duration: float
     penalty: float
     alpha: float = -0.05
-    solver: CalculixSolver = "ITERATIVE SCALING"
-    stick_slope: float | None = None
+    solver: CalculixSolver | None = None
+    stick: float = 1.0 / 30.0
 
     def __post_init__(self) -> None:
         require_positive("CalculiX: step", self.step, "s")
         require_positive("CalculiX: penalty", self.penalty, "Pa/m")
+        require_positive("CalculiX: stick", self.stick, "")
         if not self.duration >= self.step:
             raise InputError(
                 "CalculiX: duration",
@@ -218,7 +227,8 @@ def deck_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[s
     Raises
     ------
     InputError
-        For bodies of revolution, a body a that is held, and what :func:`start_of_flight` refuses.
+        For bodies of revolution, a body a that is held, an iterative solver with friction, and what
+        :func:`start_of_flight` refuses.
     """
     _require_solids(impact)
     shift, speed = start_of_flight(impact, settings.step)
@@ -332,7 +342,11 @@ def _contact_lines(settings: CalculixSettings, friction: float) -> Iterator[str]
     yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
     yield f"{settings.penalty * _MM / _MPA:.12g},"
     if friction > 0.0:
-        slope = settings.stick_slope or friction * settings.penalty
+        slope = settings.stick * settings.penalty
+        yield f"** stick slope: penalty times {settings.stick:.3g}. Faces that stick give way across"
+        yield f"** by up to {friction / settings.stick:.3g} times their overclosure. A larger slope is"
+        yield "** closer to Coulomb, but where the slip turns the iterations may cycle between stick"
+        yield "** and slip."
         yield "*FRICTION"
         yield f"{friction:.12g}, {slope * _MM / _MPA:.12g}"
     yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
@@ -342,7 +356,7 @@ def _contact_lines(settings: CalculixSettings, friction: float) -> Iterator[str]
 def _step_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[str]:
     increments = int(np.ceil(settings.duration / settings.step * (1.0 - 1e-9)))
     yield f"*STEP, INC={10 * increments + 100}"
-    yield f"*DYNAMIC, DIRECT, ALPHA={settings.alpha:g}, SOLVER={settings.solver}"
+    yield f"*DYNAMIC, DIRECT, ALPHA={settings.alpha:g}, SOLVER={_solver(impact, settings)}"
     yield f"{settings.step:.9g}, {increments * settings.step:.9g}"
     if impact.closing_force != 0.0:
         acceleration = impact.closing_force / impact.upper.mass / _MM
@@ -352,6 +366,19 @@ def _step_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[
     for role in (UPPER, LOWER):
         yield from (f"*EL PRINT, ELSET={role}, TOTALS=ONLY", "ELSE, ELKE")
     yield "*END STEP"
+
+
+def _solver(impact: CalculixImpact, settings: CalculixSettings) -> CalculixSolver:
+    if settings.solver is None:
+        return "SPOOLES" if impact.friction else "ITERATIVE SCALING"
+    if impact.friction and settings.solver.startswith("ITERATIVE"):
+        raise InputError(
+            "CalculiX: solver",
+            got=f"{settings.solver} with friction",
+            expected="SPOOLES, PARDISO or PASTIX: friction makes the system unsymmetric",
+            hint="leave the solver out.",
+        )
+    return settings.solver
 
 
 def _solid_set(role: str, mesh: Mesh, solid: str) -> str:

@@ -387,8 +387,11 @@ def _history(result: CalculixResult, reference: ImpactHistory, motion: _Motion) 
 
 
 def _ledger(result: CalculixResult, reference: ImpactHistory, motion: _Motion) -> EnergyLedger:
-    """Energies at the end; empty where the run did not print them all."""
-    if not len(result.total_energy):
+    """Energies at the end; empty where the run did not print them all.
+
+    ccx prints no work of friction, so with friction the balance is not known.
+    """
+    if not len(result.total_energy) or reference.ledger.friction:
         return EnergyLedger(initial=0.0, bodies=())
     bodies = []
     end = (float(motion.velocity[-1]), -float(result.impulse[-1]) / reference.mass_b)

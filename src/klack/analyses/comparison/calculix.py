@@ -127,7 +127,7 @@ PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
         key="energy_balance",
         symbol="r_E",
         definition="Energy gained (negative: lost) by the numerics of a run without damping, over "
-        "the energy turned over.",
+        "the energy turned over; friction of the faces is no loss of the numerics.",
         source="theory/calculix",
         read=lambda run: energy_balance(run.history.ledger),
         form="power",
@@ -244,7 +244,16 @@ def comparison_told(comparison: Comparison) -> Iterator[TextTable | str]:
         f"Force history: {100 * d.history_l2:.2f} % rms of the peak; third octaves within "
         f"{d.third_octave_max_dB:.2g} dB up to {d.third_octave_up_to_Hz / 1e3:.4g} kHz."
     )
-    if (swing := comparison.other.energy_swing) is not None:
+    swing, friction = comparison.other.energy_swing, _rubbed(comparison.level.history.ledger)
+    if swing is None:
+        return
+    if friction:
+        yield (
+            f"Energy that {comparison.other.program} lost, to friction and its numerics: "
+            f"{100 * swing:.2f} % of that at the start; friction took {100 * friction:.2f} % in "
+            "klack."
+        )
+    else:
         yield (
             f"Energy of {comparison.other.program} within {swing:.1e} of that at the start at all "
             "times."
@@ -255,16 +264,22 @@ def energy_balance(ledger: EnergyLedger) -> float | None:
     """Energy gained (negative: lost) by the numerics of a run without damping [-].
 
     What the bodies, springs and contacts hold at the end, less what they had and what outside
-    forces gave, over the energy turned over; None where a run has no energies.
+    forces gave, over the energy turned over; None where a run has no energies.  What friction took
+    is not counted.
     """
     if not ledger.bodies:
         return None
-    return ledger.residual - _lost(ledger)
+    return ledger.residual - _lost(ledger) + _rubbed(ledger)
 
 
 def _lost(ledger: EnergyLedger) -> float:
     turned_over = max(ledger.initial, abs(ledger.work))
     return ledger.lost / turned_over if turned_over else 0.0
+
+
+def _rubbed(ledger: EnergyLedger) -> float:
+    turned_over = max(ledger.initial, abs(ledger.work))
+    return ledger.friction / turned_over if turned_over else 0.0
 
 
 def comparison_to_json(comparison: Comparison) -> CalculixJson:
