@@ -273,10 +273,29 @@ def test_friction_adds_its_lines_alone():
     assert rough[at + 1] == "0.1, 5000000"
     assert rough[at - 4].startswith("** stick slope: penalty times 0.05")
     assert "by up to 2 times their overclosure" in rough[at - 3]
+    del rough[at - 4 : at + 2]
+    begin = next(i for i, line in enumerate(rough) if line.startswith("** ballast"))
+    end = rough.index("*SOLID SECTION, ELSET=BALLAST, MATERIAL=BALLAST")
+    del rough[begin : end + 1]
+    rough.remove("BALLAST_NODES, 3, -500")
     solver = next(i for i, line in enumerate(smooth) if line.startswith("*DYNAMIC"))
     assert smooth[solver].endswith("SOLVER=ITERATIVE SCALING")
     smooth[solver] = smooth[solver].replace("ITERATIVE SCALING", "SPOOLES")
-    assert rough[: at - 4] + rough[at + 2 :] == smooth
+    assert rough == smooth
+
+
+def test_the_ballast_of_friction_is_heavy_and_far(tmp_path):
+    """A thousand times the mass of the upper body, beside both bodies."""
+    bodies = impact(friction=0.1)
+
+    model = read_back(tmp_path / "two.inp", bodies, SETTINGS)
+
+    points, first = model.mesh.points, model.mesh.node_count - 8
+    cube, others = points[first:], points[:first]
+    assert cube[:, 0].min() > others[:, 0].max() + 1e-3
+    volume = np.prod(np.ptp(cube, axis=0))
+    density = 1e12 * model.materials[model.sections["BALLAST"]].density
+    assert density * volume == pytest.approx(1e3 * bodies.upper.mass, rel=1e-9)
 
 
 def test_friction_needs_a_solver_of_unsymmetric_systems():
