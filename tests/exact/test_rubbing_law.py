@@ -16,7 +16,7 @@ from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import InputError
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
-from klack.simulation.rubbing_step import rubbed_on, rubbing_mean
+from klack.simulation.rubbing_step import rubbing_mean, rubbing_store, slide, slider_places
 from klack.simulation.system import ContactPair, ReducedSystem
 
 TABLE = Path(__file__).parents[1] / "data" / "friction_cone_seat.csv"
@@ -54,13 +54,15 @@ def bed(power, friction=0.2, ratio=3.0, depth=1e-6, count=400):
 
 def work_along(law, path):
     """Work taken, energy stored at the end, loss: exactly, from corner to corner."""
-    numbers, slip = law.flat().parameters, np.zeros_like(law.onset)
+    numbers = law.flat().parameters
     work, lost = 0.0, []
     for d0, d1 in pairwise(path):
-        mean, _ = rubbing_mean(numbers, 0, slip, d0, d1)
+        mean, _ = rubbing_mean(numbers, 0, d0, d1)
         work += mean * (d1 - d0)
-        lost.append(rubbed_on(numbers, 0, slip, d0, d1))
-    return work, law.stored(path[-1], slip), np.array(lost)
+        lost.append(slide(numbers, 0, d0, d1))
+    stored = law.stored(path[-1], slider_places(numbers, 0))
+    assert rubbing_store(numbers, 0, path[-1]) == pytest.approx(stored, rel=1e-12)
+    return work, stored, np.array(lost)
 
 
 @pytest.mark.parametrize("row", cones(), ids=lambda row: f"{row['half_angle_deg']:g}-{row['mu']:g}")
@@ -98,10 +100,10 @@ def test_springs_of_all_depths_lose_the_same_share(power):
 
 def test_forces_along_a_path_are_those_of_the_steps():
     law, path = bed(1.5, count=30), np.array([0.0, 0.7, 0.5, 0.6, 0.2, 0.9, 0.0, 0.3]) * 1e-6
-    forces, slip, numbers = law.along(path), np.zeros(30), law.flat().parameters
+    forces, numbers = law.along(path), law.flat().parameters
     for d0, d1, force in zip(path[:-1], path[1:], forces[1:], strict=True):
-        rubbed_on(numbers, 0, slip, d0, d1)
-        still, _ = rubbing_mean(numbers, 0, slip, d1, d1)
+        slide(numbers, 0, d0, d1)
+        still, _ = rubbing_mean(numbers, 0, d1, d1)
         assert still == pytest.approx(force, rel=1e-12, abs=1e-12)
 
 
@@ -119,13 +121,12 @@ def test_no_path_gains_energy(seed):
 
 
 def test_slope_of_a_step_is_that_of_its_force():
-    law, slip = bed(1.5, count=7), np.zeros(7)
-    numbers = law.flat().parameters
-    rubbed_on(numbers, 0, slip, 0.0, 0.8e-6)
+    numbers = bed(1.5, count=7).flat().parameters
+    slide(numbers, 0, 0.0, 0.8e-6)
     for d0, d1 in ((0.8e-6, 0.85e-6), (0.8e-6, 0.74e-6), (0.8e-6, 0.21e-6), (0.8e-6, -0.1e-6)):
         h = 1e-12
-        up, down = (rubbing_mean(numbers, 0, slip, d0, d1 + s * h)[0] for s in (1, -1))
-        _, slope = rubbing_mean(numbers, 0, slip, d0, d1)
+        up, down = (rubbing_mean(numbers, 0, d0, d1 + s * h)[0] for s in (1, -1))
+        _, slope = rubbing_mean(numbers, 0, d0, d1)
         assert slope == pytest.approx((up - down) / (2 * h), rel=1e-4)
 
 

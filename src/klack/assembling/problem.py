@@ -1,33 +1,24 @@
 """Bodies of a case in their places, and the contact problem of one impact, for all levels."""
 
-import warnings
 from dataclasses import dataclass
 from functools import cached_property
-
-import numpy as np
-from scipy.sparse import vstack
 
 from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.opposite import OppositeStop, build_opposite
+from klack.assembling.rubbing import static_loops
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
-from klack.contact.mortar import ContactSpace, contact_space, tangent_rows
+from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
-from klack.contact.statics import ReachError, StaticContact, condensed_compliance
+from klack.contact.statics import ReachError, StaticContact
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
-from klack.errors import AccuracyWarning, ConvergenceError
 from klack.progress import Progress, remark
-from klack.transient.rubbing_ladder import (
-    LockedError,
-    RubbingContact,
-    TangentialRows,
-    rubbing_contact,
-)
+from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
@@ -106,27 +97,14 @@ class ContactProblem(PlacedBodies):
         friction = self.case.contact.faces.kinetic
         if friction == 0.0:
             return None
-        a, b = self.pair.upper.mesh, self.pair.lower.mesh
-        space = self.space
-        T_a, T_b = tangent_rows(space, a, self.pair.upper_surface, b, self.pair.lower_surface)
-        up = np.zeros((a.node_count, a.dimension))
-        up[:, -1] = 1.0
-        C = condensed_compliance(
-            vstack([space.G_a, T_a], format="csr"),
-            vstack([space.G_b, T_b], format="csr"),
+        return static_loops(
+            self.static,
+            self.pair,
             self.flexibility_upper,
             self.flexibility_lower,
+            friction,
+            key="contact.friction",
         )
-        rows = TangentialRows(T_a=T_a, T_b=T_b, axial=T_a @ up.ravel())
-        try:
-            return rubbing_contact(self.static, rows, C, friction)
-        except (LockedError, ReachError, ConvergenceError) as error:
-            warnings.warn(
-                f"the reduced level leaves out contact.friction {friction:g}: {error}",
-                AccuracyWarning,
-                stacklevel=2,
-            )
-            return None
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
         """Contact points of the same surfaces with twice the reach.

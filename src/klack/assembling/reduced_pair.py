@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
+from klack.assembling.rubbing import fitted_loops
 from klack.case.impact_sections import (
     ConsistentLocalLaw,
     HertzLocalLaw,
@@ -24,7 +25,7 @@ from klack.contact.laws import (
     LinearLaw,
 )
 from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
-from klack.contact.rubbing_fit import RubbingFit, rubbing_fit
+from klack.contact.rubbing_fit import RubbingFit
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import StaticContact
 from klack.contact.submodel import LocalStiffness, local_stiffness
@@ -59,7 +60,6 @@ PORT = "contact"
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
-_FAIR_LOOP = 0.02  # share of the work by which loops of the law may be wrong without a word
 _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
 
 
@@ -232,7 +232,7 @@ def _reduce_at(
     law, local = _law(problem, correction, upper, lower, stiffness)
     fit = None
     if isinstance(static, RubbingContact) and local is not None:
-        fit = _fitted(static, local)
+        fit = fitted_loops(static, local, key="contact.friction")
     return ReducedPair(
         upper=upper,
         lower=lower,
@@ -243,28 +243,6 @@ def _reduce_at(
         static=static,
         rubbing=fit,
     )
-
-
-def _fitted(rubbing: RubbingContact, local: LocalLaw) -> RubbingFit | None:
-    """Law with memory; None where none has loops like these, with a warning."""
-    try:
-        fit = rubbing_fit(local, rubbing.loops)
-    except InputError as error:
-        warnings.warn(
-            f"the reduced level leaves out the loss of contact.friction: {error}",
-            AccuracyWarning,
-            stacklevel=2,
-        )
-        return None
-    if fit.error > _FAIR_LOOP:
-        warnings.warn(
-            f"contact.friction: the law of the reduced level loses {100 * fit.error:.2g} % of its "
-            f"work more or less than the full bodies, which lose {100 * fit.loss:.2g} %. Keep "
-            "fewer modes, or take the interface level.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
-    return fit
 
 
 def friction_doubt(case: Case, *, has_memory: bool) -> str:

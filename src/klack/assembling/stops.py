@@ -7,7 +7,6 @@ meshed and factorised once and carries one port for each of its stops.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import pi, sqrt
 
 import numpy as np
@@ -16,11 +15,13 @@ from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder
 from klack.assembling.modes import selection_of
+from klack.assembling.rubbing import fitted_loops, static_loops
 from klack.case.valve import ValveCase
 from klack.case.valve_sections import CaseStop
 from klack.contact.laws import ContactLaw, LinearLaw, TableLaw
 from klack.contact.local_law import LocalLaw, consistent_law
 from klack.contact.mortar import touching_shift
+from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import StaticContact
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -33,9 +34,17 @@ from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact import simulate
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.stages import trial
+from klack.stages import trial, warnings_of
+from klack.transient.rubbing_ladder import RubbingContact
 
-__all__ = ["StopContact", "build_stop", "split_law", "stop_law"]
+__all__ = [
+    "StopContact",
+    "StopFaces",
+    "build_stop",
+    "bulk_compliance",
+    "stop_law",
+    "without_bulk",
+]
 
 _FIRST_FORCE = 0.7  # of the end of the ladder: about the peak of an impact of elastic bodies
 _ROUNDS = 3
@@ -55,11 +64,14 @@ class StopContact:
     pair : BodyPair
         Both bodies as they touch; the meshes are moved copies, the matrices are shared.
     static : StaticContact
+        Without friction.
     ports : pair of Port
         Of the upper and of the lower body, resultant +1 N along z each, named like the surface.
     pattern_force : float [N]
         Force at which the pressure pattern of the ports was taken: the peak of an impact at the
         speed of the case.
+    rubbing : RubbingContact or None
+        The same with friction between the faces.
     """
 
     name: str
@@ -67,6 +79,39 @@ class StopContact:
     static: StaticContact
     ports: tuple[Port, Port]
     pattern_force: float
+    rubbing: RubbingContact | None = None
+
+    @property
+    def closing(self) -> StaticContact:
+        """Static contact while it closes, with the friction of the faces."""
+        return self.static if self.rubbing is None else self.rubbing.closing
+
+    @property
+    def key(self) -> str:
+        """Friction of the faces in the case."""
+        return _friction_key(self.name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StopFaces:
+    """Law of an end stop, alone and beside a squeeze film.
+
+    Parameters
+    ----------
+    local : LocalLaw
+        While the faces close, with its shares.
+    law : TableLaw or RubbingLaw
+        All that the modes miss; with memory where faces have friction.
+    faces : TableLaw or RubbingLaw
+        The same without the bulk, which a film presses on as well.
+    bulk : float [m/N]
+        Series compliance behind ``faces``.
+    """
+
+    local: LocalLaw
+    law: TableLaw | RubbingLaw
+    faces: TableLaw | RubbingLaw
+    bulk: float
 
 
 def build_stop(
@@ -98,48 +143,79 @@ def build_stop(
         reach=stop.reach,
         progress=progress,
     )
-    force = _FIRST_FORCE * static.max_force
+    rubbing = None
+    if stop.friction > 0.0:
+        with warnings_of(f"stop '{name}'"):
+            upper, lower = flexibility
+            rubbing = static_loops(
+                static, pair, upper, lower, stop.friction, key=_friction_key(name)
+            )
+    loaded = static if rubbing is None else rubbing
+    contact = _contact_at(_FIRST_FORCE * loaded.max_force, name, pair, static, rubbing)
     for _ in range(_ROUNDS):
-        ports = _contact_ports(pair, static, force)
         with trial():  # the law of the stop comes with all its ports, and says what it lacks
-            peak = _peak_force(case, stop, pair, static, ports, flexibility, pools)
-        settled = abs(peak - force) <= _SETTLED * force
-        force = min(peak, static.max_force)
+            peak = _peak_force(case, stop, contact, flexibility, pools)
+        settled = abs(peak - contact.pattern_force) <= _SETTLED * contact.pattern_force
+        contact = _contact_at(min(peak, loaded.max_force), name, pair, static, rubbing)
         if settled:
             break
-    ports = _contact_ports(pair, static, force)
-    return StopContact(name=name, pair=pair, static=static, ports=ports, pattern_force=force)
+    return contact
 
 
-def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> LocalLaw:
-    """Local law that carries what the modes of the two bodies miss at this stop."""
-    compliance = 0.0
+def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> StopFaces:
+    """Law that carries what the modes of the two bodies miss at this stop.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where a law has not all of the friction.
+    """
+    modal = 0.0
     for body, port in zip((upper, lower), contact.ports, strict=True):
         i = body.port_index(port.name)
-        compliance += float(body.modal_compliance[i, i])
-    return consistent_law(contact.static, compliance)
+        modal += float(body.modal_compliance[i, i])
+    local, rubbing, key = consistent_law(contact.closing, modal), contact.rubbing, contact.key
+    fit = None if rubbing is None else fitted_loops(rubbing, local, key=key)
+    law = local.law if fit is None else fit.law
+    D = bulk_compliance(local, law)
+    beside = without_bulk(local, D)
+    if rubbing is None or not isinstance(law, RubbingLaw):
+        return StopFaces(local=local, law=law, faces=beside.law, bulk=D)
+    fit = fitted_loops(rubbing, beside, key=f"{key} beside a film")
+    return StopFaces(local=local, law=law, faces=beside.law if fit is None else fit.law, bulk=D)
 
 
-@lru_cache(maxsize=100)
-def split_law(local: LocalLaw) -> tuple[TableLaw, float]:
-    r"""Cut a local law into the faces and the bulk behind them.
+def bulk_compliance(local: LocalLaw, law: TableLaw | RubbingLaw) -> float:
+    r"""Compliance [m/N] of the bulk behind the faces, in series with them and with a film.
 
     .. math:: \delta_{loc}(P) = \delta_{faces}(P) + D P, \qquad D = 0.9 \min \delta_{loc}'(P)
 
     A squeeze film lies between the faces, beside their contact, and presses on the same bulk.  The
     bulk yields in proportion to the force, whatever presses; what is left grows with the contact
-    zone and stays monotone.
-
-    Returns
-    -------
-    law : TableLaw
-        Of the faces.
-    D : float [m/N]
-        Series compliance.
+    zone and stays monotone.  Faces with friction are stiffest where all of them hold, and *D* is
+    0.9 of their compliance there.
     """
     force, indentation = np.append(0.0, local.force), np.append(0.0, local.force_indentation)
-    D = _BULK_SHARE * float(np.min(np.diff(indentation) / np.diff(force)))
-    return TableLaw((indentation - D * force)[1:], local.force), D
+    least = float(np.min(np.diff(indentation) / np.diff(force)))
+    if isinstance(law, RubbingLaw):
+        least = min(least, 1.0 / float(np.max(law.tangent_stiffness(indentation))))
+    return _BULK_SHARE * least
+
+
+def without_bulk(local: LocalLaw, D: float) -> LocalLaw:
+    """Local law of the faces alone, as if the modes yielded by the bulk's *D* [m/N] as well.
+
+    Both are linear and in series with the faces.  So the loops of faces with friction lose what
+    they lost: on the way round, a linear compliance gives back what it takes.
+    """
+    indentation = local.force_indentation - D * local.force
+    return replace(
+        local,
+        law=TableLaw(indentation, local.force),
+        share=indentation / local.approach,
+        tangent_share=np.diff(indentation, prepend=0.0) / np.diff(local.approach, prepend=0.0),
+        modal_compliance=local.modal_compliance + D,
+    )
 
 
 def _touching(name: str, stop: CaseStop, bodies: Mapping[str, ElasticBody]) -> BodyPair:
@@ -163,24 +239,37 @@ def _touching(name: str, stop: CaseStop, bodies: Mapping[str, ElasticBody]) -> B
     )
 
 
-def _contact_ports(pair: BodyPair, static: StaticContact, force: float) -> tuple[Port, Port]:
-    load_upper, load_lower = static.load_patterns(force)
-    return (
+def _friction_key(stop: str) -> str:
+    return f"stops.{stop}.friction"
+
+
+def _contact_at(
+    force: float,
+    name: str,
+    pair: BodyPair,
+    static: StaticContact,
+    rubbing: RubbingContact | None,
+) -> StopContact:
+    """Ports in the shape of the pressure, and of the friction, at a force."""
+    load_upper, load_lower = (static if rubbing is None else rubbing).load_patterns(force)
+    ports = (
         Port(pair.upper_surface.name, load_upper),
         Port(pair.lower_surface.name, -load_lower),
+    )
+    return StopContact(
+        name=name, pair=pair, static=static, ports=ports, pattern_force=force, rubbing=rubbing
     )
 
 
 def _peak_force(
     case: ValveCase,
     stop: CaseStop,
-    pair: BodyPair,
-    static: StaticContact,
-    ports: tuple[Port, Port],
+    touching: StopContact,
     flexibilities: list[Flexibility],
     pools: Mapping[str, Modes],
 ) -> float:
     """Peak force [N] of an impact of the two reduced bodies alone."""
+    pair, static, ports = touching.pair, touching.static, touching.ports
     bodies = (pair.upper, pair.lower)
     upper, lower = (
         reduce_body(
@@ -195,10 +284,9 @@ def _peak_force(
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )
     secant = static.max_force / float(static.approach[-1])
-    law: ContactLaw = LinearLaw(secant)
+    law: ContactLaw | RubbingLaw = LinearLaw(secant)
     if case.reduction.correction == "consistent":
-        modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
-        law = consistent_law(static, modal).law
+        law = stop_law(touching, upper, lower).law
     contact = ContactPair(
         body_a=upper.name,
         port_a=ports[0].name,

@@ -11,13 +11,12 @@ from klack.assembling.bodies import assemble_body, find_touch, mesh_body
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.modes import mode_pool, selection_of
-from klack.assembling.stops import StopContact, build_stop, split_law, stop_law
+from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
 from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY
-from klack.contact.local_law import LocalLaw
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -52,7 +51,7 @@ class Valve:
         With all their ports.
     contacts : mapping of str to StopContact
         By end stop.
-    laws : mapping of str to LocalLaw
+    laws : mapping of str to StopFaces
         Consistent laws, of the end stops that have one.
     network : Network
         With the bodies and laws filled in: the variant ``wet``.
@@ -64,7 +63,7 @@ class Valve:
     bodies: Mapping[str, ElasticBody]
     reduced: Mapping[str, ReducedBody]
     contacts: Mapping[str, StopContact]
-    laws: Mapping[str, LocalLaw]
+    laws: Mapping[str, StopFaces]
     network: Network
     structures: tuple[Structure, ...] = ()
 
@@ -213,7 +212,7 @@ def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
 
 
 def filled_network(
-    case: ValveCase, reduced: Mapping[str, ReducedBody], laws: Mapping[str, LocalLaw]
+    case: ValveCase, reduced: Mapping[str, ReducedBody], laws: Mapping[str, StopFaces]
 ) -> Network:
     """Network of a case with its reduced bodies and computed laws."""
     network = case.network.network()
@@ -221,7 +220,7 @@ def filled_network(
 
 
 def _filled_in(
-    network: Network, reduced: Mapping[str, ReducedBody], laws: Mapping[str, LocalLaw]
+    network: Network, reduced: Mapping[str, ReducedBody], laws: Mapping[str, StopFaces]
 ) -> dict[str, Component]:
     """Components that had to wait for the bodies."""
     filled: dict[str, Component] = {}
@@ -233,8 +232,7 @@ def _filled_in(
     return filled
 
 
-def _with_law(stop: EndStop, local: LocalLaw) -> EndStop:
+def _with_law(stop: EndStop, law: StopFaces) -> EndStop:
     if stop.film is None:
-        return stop.with_law(local.law)
-    law, compliance = split_law(local)
-    return stop.with_law(law, compliance)
+        return stop.with_law(law.law)
+    return stop.with_law(law.faces, law.bulk)

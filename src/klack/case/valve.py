@@ -45,6 +45,13 @@ class ValveCase(ValveSections):
         }
         return {name: file for name, file in files.items() if isinstance(file, Path)}
 
+    def without_friction(self) -> Self:
+        """The same with smooth faces at all stops."""
+        smooth = {
+            name: stop.model_copy(update={"friction": 0.0}) for name, stop in self.stops.items()
+        }
+        return self.model_copy(update={"stops": smooth})
+
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:
         """Check that this case can run the variants; return them without repetition."""
         for variant in variants:

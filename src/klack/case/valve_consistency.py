@@ -24,6 +24,7 @@ def check_valve(case: ValveSections) -> None:
     for name in case.stops:
         _check_stop(case, name, meetings)
     _check_laws(case)
+    _check_friction(case)
     if case.lumped is None:
         for variant in case.run.variants:
             if variant.endswith("lumped"):
@@ -152,6 +153,30 @@ def _check_laws(case: ValveSections) -> None:
                 got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
                 expected="the correction 'consistent'",
                 hint="or give the end stop a linear law.",
+            )
+
+
+def _check_friction(case: ValveSections) -> None:
+    """Faces with friction have a law that can have it, and no other loss of the same impact."""
+    for name, stop in case.stops.items():
+        if stop.friction == 0.0:
+            continue
+        part = case.network.components[name]
+        if not is_consistent(part):
+            raise CaseProblem(
+                ("stops", name, "friction"),
+                got=f"{stop.friction:g} at an end stop whose law is not computed",
+                expected="0, or the consistent law at this stop: the only one with friction",
+                hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave the "
+                "friction out.",
+            )
+        restitution = getattr(part, "restitution", None)
+        if restitution is not None:
+            raise CaseProblem(
+                ("network", "components", name, "restitution"),
+                got=f"{restitution:g} beside the friction {stop.friction:g} of the same stop",
+                expected="one of them: a restitution stands for all that an impact loses",
+                hint=f"leave the restitution out, or stops.{name}.friction.",
             )
 
 

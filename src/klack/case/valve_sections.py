@@ -16,11 +16,12 @@ from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.case.study import CaseStudy
 from klack.case.variants import Variant
+from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.network.accuracy import Accuracy, fine_step
 from klack.network.declaration import NetworkSection
-from klack.units import Force, Length, Speed, Time, format_si
+from klack.units import Force, Length, Ratio, Speed, Time, format_si
 
 __all__ = [
     "BodyPort",
@@ -70,6 +71,9 @@ class CaseStop(Section):
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
+    )
+    friction: Ratio = Field(
+        default=0.0, ge=0, le=MOST_FRICTION, description="Coulomb's coefficient between the faces."
     )
 
     @property

@@ -136,11 +136,12 @@ class RubbingLaw:
         return float(0.5 * (self.normal @ x**2 + held))
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Return the law as plain numbers for the kernel: five of each spring, two of a slider."""
         head = [float(self.onset.size), self.ratio]
+        sliders = np.zeros(2 * self.onset.size)
         return FlatLaw(
             kind=LAW_RUBBING,
-            parameters=np.concatenate([head, self.onset, self.normal, self.strength]),
+            parameters=np.concatenate([head, self.onset, self.normal, self.strength, sliders]),
         )
 
     def _summed(self, stiffness: Vector, indentation: ArrayLike, power: int) -> Vector:

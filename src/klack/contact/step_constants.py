@@ -28,6 +28,7 @@ __all__ = [
     "NO_LAW",
     "RELAXATION",
     "ROUND_OFF",
+    "RUBBED_LEFT",
     "SEPARATED",
     "SETTLED",
     "SLOWEST",
@@ -45,13 +46,16 @@ NO_LAW: Annotated[int, "C", "only a film, no contact"] = -1
 LAW_LINEAR: Annotated[int, "C", "numbers: k"] = 0
 LAW_HERTZ: Annotated[int, "C", "numbers: K, n"] = 1
 LAW_TABLE: Annotated[int, "C", "numbers: intervals, then six for each"] = 2
-LAW_RUBBING: Annotated[int, "", "springs, ratio, then onsets, normal, strength"] = 3
+LAW_RUBBING: Annotated[int, "", "springs, ratio, then five numbers of each"] = 3
 
 # contact equation of a step
 FORCE_LEFT: Annotated[float, "C", "accepted error of a force over the force"] = 1e-11
 STEP_LEFT: Annotated[
     float, "C", "last Newton step over the indentation; what is left of the force is its square"
 ] = 3e-7
+RUBBED_LEFT: Annotated[
+    float, "", "the same of a law with friction, whose kinks leave no smaller error"
+] = 1e-13
 TOUCH: Annotated[
     float, "C", "[m] that a contact is closed by at least; the squares of less are no numbers"
 ] = 1e-150

@@ -72,7 +72,7 @@ def case_models(
         For friction of the faces, which exported models leave out.
     """
     if isinstance(case, ValveCase):
-        return _of_valve(case, progress, threads)
+        return _of_valve(_smooth_valve(case), progress, threads)
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
     case = _frictionless(case)
@@ -110,6 +110,20 @@ def _frictionless(case: Case) -> Case:
     warnings.warn(
         f"the exported pair leaves out contact.friction {case.contact.faces.static:g}: its law "
         "closes and opens on one curve. Try: klack impact, whose reduced level has the loss.",
+        AccuracyWarning,
+        stacklevel=3,
+    )
+    return case.without_friction()
+
+
+def _smooth_valve(case: ValveCase) -> ValveCase:
+    """The same for the end stops of a valve."""
+    left = [f"stops.{name}.friction {s.friction:g}" for name, s in case.stops.items() if s.friction]
+    if not left:
+        return case
+    warnings.warn(
+        f"the exported valve leaves out {' and '.join(left)}: its laws close and open on one "
+        "curve. Try: klack stroke, which has the loss.",
         AccuracyWarning,
         stacklevel=3,
     )

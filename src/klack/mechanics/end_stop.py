@@ -6,6 +6,7 @@ from typing import ClassVar, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
+from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import InputError
 from klack.hydraulics.film import FilmShape
 from klack.input.problem import CaseProblem
@@ -35,7 +36,9 @@ class EndStop(Component):
     ``restitution`` adds the dashpot of Hunt and Crossley with the factor of Gonthier et al. (2004);
     for rigid bodies only: in modal bodies the waves take that energy already.
 
-    Limits: parallel, centred faces; no friction across the axis.
+    Faces with friction have a law with memory (:class:`klack.contact.rubbing_law.RubbingLaw`).
+
+    Limits: parallel, centred faces.
     """
 
     type: ClassVar[str] = "end-stop"
@@ -51,7 +54,7 @@ class EndStop(Component):
     )
     film: FilmShape | None = Field(default=None, description="Squeeze film between the faces.")
 
-    _computed: ContactLaw | None = PrivateAttr(default=None)
+    _computed: ContactLaw | RubbingLaw | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _something_acts(self) -> Self:
@@ -72,22 +75,22 @@ class EndStop(Component):
             )
         return self
 
-    def with_law(self, law: ContactLaw, series_compliance: float = 0.0) -> Self:
+    def with_law(self, law: ContactLaw | RubbingLaw, series_compliance: float = 0.0) -> Self:
         """Return this end stop with a law that was computed, e.g. the consistent one.
 
         Parameters
         ----------
-        law : ContactLaw
+        law : ContactLaw or RubbingLaw
         series_compliance : float [m/N]
         """
         stop = self.model_copy(update={"series_compliance": series_compliance})
         stop._computed = law
         return stop
 
-    def contact_law(self) -> ContactLaw | None:
+    def contact_law(self) -> ContactLaw | RubbingLaw | None:
         """Law that acts; raise :class:`InputError` if a consistent law was not filled in."""
         if self._computed is not None:
-            law = self._computed
+            law: ContactLaw | RubbingLaw = self._computed
         elif self.law is None:
             return None
         elif isinstance(self.law, ConsistentStopLaw):
@@ -101,6 +104,13 @@ class EndStop(Component):
             law = self.law.contact_law()
         if self.restitution is None or isinstance(law, HuntCrossley):
             return law
+        if isinstance(law, RubbingLaw):
+            raise InputError(
+                "EndStop.restitution",
+                got=f"{self.restitution:g} beside friction between the faces",
+                expected="one of them: a restitution stands for all that an impact loses",
+                hint="leave the restitution out; friction and modes take the energy.",
+            )
         return HuntCrossley(law, gonthier_coefficient(self.restitution))
 
     def lumped(self, stiffness: float, restitution: float | None) -> Self:

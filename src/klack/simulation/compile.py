@@ -18,7 +18,6 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.rubbing_law import RubbingLaw
 from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact_arrays import Contacts, Losses, StepMatrices, Watched
@@ -128,7 +127,6 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
             law_start=np.concatenate(([0], np.cumsum(sizes)[:-1])).astype(np.int64),
             alpha=np.array([law.dissipation for law in laws]),
             series=np.array([contact.series_compliance for contact in system.contacts]),
-            slip=np.zeros(sum(_sliders(contact.law) for contact in system.contacts)),
         ),
         losses=Losses(
             damped=bool(np.any(damped_modes)),
@@ -142,10 +140,6 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
             v_force=(watch_v * B[1]) @ rows.T,
         ),
     )
-
-
-def _sliders(law: InterfaceLaw) -> int:
-    return law.onset.size if isinstance(law, RubbingLaw) else 0
 
 
 def propose_step(system: ReducedSystem, *, speed: float) -> float:

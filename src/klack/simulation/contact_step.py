@@ -23,12 +23,15 @@ from klack.contact.step_constants import (
     HERTZ_SERIES_BELOW,
     LAW_HERTZ,
     LAW_LINEAR,
+    LAW_RUBBING,
     LAW_TABLE,
     NEWTON_LIMIT,
+    RUBBED_LEFT,
     STEP_LEFT,
     TOUCH,
 )
 from klack.simulation.phase import compiled
+from klack.simulation.rubbing_step import rubbing_mean, rubbing_store
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 
@@ -64,6 +67,8 @@ def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
         return 0.5 * p[start] * d * d
     if kind == LAW_HERTZ:
         return p[start] / (p[start + 1] + 1.0) * _power(d, p[start + 1]) * d
+    if kind == LAW_RUBBING:
+        return rubbing_store(p, start, d)
     i = _interval(p, start, d, 0)
     s = d - p[i]
     return p[i + 5] + s * (p[i + 1] + s * (p[i + 2] / 2 + s * (p[i + 3] / 3 + s * p[i + 4] / 4)))
@@ -144,6 +149,9 @@ def mean_force(
             return mean, 0.5 * n * mean / high, hint
         mean *= (high - max(low, 0.0)) / (high - low)
         return mean, (K * _power(max(d1, 0.0), n) - mean) / (d1 - d0), hint
+    if kind == LAW_RUBBING:
+        mean, slope = rubbing_mean(p, start, d0, d1)
+        return mean, slope, hint
     return _table_mean(p, start, d0, d1, hint)
 
 
@@ -209,7 +217,7 @@ def solve_step(
             deep = max(d0, d1)
             if chi_over_h * deep > 1.0:
                 deep = 1.0 / chi_over_h
-            last = abs(step) <= STEP_LEFT * deep
+            last = abs(step) <= (RUBBED_LEFT if kind == LAW_RUBBING else STEP_LEFT) * deep
         # taken without a look back, and before the bracket test: both its ends are round-off then
         if last:
             force = max(force - slope * step, 0.0)

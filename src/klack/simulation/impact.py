@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
@@ -275,12 +274,9 @@ def _ledger(
             y0, y = float(phi @ q0), float(phi @ q)
             spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
     contact, at = 0.0, flat.contacts
-    for c, pair in enumerate(system.contacts):
+    for c in range(len(system.contacts)):
         gap, e = books[4 + 2 * c], books[5 + 2 * c]
-        if isinstance(pair.law, RubbingLaw):
-            contact += pair.law.stored(-gap, at.slip)
-        else:
-            contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
+        contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
         contact += 0.5 * e**2 / at.series[c] if e else 0.0
     return EnergyLedger(
         initial=initial,

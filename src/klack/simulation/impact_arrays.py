@@ -33,11 +33,10 @@ class Contacts(NamedTuple):
     gap: Vector  # (c,) [m]
     G: Matrix  # (c, c) rows B1 rows^T: gap at the end of a step from unit forces during it [m/N]
     law_kind: Index  # (c,)
-    law_data: Vector
+    law_data: Vector  # with the places of sliders, which a step changes
     law_start: Index  # (c,) into ``law_data``
     alpha: Vector  # (c,) dissipation factor
     series: Vector  # (c,) compliance in series [m/N]
-    slip: Vector  # [m] of the sliders of a law with friction, in and out; one contact only
 
 
 class Losses(NamedTuple):

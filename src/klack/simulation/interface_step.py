@@ -39,10 +39,12 @@ from klack.contact.step_constants import (
     FILM_NEWTON_LIMIT,
     FORCE_LEFT,
     LAW_LINEAR,
+    LAW_RUBBING,
     LEFT_BY_FILM,
     LOG_SERIES_BELOW,
     NO_LAW,
     ROUND_OFF,
+    RUBBED_LEFT,
     STEP_LEFT,
 )
 from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
@@ -476,7 +478,7 @@ def _contact(
     deep = -min(z0, z)
     if chi_over_h * deep > 1.0:
         deep = 1.0 / chi_over_h
-    longest = STEP_LEFT * deep
+    longest = (RUBBED_LEFT if kind == LAW_RUBBING else STEP_LEFT) * deep
     if kind == LAW_LINEAR and z0 <= 0.0 and z <= 0.0:
         mean, slope = -0.5 * p[start] * (z0 + z), 0.5 * p[start]
         if chi_over_h == 0.0:

@@ -194,7 +194,7 @@ class Interfaces(NamedTuple):
     dry: Index  # 1 without a film: no force while open
     gap0: Vector
     kind: Index
-    law: Vector
+    law: Vector  # numbers of all laws; sliders of those with memory are places that change
     law0: Index
     alpha: Vector
     series: Vector

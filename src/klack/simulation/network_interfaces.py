@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.contact.step_constants import SEPARATED, SLOWEST
+from klack.contact.step_constants import LAW_RUBBING, SEPARATED, SLOWEST
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.network_arrays import (
     AHEAD,
@@ -20,6 +20,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_ports import move_body
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
+from klack.simulation.rubbing_step import keep_sliders, slide, take_back_sliders
 
 __all__ = [
     "HELD",
@@ -253,6 +254,8 @@ def begin_macro_interfaces(
         trial.kept[k + 13] = peaks[c]
         trial.kept[k + 14] = float(recording.filled[c])
         trial.kept[k + 15] = state.pulled[c]
+        if contacts.rows.kind[c] == LAW_RUBBING:
+            keep_sliders(contacts.laws, contacts.rows.law0[c])
         begin_attempt(contacts, c)
 
 
@@ -293,6 +296,8 @@ def take_back_interfaces(
         peaks[c] = kept[k + 13]
         recording.filled[c] = int(kept[k + 14])
         state.pulled[c] = kept[k + 15]
+        if contacts.rows.kind[c] == LAW_RUBBING:
+            take_back_sliders(contacts.laws, contacts.rows.law0[c])
         begin_attempt(contacts, c)
 
 
@@ -453,6 +458,9 @@ def end_force(
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     contact, film = trial.contact[c], trial.film[c]
     was_closed = state.since[c] < np.inf
+    if rows.kind[c] == LAW_RUBBING:
+        before, after = -(state.gap[c] + state.e[c]), -(gap + trial.e[c])
+        accounts.contact[c] += slide(contacts.laws, rows.law0[c], before, after)
     state.e[c] = trial.e[c]
     state.force[c] = trial.force[c]
     accounts.contact[c] += trial.contact_loss[c]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import energy_balance
+from klack.contact.step_constants import LAW_RUBBING
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.accuracy import Accuracy
@@ -41,6 +42,7 @@ from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import IncompleteRunError, NetworkResult, StepCounts
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
+from klack.simulation.rubbing_step import slider_places
 from klack.simulation.static_start import start_at_rest
 from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
 from klack.simulation.step_status import (
@@ -533,12 +535,13 @@ def _read_stores(network: CompiledNetwork) -> None:
 
 
 _IMPACTS = "impacts.unfinished"
+_SLIDERS = "sliders."
 _LAST = "record.last"
 
 
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
     """All arrays that a step changes and the next one begins with, as a stored state calls them."""
-    line = network.line_state
+    line, faces = network.line_state, network.interfaces
     groups = {
         "bodies": {"fine": network.bodies.laid_out[: network.bodies.size], "at": network.bodies.at},
         "elements": {"state": network.elements.state},
@@ -547,6 +550,10 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
         "line_state": {name: getattr(line, name) for name in LINE_MEMORY},
         "interfaces": network.interface_state._asdict(),
         "sliders": network.slider_state._asdict(),
+        "laws": {
+            network.rows.interfaces[c].component: slider_places(faces.law, int(faces.law0[c]))
+            for c in np.flatnonzero(faces.kind == LAW_RUBBING)
+        },
     }
     arrays = {
         f"{owner}.{name}": array for owner, group in groups.items() for name, array in group.items()
@@ -574,6 +581,8 @@ def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Chang
 
 def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
     for key, target in _changing(network, clock).items():
+        if key not in state and key.startswith(_SLIDERS):
+            continue
         if key not in state or state[key].shape != target.shape:
             came = f"shape {state[key].shape}" if key in state else "nothing"
             raise InputError(
@@ -583,3 +592,6 @@ def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -
                 hint="continue with the same network, step and coarse as those of the state.",
             )
         target[...] = state[key]
+    if f"{_SLIDERS}seen" not in state:  # of an earlier version
+        rows, at = network.sliders, network.bodies.at[Y0:]
+        network.slider_state.seen[:] = at[rows.upper] - at[rows.lower]

@@ -17,7 +17,7 @@ from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
 from klack.simulation.kernel import FAST, STATUS_FINE, Damped, add_release, push_on
 from klack.simulation.phase import compiled, phase
-from klack.simulation.rubbing_step import rubbing_step
+from klack.simulation.rubbing_step import slide
 
 __all__ = ["run_one_contact"]
 
@@ -235,12 +235,6 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
     if d0 > 0.0 or d_free > 0.0:
         if linear:
             force = solve_linear(contacts.law_data[contacts.law_start[0]], own, d0, d_free)
-        elif contacts.law_kind[0] == LAW_RUBBING:
-            guess = 2.0 * now.F - now.F_before
-            start = contacts.law_start[0]
-            force, lost = rubbing_step(
-                contacts.law_data, start, contacts.slip, own, d0, d_free, guess
-            )
         else:
             if contacts.alpha[0] > 0.0 and approaching and free < 0.0:
                 # mean rate of the gap over the step of onset: no force has acted yet
@@ -256,6 +250,9 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
                 2.0 * now.F - now.F_before,
                 hint,
             )
+            if contacts.law_kind[0] == LAW_RUBBING:
+                start = contacts.law_start[0]
+                lost = slide(contacts.law_data, start, d0, d_free - own * force)
     return _Contact(force, now.F, now.gap, now.e, chi, approaching, now.deepest, hint), lost
 
 

@@ -1,11 +1,15 @@
-"""Forces of all contacts of a network at rest, and how they answer to their gaps."""
+"""Forces of all contacts of a network at rest, and how they answer to their gaps.
+
+A law with memory is on its closing curve: the faces have slipped up and hold nothing back.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
-from klack.contact.step_constants import NO_LAW
+from klack.contact.step_constants import LAW_RUBBING, NO_LAW
 from klack.simulation.contact_step import mean_force
+from klack.simulation.rubbing_step import closing_force
 
 __all__ = ["contacts_at_rest"]
 
@@ -42,8 +46,11 @@ def _pressed(kind: int, law: Vector, first: int, series: float, gap: float) -> t
     low, high, d = 0.0, -gap, -gap
     force = stiffness = 0.0
     for _ in range(_MOST_NEWTON):
-        force, half, _interval = mean_force(kind, law, first, d, d, 0)
-        stiffness = 2.0 * half
+        if kind == LAW_RUBBING:
+            force, stiffness = closing_force(law, first, d)
+        else:
+            force, half, _interval = mean_force(kind, law, first, d, d, 0)
+            stiffness = 2.0 * half
         excess = d + series * force + gap
         if excess > 0.0:
             high = d

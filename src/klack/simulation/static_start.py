@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.step_constants import LAW_RUBBING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
@@ -49,6 +50,7 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
+from klack.simulation.rubbing_step import begin_sliders
 from klack.simulation.static_contacts import contacts_at_rest
 from klack.simulation.static_newton import (
     Balance,
@@ -712,6 +714,9 @@ class _Balance:
         now.e[:] = interfaces.series * now.force  # in equilibrium with the contacts
         closed = now.gap + now.e < 0.0
         now.since[closed] = -np.inf
+        for c in map(int, np.flatnonzero(interfaces.kind == LAW_RUBBING)):
+            deep = max(-float(now.gap[c] + now.e[c]), 0.0)
+            begin_sliders(interfaces.law, int(interfaces.law0[c]), deep)
         owner = {handle: row for row in rows.bodies for handle in row.ports}
         for c, touching in enumerate(rows.interfaces):
             pair = (owner.get(touching.upper), owner.get(touching.lower))

@@ -233,7 +233,7 @@ def _floats(bundle: Any) -> list[Any]:
 
 def state_arrays(numbers: NetworkArrays) -> list[Any]:
     """Arrays that a step changes, but for the modes."""
-    found = [numbers.bodies.at]
+    found = [numbers.bodies.at, numbers.interfaces.law]  # with the places of sliders
     for rows in (numbers.elements, numbers.branches):
         found += [rows.state, rows.inputs, rows.outputs]
     groups = (

@@ -119,6 +119,7 @@ def rubbing_contact(
     *,
     turns: Sequence[float] = TURNS,
     count: int = 24,
+    key: str = "contact.friction",
 ) -> RubbingContact:
     """States of a contact with friction at the approaches of the frictionless ladder.
 
@@ -135,6 +136,8 @@ def rubbing_contact(
         Approaches from which it opens again, over the highest one; the last is 1.
     count : int
         Steps of each opening.
+    key : str
+        Of the friction in the case, for an error.
 
     Raises
     ------
@@ -151,7 +154,7 @@ def rubbing_contact(
         pressures.append(state.lam[: state.count])
         shear.append(state.lam[state.count :])
         if place in places:
-            opened.append(_opened(state.copy(), approach, count, friction))
+            opened.append(_opened(state.copy(), approach, count, friction, key))
     closing = replace(
         static,
         force=np.array(pressures) @ static.space.axial + np.array(shear) @ rows.axial,
@@ -169,7 +172,9 @@ def rubbing_contact(
     )
 
 
-def _opened(state: "_State", approach: float, count: int, friction: float) -> tuple[Vector, Vector]:
+def _opened(
+    state: "_State", approach: float, count: int, friction: float, key: str
+) -> tuple[Vector, Vector]:
     """Approaches [m] and forces [N] while the contact opens."""
     down = np.linspace(approach, 0.0, count + 1)
     force = [state.force]
@@ -178,11 +183,12 @@ def _opened(state: "_State", approach: float, count: int, friction: float) -> tu
         force.append(state.force)
     if min(force) < -_PULL * force[0]:
         raise LockedError(
-            "contact.friction",
+            key,
             got=f"{friction:g}: the faces lock, it takes {-min(force):.3g} N to part them after "
             f"{force[0]:.3g} N",
             expected="less than the slope of the faces, so that they part by themselves",
-            hint="lower the coefficient, or take levels without a local law: interface and full.",
+            hint="lower the coefficient; levels without a local law, interface and full, have no "
+            "such limit.",
         )
     return down, np.array(force)
 

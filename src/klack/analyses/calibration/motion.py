@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.damping_choice import damping_of
+from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.free_parameters import FreeParameter
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
-from klack.contact.local_law import LocalLaw
 from klack.errors import InputError
 from klack.input.problem import Key, one_of
 from klack.network.network import Network
@@ -69,7 +69,7 @@ class MotionModel:
     channels : mapping of str to str
         Recorded channel of each role.
     reduced : mapping of str to ReducedBody
-    laws : mapping of str to LocalLaw
+    laws : mapping of str to StopFaces
     record : float [s]
         Spacing of the records.
     """
@@ -80,7 +80,7 @@ class MotionModel:
     roles: ValveRoles
     channels: Mapping[str, str]
     reduced: Mapping[str, ReducedBody]
-    laws: Mapping[str, LocalLaw]
+    laws: Mapping[str, StopFaces]
     record: float
 
     def changes(self, values: Sequence[float]) -> dict[Key, str | float]:

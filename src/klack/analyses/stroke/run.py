@@ -413,13 +413,14 @@ def stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
 
 
 def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
-    contact, local = valve.contacts.get(name), valve.laws.get(name)
+    contact, law = valve.contacts.get(name), valve.laws.get(name)
+    local = None if law is None else law.local
     none, nan = np.empty(0), float("nan")
     surfaces = " on ".join(str(s) for s in valve.case.stops[name].between) if contact else ""
     check = None
     if contact is not None:
         force = contact.pattern_force
-        check = check_contact(valve.case, contact.pair, contact.static, force, surfaces)
+        check = check_contact(valve.case, contact.pair, contact.closing, force, surfaces)
     return StopSummary(
         name=name,
         surfaces=surfaces,
@@ -429,9 +430,9 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         indentation=np.append(0.0, local.force_indentation) if local else none,
         force=np.append(0.0, local.force) if local else none,
         share=np.append(nan, local.share) if local else none,
-        approach=contact.static.approach if contact else none,
-        static_force=contact.static.force if contact else none,
-        area=contact.static.area if contact else none,
+        approach=contact.closing.approach if contact else none,
+        static_force=contact.closing.force if contact else none,
+        area=contact.closing.area if contact else none,
         pattern_force=contact.pattern_force if contact else nan,
         half_width=check.half_width if check else nan,
         size_ratio=check.size_ratio if check else nan,

@@ -1,0 +1,111 @@
+"""Friction between two faces for a reduced model: static loops of the full bodies, and their law.
+
+The same for the contact of an impact (``contact.friction``) and an end stop of a valve
+(``stops.NAME.friction``).  Where no law has the friction, a warning says so and the law stays
+smooth: other levels have no need of it.
+"""
+
+import warnings
+
+import numpy as np
+from scipy.sparse import vstack
+
+from klack.assembling.bodies import BodyPair
+from klack.contact.local_law import LocalLaw
+from klack.contact.mortar import tangent_rows
+from klack.contact.rubbing_fit import RubbingFit, rubbing_fit
+from klack.contact.statics import ReachError, StaticContact, condensed_compliance
+from klack.elasticity.statics import Flexibility
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.transient.rubbing_ladder import (
+    LockedError,
+    RubbingContact,
+    TangentialRows,
+    rubbing_contact,
+)
+
+__all__ = ["fitted_loops", "static_loops"]
+
+_FAIR_LOOP = 0.02  # share of the work by which loops of the law may be wrong without a word
+
+
+def static_loops(
+    static: StaticContact,
+    pair: BodyPair,
+    upper: Flexibility,
+    lower: Flexibility,
+    friction: float,
+    *,
+    key: str,
+) -> RubbingContact | None:
+    """Static contact with friction; None where none is found.
+
+    Parameters
+    ----------
+    static : StaticContact
+        Of the same bodies without friction.
+    pair : BodyPair
+    upper, lower : Flexibility
+    friction : float [-]
+        Above 0.
+    key : str
+        Of the friction in the case, for words.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where no such contact is found.
+    """
+    a, b, space = pair.upper.mesh, pair.lower.mesh, static.space
+    T_a, T_b = tangent_rows(space, a, pair.upper_surface, b, pair.lower_surface)
+    up = np.zeros((a.node_count, a.dimension))
+    up[:, -1] = 1.0
+    C = condensed_compliance(
+        vstack([space.G_a, T_a], format="csr"), vstack([space.G_b, T_b], format="csr"), upper, lower
+    )
+    rows = TangentialRows(T_a=T_a, T_b=T_b, axial=T_a @ up.ravel())
+    try:
+        return rubbing_contact(static, rows, C, friction, key=key)
+    except (LockedError, ReachError, ConvergenceError) as error:
+        warnings.warn(
+            f"the reduced level leaves out {key} {friction:g}: {error}",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return None
+
+
+def fitted_loops(rubbing: RubbingContact, local: LocalLaw, *, key: str) -> RubbingFit | None:
+    """Law with memory; None where none has loops like these.
+
+    Parameters
+    ----------
+    rubbing : RubbingContact
+    local : LocalLaw
+        Of ``rubbing.closing``.
+    key : str
+        Of the friction in the case, for words.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where there is none, and for a law whose loops are others than those of the bodies.
+    """
+    try:
+        fit = rubbing_fit(local, rubbing.loops)
+    except InputError as error:
+        warnings.warn(
+            f"the reduced level leaves out the loss of {key}: {error}",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return None
+    if fit.error > _FAIR_LOOP:
+        warnings.warn(
+            f"{key}: the law of the reduced level loses {100 * fit.error:.2g} % of its "
+            f"work more or less than the full bodies, which lose {100 * fit.loss:.2g} %. Keep "
+            "fewer modes, or take the interface level.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return fit
