@@ -14,7 +14,6 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json
-from klack.assembling.stops import split_law
 from klack.assembling.valve import Valve, build_valve
 from klack.case import read_case
 from klack.case.valve import ValveCase
@@ -115,7 +114,7 @@ def test_law_and_modes_add_up_to_the_static_contact(valve: Valve):
     """The compliance that the modes miss at the pattern force is in the law, none twice."""
     for name, contact in valve.contacts.items():
         force = contact.static.force
-        local = valve.laws[name]
+        local = valve.laws[name].local
         compliance = 0.0
         for body, port in zip((contact.pair.upper, contact.pair.lower), contact.ports, strict=True):
             reduced = valve.reduced[body.name]
@@ -128,8 +127,8 @@ def test_law_and_modes_add_up_to_the_static_contact(valve: Valve):
 
 
 def test_faces_and_bulk_are_the_same_law_in_two_parts(valve: Valve):
-    for local in valve.laws.values():
-        faces, compliance = split_law(local)
+    for law in valve.laws.values():
+        local, faces, compliance = law.local, law.faces, law.bulk
 
         force = np.linspace(0.1, 0.9, 9) * local.max_force
         whole = [np.interp(F, local.force, local.force_indentation) for F in force]
@@ -152,14 +151,19 @@ def test_momentum_of_an_impact_on_either_stop(valve: Valve):
         assert event.impulse == pytest.approx(mass * abs(after - speed), rel=1e-9)
 
 
-def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve):
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.3])
+def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve, friction: float):
     """Same bodies and speed through `klack impact`: another port pattern, another time loop."""
     text = FILE.read_text(encoding="utf-8")
+    if friction:
+        rubbing = text.replace("force: 20 N}", f"force: 20 N, friction: {friction}}}")
+        valve = build_valve(read_valve_case(rubbing, FILE))
     bodies = text[text.index("materials:") : text.index("  pole:")]
     impact = read_case(
         "klack: 1\ntitle: t\n"
         + bodies
-        + "contact: {between: [needle.tip, housing.seat], gap: 0.5 um}\n"
+        + "contact: {between: [needle.tip, housing.seat], gap: 0.5 um, "
+        + f"friction: {friction}}}\n"
         + f"motion: {{speed: {SPEED} m/s}}\n"
         + "reduction: {modes: {needle: {count: 20}, housing: {count: 40}}}\n"
         + "run: {duration: 60 us, reduced_step: 20 ns, levels: [reduced]}\n",
@@ -170,6 +174,8 @@ def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve):
     result = fly(valve, -SPEED, {"seat": 0.5e-6, "opening": 1e-3}, 60e-6)
     event = next(e for e in result.events if e.stop == "seat")
 
+    assert result.books.relative_residual < 1e-10
+    assert (result.books.losses["seat contact"] > 0.0) == (friction > 0.0)
     # the pattern was taken at another force (1.2 m/s): some tenths of a per cent
     assert event.peak_force == pytest.approx(expected.peak_force, rel=5e-3)
     assert event.contact_time == pytest.approx(expected.contact_time, rel=5e-3)
@@ -259,5 +265,5 @@ def test_a_stop_above_is_a_stop_below_upside_down():
         np.interp(force, side.static.force, side.static.approach) for side in (below, above)
     ]
     assert approach[1] == pytest.approx(approach[0], rel=3e-3)
-    shares = [np.interp(force, law.force, law.share) for law in valve.laws.values()]
+    shares = [np.interp(force, law.local.force, law.local.share) for law in valve.laws.values()]
     assert shares[1] == pytest.approx(shares[0], rel=1e-2)

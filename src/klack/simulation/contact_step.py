@@ -198,7 +198,7 @@ def solve_step(
         return 0.0, hint, 0.0
     if kind == LAW_LINEAR and chi_over_h == 0.0:
         return solve_linear(p[start], G, d0, df), hint, 0.0
-    low, high = -np.inf, df
+    low, high, longest = -np.inf, df, np.inf
     d1 = df - G * guess
     force = 0.0
     for _ in range(NEWTON_LIMIT):
@@ -228,7 +228,10 @@ def solve_step(
         else:
             low, high = d1, min(high, d1 - excess)
         d1 -= step
-        if not low <= d1 <= high:
+        # about sliders that let go Newton's method can turn in a circle
+        circles = kind == LAW_RUBBING and 2.0 * abs(step) > longest
+        longest = abs(step)
+        if circles or not low <= d1 <= high:
             d1 = 0.5 * (low + high)
     if chi_over_h == 0.0:
         return force, hint, 0.0

@@ -421,7 +421,7 @@ def _both(
     x0 = open0 + cut_off
     inverse0 = 1.0 / x0
     z = base + S * guess
-    low, high = -np.inf, np.inf
+    low, high, before = -np.inf, np.inf, np.inf
     contact, film = 0.0, 0.0
     for _ in range(FILM_NEWTON_LIMIT):
         contact, stiffness, curvature, longest = 0.0, 0.0, 0.0, np.inf
@@ -459,6 +459,10 @@ def _both(
             low, high = z, min(high, z - excess)
         if z != 0.0 and (z > 0.0) != (after > 0.0) and low < 0.0 < high:
             after = 0.0
+        # about sliders that let go Newton's method can turn in a circle
+        elif kind == LAW_RUBBING and 2.0 * abs(step) > before:
+            after = 0.5 * (low + high)
+        before = abs(step)
         if not low <= after <= high:
             after = 0.5 * (low + high)
         z = after
