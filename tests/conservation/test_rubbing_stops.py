@@ -179,7 +179,7 @@ def test_a_mass_at_rest_holds_still(coarse):
     depth = -result.channels["stop gap"].values
     assert float(law.force(depth[0])) == pytest.approx(force, rel=1e-9)
     assert depth == pytest.approx(depth[0], rel=1e-9)
-    sliders = result.state["sliders.stop"]
+    sliders = result.state["laws.stop"]
     pressed = np.maximum(depth[0] - law.onset, 0.0)
     assert sliders == pytest.approx(pressed * (1.0 - 1.0 / law.ratio), rel=1e-8, abs=1e-18)
     assert result.books.losses["stop contact"] < 1e-12 * force * depth[0]
@@ -197,6 +197,7 @@ def test_a_mass_that_swings_on_its_seat_loses_nothing_while_the_faces_hold():
     result = fall(
         rows(CONE, force=-force, speed=0.0, gap=0.0, blow=blow),
         duration=250e-6,
+        coarse=1,
         record=0.2e-6,
         start="rest",
     )
@@ -208,7 +209,7 @@ def test_a_mass_that_swings_on_its_seat_loses_nothing_while_the_faces_hold():
     share, left, *_ = np.linalg.lstsq(waves, v)
     unloading = 5.0 / 200e-6 / held  # [m/s], which ends at once
     assert np.hypot(*share) == pytest.approx(blow, abs=2.0 * unloading)
-    assert left[0] < 1e-6 * np.sum(v**2)
+    assert left[0] < 1e-5 * np.sum(v**2)
 
 
 def test_a_continued_run_has_the_bits_of_one_in_one_go():
@@ -216,13 +217,13 @@ def test_a_continued_run_has_the_bits_of_one_in_one_go():
     built, record = rows(bed(), force=-200.0), 1.28e-6
     whole = fall(built, duration=60 * record, record=record)
     first = fall(built, duration=8 * record, record=record)
-    assert np.any(first.state["sliders.stop"] > 0.0)
+    assert np.any(first.state["laws.stop"] > 0.0)
     second = fall(built, duration=52 * record, record=record, state=first.state)
 
     assert len(whole.events) > 1
     for name in ("mass velocity", "stop gap"):
         assert np.array_equal(second.channels[name].values, whole.channels[name].values[8:])
-    assert np.array_equal(second.state["sliders.stop"], whole.state["sliders.stop"])
+    assert np.array_equal(second.state["laws.stop"], whole.state["laws.stop"])
 
 
 def test_the_bulk_behind_the_faces_takes_nothing_from_a_loop():

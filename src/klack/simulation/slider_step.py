@@ -17,7 +17,7 @@ holds a body at rest against any force up to :math:`F_s`, without creep; slides 
 :math:`-f \Delta` is never negative.
 
 Where *L* falls with the speed, a body may stick or slip in the same step.  Which of both is decided
-once in a step, before the contacts answer: else these and the friction would take turns for ever.
+once in a step, before the contacts answer: else these and the friction would take turns endlessly.
 
 Where *v* turns round within the step by other forces, *C* is 0 for this step: an error of the
 impulse below :math:`F_s h`.
