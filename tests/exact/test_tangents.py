@@ -13,6 +13,7 @@ from numba.core.registry import cpu_target
 
 from klack.compiling.jit import inner, njit
 from klack.compiling.tangent_number import tangent_number, with_tangents
+from klack.contact.rubbing_law import RubbingLaw
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ConstantForce
 from klack.mechanics.rigid_mass import RigidMass
@@ -203,6 +204,51 @@ def test_touches_at_fixed_steps_would_have_other_derivatives(ball_run, monkeypat
 
     assert kept == pytest.approx(exact, rel=1e-5)
     assert lost == pytest.approx(0.0, abs=1e-6)  # at a given time the ball has its speed
+
+
+# --------------------------------------------------------------------------- faces with friction
+
+
+def rubbed(mass: float, speed: float, stiffness: float, friction: float) -> Rows:
+    """A mass that flies against a stop of one spring and one slider."""
+    law = RubbingLaw(
+        onset=[0.0], normal=[stiffness], strength=[friction * stiffness], ratio=SLOPE / friction
+    )
+    stop = EndStop(gap=20e-6, law=LinearStopLaw(kind="linear", stiffness=stiffness)).with_law(law)
+    parts = {"ball": RigidMass(mass=mass, speed=speed), "stop": stop}
+    return Network(parts, [["ball.body", "stop.lower"], ["stop.upper", "ground"]]).rows()
+
+
+SLOPE = 0.8  # of the held sliders over that of the pressure
+RUBBED = {"mass": MASS, "speed": 1.0, "stiffness": STIFFNESS, "friction": 0.1}
+
+
+def rebound(mass: float, speed: float, stiffness: float, friction: float) -> float:
+    """Speed after the impact: see :mod:`klack.contact.rubbing_law`."""
+    ratio = SLOPE / friction
+    return speed * sqrt(1.0 - 2 * friction / (1 + friction) * (ratio - 1) / (ratio + 1))
+
+
+def pressed(mass: float, speed: float, stiffness: float, friction: float) -> float:
+    """Peak force: all sliders slip up."""
+    return speed * sqrt(mass * stiffness * (1.0 + friction))
+
+
+def test_sliders_carry_their_derivatives():
+    run = tangents(rubbed, RUBBED, duration=60e-6, step=5e-9, coarse=1, start="free")
+
+    reads = {
+        rebound: lambda result: -result.channels["ball velocity"].values[-1],
+        pressed: lambda result: result.events[0].peak_force,
+    }
+    for formula, read in reads.items():
+        found, exact = slopes(run, RUBBED, read), {}
+        for name, value in RUBBED.items():
+            ends = [formula(**RUBBED | {name: value * (1 + way * 1e-5)}) for way in (1, -1)]
+            exact[name] = (ends[0] - ends[1]) / 2e-5
+        largest = max(abs(value) for value in exact.values())
+        for name, value in exact.items():
+            assert abs(found[name] - value) < 1e-3 * largest, (formula.__name__, name)
 
 
 # --------------------------------------------------------------------------- two elastic balls

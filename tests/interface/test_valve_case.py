@@ -26,9 +26,12 @@ IMPACT = FILE.with_name("drawn.yaml")
 TEXT = FILE.read_text(encoding="utf-8")
 
 
-def changed(old: str, new: str) -> str:
-    assert TEXT.count(old) >= 1, f"the case has no {old!r}"
-    return TEXT.replace(old, new, 1)
+def changed(*pairs: str) -> str:
+    text = TEXT
+    for old, new in zip(pairs[::2], pairs[1::2], strict=True):
+        assert text.count(old) >= 1, f"the case has no {old!r}"
+        text = text.replace(old, new, 1)
+    return text
 
 
 def test_values_arrive_in_si():
@@ -113,6 +116,31 @@ MISTAKES = {
         changed("[needle.tip, housing.seat]", "[needle.tip, needle.shaft]"),
         "stops.seat.between",
         "a separate body",
+    ),
+    "friction of a law that is given": (
+        changed(
+            "speed: 1.2 m/s, force: 20 N}",
+            "speed: 1.2 m/s, force: 20 N, friction: 0.1}",
+            "seat: {type: end-stop, gap: 0 um, law: {kind: consistent}}",
+            "seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e9 N/m}}",
+        ),
+        "stops.seat.friction",
+        "the only one with friction",
+    ),
+    "friction beside a restitution": (
+        changed(
+            "speed: 1.2 m/s, force: 20 N}",
+            "speed: 1.2 m/s, force: 20 N, friction: 0.1}",
+            "seat: {type: end-stop, gap: 0 um, law: {kind: consistent}}",
+            "seat: {type: end-stop, gap: 0 um, law: {kind: consistent}, restitution: 0.9}",
+        ),
+        "network.components.seat.restitution",
+        "one of them",
+    ),
+    "friction beyond any pair of faces": (
+        changed("force: 20 N}", "force: 20 N, friction: 3}"),
+        "stops.seat.friction",
+        "2",
     ),
     "consistent law without surfaces": (
         changed("  seat: {between: [needle.tip, housing.seat], speed: 1.2 m/s, force: 20 N}\n", ""),
