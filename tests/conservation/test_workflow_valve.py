@@ -14,14 +14,20 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json
+from klack.assembling import rubbing as rubbing_module
 from klack.assembling.valve import Valve, build_valve
 from klack.case import read_case
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.contact.laws import TableLaw
+from klack.contact.rubbing_law import RubbingLaw
+from klack.errors import AccuracyWarning
+from klack.exchange.case_models import case_models
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
+from klack.transient.rubbing_ladder import LockedError, RubbingContact
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
 SPEED = 0.8  # [m/s]
@@ -156,8 +162,7 @@ def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve, friction: floa
     """Same bodies and speed through `klack impact`: another port pattern, another time loop."""
     text = FILE.read_text(encoding="utf-8")
     if friction:
-        rubbing = text.replace("force: 20 N}", f"force: 20 N, friction: {friction}}}")
-        valve = build_valve(read_valve_case(rubbing, FILE))
+        valve = build_valve(rubbing(friction))
     bodies = text[text.index("materials:") : text.index("  pole:")]
     impact = read_case(
         "klack: 1\ntitle: t\n"
@@ -180,6 +185,49 @@ def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve, friction: floa
     assert event.peak_force == pytest.approx(expected.peak_force, rel=5e-3)
     assert event.contact_time == pytest.approx(expected.contact_time, rel=5e-3)
     assert event.restitution == pytest.approx(expected.restitution, abs=3e-3)
+
+
+def rubbing(friction: float) -> ValveCase:
+    text = FILE.read_text(encoding="utf-8")
+    return read_valve_case(
+        text.replace("force: 20 N}", f"force: 20 N, friction: {friction}}}"), FILE
+    )
+
+
+def test_friction_of_a_stop_raises_its_pressure_pattern_and_its_law(valve: Valve):
+    """Truth: the same faces without friction, softer; the smooth stop keeps its bits."""
+    rough = build_valve(rubbing(0.1))
+
+    before, after = valve.contacts["seat"], rough.contacts["seat"]
+    assert 1.01 < after.pattern_force / before.pattern_force < 1.05
+    assert after.closing.force[-1] > before.closing.force[-1]
+    assert isinstance(rough.laws["seat"].law, RubbingLaw)
+    assert isinstance(rough.laws["seat"].faces, RubbingLaw)
+    assert 0.0 < rough.laws["seat"].bulk <= valve.laws["seat"].bulk
+    for of in (valve, rough):
+        assert isinstance(of.laws["opening"].law, TableLaw)
+    assert rough.contacts["opening"].pattern_force == valve.contacts["opening"].pattern_force
+
+
+def test_an_exported_valve_says_that_it_leaves_friction_out():
+    with pytest.warns(AccuracyWarning, match=r"leaves out stops\.seat\.friction 0\.1"):
+        models = case_models(rubbing(0.1))
+
+    laws = [contact.law for contact in models.pair.contacts]
+    assert not any(isinstance(law, RubbingLaw) for law in laws)
+
+
+def test_faces_that_lock_leave_the_law_smooth(monkeypatch: pytest.MonkeyPatch, valve: Valve):
+    def locks(*_given: object, key: str) -> RubbingContact:
+        raise LockedError(key, got="0.1: the faces lock", expected="less", hint="less.")
+
+    monkeypatch.setattr(rubbing_module, "rubbing_contact", locks)
+    with pytest.warns(AccuracyWarning, match=r"seat.*leaves out stops\.seat\.friction 0\.1"):
+        locked = build_valve(rubbing(0.1))
+
+    law = locked.laws["seat"].law
+    assert isinstance(law, TableLaw)
+    assert np.array_equal(law.force_points, valve.laws["seat"].local.law.force_points)
 
 
 MIRRORED = """
