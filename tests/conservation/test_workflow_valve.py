@@ -11,6 +11,8 @@ import pytest
 
 from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.content import stroke_content
+from klack.analyses.stroke.figures import stop_law_chart
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json
@@ -207,6 +209,21 @@ def test_friction_of_a_stop_raises_its_pressure_pattern_and_its_law(valve: Valve
     for of in (valve, rough):
         assert isinstance(of.laws["opening"].law, TableLaw)
     assert rough.contacts["opening"].pattern_force == valve.contacts["opening"].pattern_force
+
+
+def test_a_report_names_the_friction_of_its_stops(study: StrokeStudy):
+    rough = run_stroke(rubbing(0.1), variants=("dry",))
+
+    seat, opening = rough.stops
+    assert (seat.friction, opening.friction) == (0.1, 0.0)
+    assert np.all(seat.returning[1:] < seat.force[1:])
+    chart = stop_law_chart(seat)
+    assert chart is not None
+    assert "with friction 0.1" in chart.note
+    assert [curve.label for curve in chart.panels[0].curves][-1] == "the same, slipping back"
+    physics = [dict(stroke_content(of).limits)["Physics"] for of in (rough, study)]
+    assert "frictionless but at 'seat'" in physics[0]
+    assert "frictionless contact" in physics[1]
 
 
 def test_an_exported_valve_says_that_it_leaves_friction_out():

@@ -41,6 +41,7 @@ STROKE = StoredAnalysis(
             "gap": "m",
             "indentation": "m",
             "force": "N",
+            "returning": "N",
             "share": "1",
             "approach": "m",
             "static_force": "N",

@@ -210,6 +210,18 @@ def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
     rows: tuple[tuple[str, Callable[[StopSummary], str]], ...] = (
         ("surfaces", lambda stop: stop.surfaces or "none"),
         ("local law", lambda stop: stop.kind),
+        (
+            "friction between the faces",
+            lambda stop: (
+                (
+                    f"{stop.friction:g}"
+                    if stop.returning.size
+                    else f"{stop.friction:g}, no loss in the law"
+                )
+                if stop.friction
+                else "none"
+            ),
+        ),
         ("film in parallel with the contact", lambda stop: "yes" if stop.film else "no"),
         ("gap at the start", lambda stop: quantity(stop.gap, "m", 4)),
         ("force of the port pattern", lambda stop: quantity(stop.pattern_force, "N", 3)),
@@ -373,11 +385,13 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 
 
 def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
+    rough = " and ".join(f"'{stop.name}'" for stop in study.stops if stop.friction)
+    contact = f"contact, frictionless but at {rough}," if rough else "frictionless contact"
     limits = [
         (
             "Physics",
-            "Motion along one axis; linear elastic bodies with small deformations; frictionless "
-            "contact without plastic flow; one-dimensional waves in lines, chambers with one "
+            f"Motion along one axis; linear elastic bodies with small deformations; {contact} "
+            "without plastic flow; one-dimensional waves in lines, chambers with one "
             "pressure each; magnetic fluxes in a network of reluctances.",
         ),
         (

@@ -430,10 +430,26 @@ def stop_law_chart(stop: StopSummary) -> Chart | None:
             width=2.0,
         )
     )
+    kind = f"with friction {stop.friction:g}" if stop.friction else "without friction"
     note = (
-        "Frictionless static contact of the two complete bodies, counted from first touch, and the "
+        f"Static contact of the two complete bodies {kind}, counted from first touch, and the "
         "part of it that the local law carries; the kept modes carry the rest."
     )
+    if stop.returning.size:
+        curves.append(
+            Curve(
+                x=1e6 * stop.indentation,
+                y=stop.returning,
+                label="the same, slipping back",
+                colour="blue",
+                style="dashdot",
+                width=1.8,
+            )
+        )
+        note += (
+            " Closing, the faces slip along the upper curve of the law; opening, they hold first, "
+            "and slip back along the lower one. The loop between is lost."
+        )
     known = stop.share[np.isfinite(stop.share)]
     if known.size:
         note += f" Share of the law: {100 * known.min():.0f} to {100 * known.max():.0f} %."

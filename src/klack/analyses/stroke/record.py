@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
@@ -112,6 +112,10 @@ class StopSummary:
         Loaded contact points across the whole width then; 0 if unknown.
     doubts : tuple of str
         Why no error of impacts on this stop can be judged, each in a few words.
+    friction : float [-]
+        Coulomb's coefficient between the faces.
+    returning : array, shape (k,) [N]
+        Force at ``indentation`` while faces with friction slip back; empty for a law without loss.
     """
 
     name: str
@@ -130,6 +134,8 @@ class StopSummary:
     size_ratio: float
     points_across: int = 0
     doubts: tuple[str, ...] = ()
+    friction: float = 0.0
+    returning: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,6 +27,7 @@ from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
+from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
@@ -416,6 +417,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
     contact, law = valve.contacts.get(name), valve.laws.get(name)
     local = None if law is None else law.local
     none, nan = np.empty(0), float("nan")
+    indentation = np.append(0.0, local.force_indentation) if local else none
     surfaces = " on ".join(str(s) for s in valve.case.stops[name].between) if contact else ""
     check = None
     if contact is not None:
@@ -427,7 +429,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         kind=part.law.kind if part.law is not None else "film",
         gap=part.gap,
         film=part.film is not None,
-        indentation=np.append(0.0, local.force_indentation) if local else none,
+        indentation=indentation,
         force=np.append(0.0, local.force) if local else none,
         share=np.append(nan, local.share) if local else none,
         approach=contact.closing.approach if contact else none,
@@ -438,6 +440,10 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         size_ratio=check.size_ratio if check else nan,
         points_across=check.points_across if check else 0,
         doubts=check.doubts if check else (),
+        friction=valve.case.stops[name].friction if contact else 0.0,
+        returning=law.law.returning(indentation)
+        if law and isinstance(law.law, RubbingLaw)
+        else none,
     )
 
 
