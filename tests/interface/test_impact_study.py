@@ -29,6 +29,11 @@ STUDY = f"""
   measures: [peak_force, contact_time, restitution, impulse, sub_contacts]
   design: {{points: 2}}
 """
+RUBBING = """
+    contact.friction: {from: 0, to: 0.3}
+    contact.static_friction: {from: 0.3, to: 0.4}
+    contact.stribeck_speed: {from: 0.01 m/s, to: 0.1 m/s}
+  measures"""
 CASE = """klack: 1
 title: Ball on a short rod
 materials:
@@ -120,6 +125,8 @@ def test_every_point_is_the_impact_of_the_changed_case(ball, tmp_path):
         ("bodies.rod.mesh.contact.size", "{values: [0.025 mm, 0.03 mm]}", "reduced"),
         (YOUNG, "{values: [190 GPa, 200 GPa]}", "interface"),
         ("reduction.modes.ball.count", "{values: [8, 9]}", "reduced"),
+        ("contact.friction", "{values: [0, 0.2]}", "reduced"),
+        ("contact.friction", "{values: [0.2, 0]}", "interface"),
         ("lumped.stiffness", "{values: [2e8 N/m, 3e8 N/m]}", "lumped"),
         ("run.reduced_step", "{values: [10 ns, 15 ns]}", "reduced-none"),
         pytest.param(SPEED, "{values: [0.4 m/s, 0.5 m/s]}", "full", marks=pytest.mark.slow),
@@ -155,7 +162,7 @@ def test_many_points_of_your_own_program(ball):
 
 
 def test_points_of_the_same_bodies_build_them_once(ball, tmp_path, monkeypatch):
-    """Speed, forces and damping leave meshes and modes; a modulus does not."""
+    """Speed, forces, damping and friction leave meshes and modes; a modulus does not."""
     built = []
     real = impacts.impact_bodies
 
@@ -164,7 +171,9 @@ def test_points_of_the_same_bodies_build_them_once(ball, tmp_path, monkeypatch):
         return real(*given, **named)
 
     monkeypatch.setattr(impacts, "impact_bodies", counted)
-    klack.run_study(ball, write(tmp_path, STUDY))
+    for key, value in (("friction", 0.1), ("static_friction", 0.3), ("stribeck_speed", "0.1 m/s")):
+        ball = ball.with_value(f"contact.{key}", value)
+    klack.run_study(ball, write(tmp_path, STUDY.replace("\n  measures", RUBBING)))
     assert len(built) == 1
     text = STUDY.replace("measures", f"  {YOUNG}: {{values: [200 GPa, 210 GPa]}}\n  measures")
     file = write(tmp_path, text.replace("points: 2", "kind: grid, levels: 2"))

@@ -50,6 +50,9 @@ _OF_THE_IMPACT = (
     ("motion", "spring"),
     ("contact", "local_law"),
     ("contact", "reach"),
+    ("contact", "friction"),
+    ("contact", "static_friction"),
+    ("contact", "stribeck_speed"),
     ("reduction", "correction"),
 )
 """Keys of an impact of the same bodies."""
@@ -108,9 +111,9 @@ class _Impacts:
     def makes_bodies(self, case: Case, place: Key) -> bool:
         """Whether meshes, places or modes may follow from what stands there.
 
-        The static contact, the pressure pattern and the law follow from speed and forces, the
-        contact points of shots from their distributions, too; all of them are those of each point.
-        So is the guide.  An upper stop is built for the energy of one impact.
+        The static contact, the pressure pattern and the law follow from speed, forces and friction,
+        the contact points of shots from their distributions, too; all of them are those of each
+        point.  So is the guide.  An upper stop is built for the energy of one impact.
         """
         if place[0] in _ASIDE:
             return place[:2] == ("run", "transfer")  # takes more modes
