@@ -169,6 +169,22 @@ def test_expected_error_of_the_step_is_that_against_a_thirtysecond_of_it(case, a
     assert item.now[HISTORY] == pytest.approx(true, rel=0.5)
 
 
+def test_a_case_that_rubs_is_advised_with_its_friction(case):
+    """In a cone.  Truth: its own levels, which are far apart where one of them has no friction."""
+    cone = TEXT.replace("[4, 0], name: side", "[4, 3.172], name: side")
+    cone = cone.replace("[0, 0], name: end", "[0, -0.828], name: end")
+    case = read_case(cone, Path("cone.yaml"))
+    rubbing = read_case(cone.replace("reach:", "friction: 0.2, reach:"), Path("cone.yaml"))
+    told = advise_impact(rubbing, confirm=False)
+    (pattern,) = told.fixed
+    lossless = history_error(told, reduced(rubbing), reduced(case))
+
+    assert lossless > 0.1
+    assert pattern.errors[HISTORY] < 0.2 * lossless
+    true = history_error(told, reduced(rubbing, step=100e-9 / 32), reduced(rubbing))
+    assert counsel(told, STEP).now[HISTORY] == pytest.approx(true, rel=0.5)
+
+
 def test_the_advised_case_meets_the_target_against_the_finest_run(case, advice):
     problem, pools, pair = prepared(refined(case, advice, FINEST), modes=30)
     truth = interface_history(problem, pools, pair.ports, {"sphere": 30, "rod": 30}, step=12.5e-9)
