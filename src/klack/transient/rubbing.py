@@ -431,7 +431,7 @@ def _rounds(
             _as_before(closed, d, lam, doing, along, stiffer)
         _place(closed, d, mu, lam, w, doing, along, _LEAST * worst, change)
         ratio = worst / last if rounds > 2 else 0.0
-        lost = worst * ratio ** (2 + closed.counts[1] // 40) > tolerance
+        lost = worst * ratio ** (2 + closed.counts[1] // 12) > tolerance
         paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
         slow = ratio > _SLOW
         if lost or paid or not _follow(closed, d, mu, doing, along, stiffer, slow):
