@@ -68,7 +68,9 @@ def write(folder: Path, scale: float = 3.0, text: str = "", added: float = 1.0) 
 
 
 def start(folder: Path, **env: str) -> "subprocess.Popen[str]":
-    given = os.environ | {"NUMBA_CACHE_DIR": str(folder / "store")} | env
+    # Python knows a source by its second and its size: one written anew at once has old bytecode.
+    own = {"NUMBA_CACHE_DIR": str(folder / "store"), "PYTHONDONTWRITEBYTECODE": "1"}
+    given = os.environ | own | env
     return subprocess.Popen(
         [sys.executable, str(folder / "run.py")],
         env=given,
