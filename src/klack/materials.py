@@ -1,9 +1,10 @@
-"""Isotropic linear elastic materials."""
+"""Isotropic materials: linear elastic, and when they yield."""
 
 from dataclasses import dataclass
 from math import sqrt
 
 from klack.errors import InputError, require_positive
+from klack.hardening import LARGEST_YIELD, Hardening
 
 __all__ = ["Material"]
 
@@ -13,7 +14,7 @@ _DENSE = 3000.0  # [kg/m^3]; lighter solids, rubber and polymers, may be slower
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """Isotropic linear elastic material.
+    """Isotropic linear elastic material; where it yields is asked of analyses that know how.
 
     Parameters
     ----------
@@ -23,12 +24,15 @@ class Material:
     poisson : float [-]
         Poisson's ratio, above -1 and below 0.5.
     density : float [kg/m^3]
+    hardening : Hardening, optional
+        Yield stress and what follows; without it the material is elastic at any stress.
     """
 
     name: str
     young: float
     poisson: float
     density: float
+    hardening: Hardening | None = None
 
     def __post_init__(self) -> None:
         require_positive(f"material '{self.name}': young", self.young, "Pa")
@@ -39,6 +43,15 @@ class Material:
                 got=f"{self.poisson:g}",
                 expected="a value between -1 and 0.5 (both excluded)",
                 hint="metals lie between 0.25 and 0.35; 0.5 would be incompressible.",
+            )
+
+        limit = LARGEST_YIELD * self.young
+        if self.hardening is not None and self.hardening.yield_stress > limit:
+            raise InputError(
+                f"material '{self.name}': yield",
+                got=f"{self.hardening.yield_stress / 1e6:.4g} MPa",
+                expected=f"at most a fiftieth of Young's modulus, {limit / 1e6:.4g} MPa",
+                hint="check the unit; hardened steel has 2000 MPa.",
             )
 
     @property

@@ -1,11 +1,13 @@
 """Mesh of a contact, and reasons to doubt its numbers: of an impact or of an end stop."""
 
+from math import isfinite
 from typing import Protocol
 
 from klack.analyses.json_parts import ContactJson
 from klack.analyses.measures import number_or_none
+from klack.units import format_si
 
-__all__ = ["MeshedContact", "contact_doubt", "contact_to_json"]
+__all__ = ["MeshedContact", "contact_doubt", "contact_to_json", "elastic_above"]
 
 
 class MeshedContact(Protocol):
@@ -31,6 +33,10 @@ class MeshedContact(Protocol):
     def doubts(self) -> tuple[str, ...]:
         """Reasons why no error can be estimated there."""
 
+    @property
+    def needed_yield(self) -> float:
+        """Yield stress from which on both bodies stay elastic [Pa]; nan if unknown."""
+
 
 def contact_to_json(contact: MeshedContact) -> ContactJson:
     """Mesh of a contact in plain numbers, SI, the unit in the key."""
@@ -40,6 +46,7 @@ def contact_to_json(contact: MeshedContact) -> ContactJson:
         "size_over_half_width": number_or_none(contact.size_ratio),
         "points_across": contact.points_across or None,
         "doubts": list(contact.doubts),
+        "needed_yield_Pa": number_or_none(contact.needed_yield),
     }
 
 
@@ -47,3 +54,13 @@ def contact_doubt(contact: MeshedContact) -> str:
     """Sentence on why the numbers of a contact are doubtful; empty if they are not."""
     doubts = " and ".join(contact.doubts)
     return f"The contact {contact.surfaces} cannot be relied on: {doubts}." if doubts else ""
+
+
+def elastic_above(contact: MeshedContact) -> str:
+    """Yield stress that elastic faces need; empty if it is not known."""
+    if not isfinite(contact.needed_yield):
+        return ""
+    return (
+        f"The faces {contact.surfaces} stay elastic from a yield stress of about "
+        f"{format_si(contact.needed_yield, 'Pa', 2)} on."
+    )

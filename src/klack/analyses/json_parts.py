@@ -26,6 +26,9 @@ class ContactJson(TypedDict):
         list[str],
         Field(description="Reasons why no error of impacts there can be estimated; empty if none."),
     ]
+    needed_yield_Pa: Annotated[
+        Real, Field(description="Yield stress from which on both bodies stay elastic, about.")
+    ]
 
 
 class RejectedJson(TypedDict):

@@ -7,16 +7,18 @@ from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.assembling.rubbing import static_loops
+from klack.assembling.yielding import LoadedBody, loops_with_yield
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
-from klack.contact.statics import ReachError, StaticContact
+from klack.contact.statics import ReachError, StaticContact, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
+from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
 
@@ -105,6 +107,48 @@ class ContactProblem(PlacedBodies):
             friction,
             key="contact.friction",
         )
+
+    @cached_property
+    def yielding(self) -> YieldingLoops | None:
+        """Static loops with yield; None where no material has a yield stress.
+
+        They take the static solutions: first used before :meth:`close`.
+
+        Raises
+        ------
+        InputError
+            For bodies of three dimensions.
+        """
+        upper, lower = (
+            LoadedBody(
+                body=body,
+                flexibility=flexibility,
+                materials=self.case.materials_of(body.name, body.mesh.solids),
+            )
+            for body, flexibility in (
+                (self.pair.upper, self.flexibility_upper),
+                (self.pair.lower, self.flexibility_lower),
+            )
+        )
+        if not (upper.yields or lower.yields):
+            return None
+        space, C = self.space, self.static.compliance
+        while True:
+            try:
+                return loops_with_yield(
+                    self.static,
+                    space,
+                    C,
+                    upper,
+                    lower,
+                    energy=impact_energy(self.case, self.pair),
+                    closing=closing_force(self.case),
+                )
+            except ReachError as error:
+                space = self.wider(space, error)
+                C = extended_compliance(
+                    space, self.static, self.flexibility_upper, self.flexibility_lower
+                )
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
         """Contact points of the same surfaces with twice the reach.

@@ -16,6 +16,12 @@ from pydantic import (
 from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.errors import InputError
+from klack.hardening import (
+    LARGEST_YIELD,
+    Hardening,
+    vickers_of_rockwell,
+    yield_of_hardness,
+)
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Count, Name, Section, Text
 from klack.materials import Material
@@ -27,6 +33,8 @@ __all__ = [
     "CaseBody",
     "CaseFile",
     "CaseMaterial",
+    "HardeningSlopes",
+    "Hardness",
     "ModeChoice",
     "RayleighCoefficients",
     "Reduction",
@@ -61,12 +69,87 @@ BodySurface = Annotated[
 ]
 
 
+class Hardness(Section):
+    """Hardness of a metal, from which its yield stress is estimated: exactly one of the two."""
+
+    HV: Ratio | None = Field(default=None, gt=0, description="Vickers, e.g. 180.")
+    HRC: Ratio | None = Field(default=None, ge=20, le=68, description="Rockwell C, 20 to 68.")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        self._exactly_one(("HV", "HRC"), "how hard the material is")
+        return self
+
+    @property
+    def yield_stress(self) -> float:
+        """Estimate of the yield stress [Pa]; see :func:`klack.hardening.yield_of_hardness`."""
+        vickers = self.HV
+        if vickers is None:
+            assert self.HRC is not None
+            vickers = vickers_of_rockwell(self.HRC)
+        return yield_of_hardness(vickers)
+
+
+class HardeningSlopes(Section):
+    """Rise of the stress per plastic strain."""
+
+    isotropic: Modulus = Field(default=0.0, ge=0, description="Rise of the yield stress.")
+    kinematic: Modulus = Field(default=0.0, ge=0, description="Shift of the yield surface.")
+
+
 class CaseMaterial(Section):
-    """Isotropic linear elastic material."""
+    """Isotropic material: elastic, and when it yields."""
 
     young: Modulus = Field(gt=0, description="Young's modulus; steel 210 GPa.")
     poisson: Ratio = Field(gt=-1, lt=0.5, description="Poisson's ratio; steel 0.3.")
     density: Density = Field(gt=0, description="Density; steel 7850 kg/m^3.")
+    yield_stress: Modulus | None = Field(
+        default=None,
+        alias="yield",
+        gt=0,
+        description="Yield stress; soft magnetic steel 280 MPa. Without it always elastic.",
+    )
+    hardness: Hardness | None = Field(
+        default=None, description="Instead of a yield stress: HV or HRC; an estimate."
+    )
+    hardening: HardeningSlopes | None = Field(
+        default=None, description="Linear hardening; without it perfectly plastic."
+    )
+
+    @model_validator(mode="after")
+    def _one_yield(self) -> Self:
+        if self.yield_stress is not None:
+            self._refuse_with(("hardness",), "a yield stress", "it is an estimate of it")
+        if self.yield_stress is None and self.hardness is None:
+            self._refuse_with(("hardening",), "no yield stress", "give 'yield' or 'hardness'")
+        limit = LARGEST_YIELD * self.young
+        given = self.yield_stress or (self.hardness.yield_stress if self.hardness else 0.0)
+        if given > limit:
+            raise CaseProblem(
+                ("yield",) if self.hardness is None else ("hardness",),
+                got=f"a yield stress of {given / 1e6:.4g} MPa",
+                expected=f"at most a fiftieth of Young's modulus, {limit / 1e6:.4g} MPa",
+                hint="check the unit; hardened steel has 2000 MPa.",
+            )
+        return self
+
+    def named(self, name: str) -> Material:
+        """As the finite elements need it."""
+        hardening, given = None, self.yield_stress
+        if given is None and self.hardness is not None:
+            given = self.hardness.yield_stress
+        if given is not None:
+            slopes = self.hardening or HardeningSlopes()
+            hardening = Hardening(
+                yield_stress=given, isotropic=slopes.isotropic, kinematic=slopes.kinematic
+            )
+        return Material(
+            name=name,
+            young=self.young,
+            poisson=self.poisson,
+            density=self.density,
+            hardening=hardening,
+        )
 
 
 class RayleighCoefficients(Section):
@@ -344,8 +427,5 @@ class CaseFile(Section):
                     hint=nearest(solid, chosen, f"add '{solid}: ...' there."),
                 )
             name = chosen if isinstance(chosen, str) else chosen[solid]
-            data = self.materials[name]
-            result[solid] = Material(
-                name=name, young=data.young, poisson=data.poisson, density=data.density
-            )
+            result[solid] = self.materials[name].named(name)
         return result

@@ -35,9 +35,11 @@ __all__ = [
     "ReachError",
     "StaticContact",
     "check_rim",
+    "check_state",
     "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
+    "highest_load",
     "points_across",
     "ring_radius",
     "size_over_half_width",
@@ -49,6 +51,8 @@ _CHUNK = 64
 
 COARSE = 1.5
 """Element size over half width of a contact that is too coarse to be judged."""
+
+_SECTORS = 6
 
 _RING = 0.25
 """Spread of the pressure over its mean radius below which the contact is a ring.
@@ -416,23 +420,58 @@ def check_rim(static: StaticContact) -> None:
     InputError
         It names the reach and the highest force without contact at the rim.
     """
-    space = static.space
-    travel = static.approach + min(space.clearance, space.touch)
-    touched = (static.pressures[:, space.rim] > 0).any(axis=1)
-    touched = touched & np.array([not space.complete_at(distance) for distance in travel])
-    if not np.any(touched):
+    for i, (approach, lam) in enumerate(zip(static.approach, static.pressures, strict=True)):
+        below = float(static.force[i - 1]) if i else 0.0
+        check_state(
+            static.space,
+            approach,
+            lam,
+            below=below,
+            needed=static.max_force,
+            deepest=float(static.approach[-1]),
+        )
+
+
+def check_state(
+    space: ContactSpace,
+    approach: float,
+    lam: NDArray[np.float64],
+    *,
+    below: float,
+    needed: float,
+    deepest: float,
+) -> None:
+    """Refuse one state that has grown to the border of the candidate points.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    approach : float [m]
+        From first touch.
+    lam : array, shape (nc,) [N]
+    below : float [N]
+        Highest force known to stay within.
+    needed : float [N]
+        That is asked for.
+    deepest : float [m]
+        Approach that is asked for.
+
+    Raises
+    ------
+    ReachError
+    """
+    touched = bool(np.any(lam[space.rim] > 0))
+    if not touched or space.complete_at(approach + min(space.clearance, space.touch)):
         return
-    first = int(np.argmax(touched))
-    below = static.force[first - 1] if first else 0.0
     error = ReachError(
         "contact: reach",
         got=f"contact at the edge of the candidate points above {below:.4g} N "
-        f"(reach {static.space.reach * 1e6:.4g} um)",
-        expected=f"a reach that covers the contact up to {static.max_force:.4g} N",
-        hint=f"enlarge the reach: in a case 'reach: {2e6 * static.approach[-1]:.3g} um', "
+        f"(reach {space.reach * 1e6:.4g} um)",
+        expected=f"a reach that covers the contact up to {needed:.4g} N",
+        hint=f"enlarge the reach: in a case 'reach: {2e6 * deepest:.3g} um', "
         "under contact or at the stop; or enlarge the named surfaces.",
     )
-    error.held = float(below)
+    error.held = below
     raise error
 
 
@@ -479,3 +518,15 @@ def ring_radius(space: ContactSpace, lam: NDArray[np.float64]) -> float | None:
     """
     spread, mean = _closest_ring(space, lam / lam.sum())
     return mean if spread < _RING * mean else None
+
+
+def highest_load(space: ContactSpace, lam: NDArray[np.float64]) -> float:
+    """Force of the whole ring if every sector carried as much as the most loaded one [N]."""
+    if space.dimension == 2:
+        return float(lam.sum())
+    centre = np.average(space.points[:, :2], axis=0, weights=lam)
+    if np.linalg.norm(centre) < 0.5 * float(np.ptp(space.points[:, 0])):
+        centre = np.zeros(2)
+    angle = np.arctan2(space.points[:, 1] - centre[1], space.points[:, 0] - centre[0])
+    sector = np.floor((angle / (2.0 * np.pi) + 0.5) * _SECTORS).astype(int) % _SECTORS
+    return _SECTORS * float(np.bincount(sector, weights=lam, minlength=_SECTORS).max())

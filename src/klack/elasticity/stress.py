@@ -23,7 +23,7 @@ from klack.errors import InputError
 from klack.materials import Material
 from klack.mesh.mesh import ElementBlock, Mesh
 
-__all__ = ["COMPONENTS", "StressField", "von_mises"]
+__all__ = ["COMPONENTS", "StressField", "stress_points", "von_mises"]
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the stresses; of a body of revolution x is the radius and y the direction around."""
@@ -134,7 +134,7 @@ class _Block:
     def __init__(self, mesh: Mesh, block: ElementBlock, material: Material) -> None:
         self.connectivity, self.material = block.connectivity, material
         self.axisymmetric = mesh.dimension == 2
-        xi = _stress_points(block.family)
+        xi = stress_points(block.family)
         N, dN = shape_functions(block.family, xi)
         x = mesh.points[block.connectivity]
         J = np.einsum("ena,qnb->eqab", x, dN)
@@ -162,7 +162,7 @@ class _Block:
         return np.asarray(self.to_nodes @ stress)
 
 
-def _stress_points(family: str) -> NDArray[np.float64]:
+def stress_points(family: str) -> NDArray[np.float64]:
     """Reference coordinates of the points where the stress is taken, shape (q, d)."""
     if family not in _LINEAR:
         return reference_nodes(family).mean(axis=0, keepdims=True)

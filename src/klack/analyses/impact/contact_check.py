@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.yield_check import check_yield, solid_at
 from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
 from klack.contact.hertz import line_half_width, point_radius
@@ -24,6 +25,7 @@ from klack.contact.pairing import face_geometry, project_to_surface
 from klack.contact.statics import (
     COARSE,
     StaticContact,
+    highest_load,
     points_across,
     ring_radius,
     size_over_half_width,
@@ -59,7 +61,6 @@ _CARRIES = 1e-6
 _SHALLOW = sin(0.5 * pi / 180.0)
 """Slope on both sides of a corner above which it is the corner that touches, not a face."""
 
-_SECTORS = 6
 _OVER_THE_END = "it reaches the edge of a named surface"
 
 
@@ -77,6 +78,8 @@ class ContactCheck:
         Contact points across the whole width.
     expected : float [m]
         Half width of smooth bodies of this shape (Hertz); nan where no law fits.
+    needed_yield : float [Pa]
+        Yield stress from which on both bodies stay elastic; nan where it is not known.
     doubts : tuple of str
         Why no error of this contact can be judged on this mesh, each in a few words.
     """
@@ -85,6 +88,7 @@ class ContactCheck:
     size_ratio: float
     points_across: int
     expected: float
+    needed_yield: float = nan
     doubts: tuple[str, ...] = ()
 
 
@@ -108,8 +112,8 @@ def check_contact(
     Warns
     -----
     AccuracyWarning
-        About a sharp edge, elements too coarse for the contact, and a contact at the end of a
-        named surface.
+        About a sharp edge, elements too coarse for the contact, a contact at the end of a named
+        surface, and a body that yields.
     """
     space, lam = static.space, static.pattern_at(force)
     ratio = size_over_half_width(static, force)
@@ -134,6 +138,9 @@ def check_contact(
         size_ratio=ratio,
         points_across=across,
         expected=nan if corner is not None else expected,
+        needed_yield=nan
+        if corner is not None
+        else check_yield(case, pair, static, force, surfaces).needed,
         doubts=tuple(doubts),
     )
 
@@ -203,7 +210,7 @@ def expected_half_width(
         return nan
     radius = ring_radius(space, lam)
     if radius is not None:
-        load = _highest_load(space, lam) / (2.0 * pi * radius)
+        load = highest_load(space, lam) / (2.0 * pi * radius)
         return _within(pair, line_half_width(load, float(curvature[0]), modulus))
     if not curvature[-1] > 0.0:
         return nan
@@ -225,18 +232,6 @@ def _within(pair: BodyPair, width: float) -> float:
     return width if width < 0.5 * room else nan
 
 
-def _highest_load(space: ContactSpace, lam: NDArray[np.float64]) -> float:
-    """Force of the whole ring if every sector carried as much as the most loaded one [N]."""
-    if space.dimension == 2:
-        return float(lam.sum())
-    centre = np.average(space.points[:, :2], axis=0, weights=lam)
-    if np.linalg.norm(centre) < 0.5 * float(np.ptp(space.points[:, 0])):
-        centre = np.zeros(2)
-    angle = np.arctan2(space.points[:, 1] - centre[1], space.points[:, 0] - centre[0])
-    sector = np.floor((angle / (2.0 * pi) + 0.5) * _SECTORS).astype(int) % _SECTORS
-    return _SECTORS * float(np.bincount(sector, weights=lam, minlength=_SECTORS).max())
-
-
 def _modulus(case: CaseFile, pair: BodyPair) -> float:
     """E* of the two materials that touch [Pa]; nan where a body has none of its own."""
     inverse = 0.0
@@ -244,16 +239,9 @@ def _modulus(case: CaseFile, pair: BodyPair) -> float:
         if case.bodies[body.name].material is None:
             return nan
         materials = case.materials_of(body.name, body.mesh.solids)
-        solid = _solid_at(body.mesh, surface)
+        solid = solid_at(body.mesh, surface)
         inverse += 1.0 / materials[solid].plane_strain_modulus
     return 1.0 / inverse
-
-
-def _solid_at(mesh: Mesh, surface: Surface) -> str:
-    """Solid that most nodes of a surface belong to."""
-    nodes = surface.nodes
-    counts = [np.isin(nodes, block.connectivity).sum() for block in mesh.blocks]
-    return mesh.blocks[int(np.argmax(counts))].solid
 
 
 # --------------------------------------------------------------------------- edges

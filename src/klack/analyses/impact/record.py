@@ -52,6 +52,8 @@ class ContactSummary:
         Loaded contact points across the whole width then; 0 if unknown.
     doubts : tuple of str
         Why no error can be judged on these meshes, each in a few words.
+    needed_yield : float [Pa]
+        Yield stress from which on both bodies stay elastic; nan where it is not known.
     approach, force, area : array, shape (n,) [m], [N], [m^2]
         Ladder from first touch.
     """
@@ -65,6 +67,7 @@ class ContactSummary:
     area: NDArray[np.float64]
     points_across: int = 0
     doubts: tuple[str, ...] = ()
+    needed_yield: float = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -507,6 +507,7 @@ def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSum
         size_ratio=check.size_ratio,
         points_across=check.points_across,
         doubts=check.doubts,
+        needed_yield=check.needed_yield,
         approach=static.approach,
         force=static.force,
         area=static.area,

@@ -7,7 +7,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured
-from klack.analyses.contact_doubts import contact_doubt, contact_to_json
+from klack.analyses.contact_doubts import contact_doubt, contact_to_json, elastic_above
 from klack.analyses.impact.measures import (
     CONTACT_TIME,
     DEVIATION_MEASURES,
@@ -109,6 +109,8 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
         yield doubt
+    if line := elastic_above(study.contact):
+        yield line
     yield from estimate_lines(study)
 
 

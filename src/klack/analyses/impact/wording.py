@@ -1,6 +1,6 @@
 """The answer of an impact in one paragraph."""
 
-from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.contact_doubts import contact_doubt, elastic_above
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.report.wording import count, quantity, share, signed, signed_share
@@ -44,6 +44,8 @@ def answer(study: ImpactStudy) -> str:
     text += "."
     if doubt := contact_doubt(study.contact):
         text += f" {doubt}"
+    if line := elastic_above(study.contact):
+        text += f" {line}"
     if "reduced" in study.deviations:
         text += f" {verdict(study.levels['reduced'], study.deviations['reduced'])}"
     elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:

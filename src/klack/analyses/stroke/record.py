@@ -112,6 +112,8 @@ class StopSummary:
         Loaded contact points across the whole width then; 0 if unknown.
     doubts : tuple of str
         Why no error of impacts on this stop can be judged, each in a few words.
+    needed_yield : float [Pa]
+        Yield stress from which on both bodies stay elastic; nan where it is not known.
     friction : float [-]
         Coulomb's coefficient between the faces.
     returning : array, shape (k,) [N]
@@ -134,6 +136,7 @@ class StopSummary:
     size_ratio: float
     points_across: int = 0
     doubts: tuple[str, ...] = ()
+    needed_yield: float = float("nan")
     friction: float = 0.0
     returning: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 

@@ -440,6 +440,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
         size_ratio=check.size_ratio if check else nan,
         points_across=check.points_across if check else 0,
         doubts=check.doubts if check else (),
+        needed_yield=check.needed_yield if check else nan,
         friction=valve.case.stops[name].friction if contact else 0.0,
         returning=law.law.returning(indentation)
         if law and isinstance(law.law, RubbingLaw)

@@ -8,7 +8,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured
-from klack.analyses.contact_doubts import contact_doubt, contact_to_json
+from klack.analyses.contact_doubts import contact_doubt, contact_to_json, elastic_above
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
 from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.analyses.stroke.measures import (
@@ -163,6 +163,8 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
     for stop in study.stops:
         if doubt := contact_doubt(stop):
             yield f"Impacts on '{stop.name}': {doubt}"
+        if line := elastic_above(stop):
+            yield f"Impacts on '{stop.name}': {line}"
 
 
 def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
