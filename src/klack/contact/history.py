@@ -68,6 +68,8 @@ class EnergyLedger:
         Change of the energy stored in springs to ground.
     friction : float [J]
         Lost in friction of the faces, never below zero.
+    plastic : float [J]
+        Lost to faces that yield; a tenth of it stays in them as energy of residual stress.
     """
 
     initial: float
@@ -78,11 +80,12 @@ class EnergyLedger:
     work: float = 0.0
     spring: float = 0.0
     friction: float = 0.0
+    plastic: float = 0.0
 
     @property
     def lost(self) -> float:
         """Sum of all losses [J]."""
-        return self.contact_dissipation + self.damping + self.friction
+        return self.contact_dissipation + self.damping + self.friction + self.plastic
 
     @property
     def residual(self) -> float:
@@ -98,15 +101,14 @@ class EnergyLedger:
 
     @property
     def least_loss(self) -> float:
-        """Smallest loss, relative to the energy turned over [-]; without friction, of the two."""
+        """Smallest loss, relative to the energy turned over [-], of those that are there."""
         losses = [self.contact_dissipation, self.damping]
-        if self.friction:
-            losses.append(self.friction)
+        losses += [loss for loss in (self.friction, self.plastic) if loss]
         scale = self.turned_over
         return min(losses) / scale if scale else 0.0
 
     def parts(self) -> dict[str, float]:
-        """Return every entry by name [J], the initial energy first; friction where not zero."""
+        """Return every entry by name [J], the initial energy first; losses of faces if not zero."""
         out = {"initial kinetic": self.initial}
         for body in self.bodies:
             out[f"{body.name} kinetic (rigid)"] = body.translation
@@ -118,6 +120,8 @@ class EnergyLedger:
         out["springs"] = self.spring
         if self.friction:
             out["friction"] = self.friction
+        if self.plastic:
+            out["plastic"] = self.plastic
         return out
 
 
@@ -153,6 +157,8 @@ class ImpactHistory:
         Mean axial force on body a from outside the contact (springs, constant forces), + in z.
     longest_period : float [s]
         Of the elastic modes of body a; 0 for a rigid body.  Separates clusters of sub-contacts.
+    pressed : float [m]
+        Largest local indentation since the faces were new, of a law that yields; else 0.
     solver : str
         What computed this, in words.
     start : float [s]
@@ -173,6 +179,7 @@ class ImpactHistory:
     displacement_b: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     external_force: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     longest_period: float = 0.0
+    pressed: float = 0.0
     solver: str = ""
     start: float = 0.0
 

@@ -17,6 +17,7 @@ __all__ = [
     "LAW_LINEAR",
     "LAW_RUBBING",
     "LAW_TABLE",
+    "LAW_YIELDING",
     "LEAST_WAY",
     "LEFT_BY_FILM",
     "LOG_SERIES_BELOW",
@@ -47,6 +48,7 @@ LAW_LINEAR: Annotated[int, "C", "numbers: k"] = 0
 LAW_HERTZ: Annotated[int, "C", "numbers: K, n"] = 1
 LAW_TABLE: Annotated[int, "C", "numbers: intervals, then six for each"] = 2
 LAW_RUBBING: Annotated[int, "", "springs, ratio, then five numbers of each"] = 3
+LAW_YIELDING: Annotated[int, "", "states, places, largest indentation, then tables"] = 4
 
 # contact equation of a step
 FORCE_LEFT: Annotated[float, "C", "accepted error of a force over the force"] = 1e-11

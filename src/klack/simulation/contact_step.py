@@ -25,6 +25,7 @@ from klack.contact.step_constants import (
     LAW_LINEAR,
     LAW_RUBBING,
     LAW_TABLE,
+    LAW_YIELDING,
     NEWTON_LIMIT,
     RUBBED_LEFT,
     STEP_LEFT,
@@ -32,6 +33,7 @@ from klack.contact.step_constants import (
 )
 from klack.simulation.phase import compiled
 from klack.simulation.rubbing_step import rubbing_mean, rubbing_store
+from klack.simulation.yielding_step import yielding_mean, yielding_store
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 
@@ -69,6 +71,8 @@ def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
         return p[start] / (p[start + 1] + 1.0) * _power(d, p[start + 1]) * d
     if kind == LAW_RUBBING:
         return rubbing_store(p, start, d)
+    if kind == LAW_YIELDING:
+        return yielding_store(p, start, d)
     i = _interval(p, start, d, 0)
     s = d - p[i]
     return p[i + 5] + s * (p[i + 1] + s * (p[i + 2] / 2 + s * (p[i + 3] / 3 + s * p[i + 4] / 4)))
@@ -152,6 +156,9 @@ def mean_force(
     if kind == LAW_RUBBING:
         mean, slope = rubbing_mean(p, start, d0, d1)
         return mean, slope, hint
+    if kind == LAW_YIELDING:
+        mean, slope = yielding_mean(p, start, d0, d1)
+        return mean, slope, hint
     return _table_mean(p, start, d0, d1, hint)
 
 
@@ -217,7 +224,7 @@ def solve_step(
             deep = max(d0, d1)
             if chi_over_h * deep > 1.0:
                 deep = 1.0 / chi_over_h
-            last = abs(step) <= (RUBBED_LEFT if kind == LAW_RUBBING else STEP_LEFT) * deep
+            last = abs(step) <= (RUBBED_LEFT if kind >= LAW_RUBBING else STEP_LEFT) * deep
         # taken without a look back, and before the bracket test: both its ends are round-off then
         if last:
             force = max(force - slope * step, 0.0)
@@ -228,8 +235,8 @@ def solve_step(
         else:
             low, high = d1, min(high, d1 - excess)
         d1 -= step
-        # about sliders that let go Newton's method can turn in a circle
-        circles = kind == LAW_RUBBING and 2.0 * abs(step) > longest
+        # about the kinks of laws with memory Newton's method can turn in a circle
+        circles = kind >= LAW_RUBBING and 2.0 * abs(step) > longest
         longest = abs(step)
         if circles or not low <= d1 <= high:
             d1 = 0.5 * (low + high)

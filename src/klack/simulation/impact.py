@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.contact.step_constants import LAW_YIELDING
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
@@ -17,6 +19,7 @@ from klack.simulation.impact_arrays import Record
 from klack.simulation.kernel import STATUS_FINE, run_steps
 from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
+from klack.simulation.yielding_step import pressed_state
 
 __all__ = ["SystemRecord", "simulate", "simulate_impact"]
 
@@ -43,6 +46,8 @@ class SystemRecord:
     final_position, final_velocity : tuple of array
         Modal coordinates of each body at the end, in its own modes.
     ledger : EnergyLedger
+    pressed : tuple of float [m]
+        Largest indentation of each contact since its faces were new, of laws that yield; else 0.
     """
 
     system: ReducedSystem
@@ -57,6 +62,7 @@ class SystemRecord:
     final_position: tuple[NDArray[np.float64], ...]
     final_velocity: tuple[NDArray[np.float64], ...]
     ledger: EnergyLedger
+    pressed: tuple[float, ...]
 
     def impact(self, contact: int = 0) -> ImpactHistory:
         """Return the history of one contact.
@@ -86,6 +92,7 @@ class SystemRecord:
             mass_b=body_b.mass if body_b.rigid_count else np.inf,
             longest_period=2.0 * pi / float(elastic.min()) if elastic.size else 0.0,
             ledger=self.ledger,
+            pressed=self.pressed[contact],
             solver=f"modal, discrete gradient, {self.integration_step * 1e9:g} ns",
         )
 
@@ -181,6 +188,10 @@ def simulate(
         own = slice(block.first, block.last)
         positions.append(block.basis @ (q[own] + block.rest))
         speeds.append(block.basis @ v[own])
+    pressed = tuple(_pressed(flat, c) for c in range(contacts))
+    for pair, deep in zip(system.contacts, pressed, strict=True):
+        if isinstance(pair.law, YieldingLaw):
+            pair.law.require(deep)
     ledger = _ledger(system, flat, positions, speeds, books)
     energy_balance.check_energy_balance(
         "simulate",
@@ -202,7 +213,15 @@ def simulate(
         final_position=tuple(positions),
         final_velocity=tuple(speeds),
         ledger=ledger,
+        pressed=pressed,
     )
+
+
+def _pressed(flat: FlatSystem, contact: int) -> float:
+    at = flat.contacts
+    if at.law_kind[contact] != LAW_YIELDING:
+        return 0.0
+    return float(pressed_state(at.law_data, int(at.law_start[contact]))[0])
 
 
 def simulate_impact(
@@ -274,6 +293,7 @@ def _ledger(
             y0, y = float(phi @ q0), float(phi @ q)
             spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
     contact, at = 0.0, flat.contacts
+    yields = bool(at.law_kind[0] == LAW_YIELDING)
     for c in range(len(system.contacts)):
         gap, e = books[4 + 2 * c], books[5 + 2 * c]
         contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
@@ -286,7 +306,8 @@ def _ledger(
         damping=float(books[2]),
         work=work,
         spring=spring,
-        friction=float(books[3]),
+        friction=0.0 if yields else float(books[3]),
+        plastic=float(books[3]) if yields else 0.0,
     )
 
 

@@ -12,12 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
-from klack.contact.step_constants import LAW_LINEAR, LAW_RUBBING, LEAST_WAY, SEPARATED
+from klack.contact.step_constants import (
+    LAW_LINEAR,
+    LAW_RUBBING,
+    LAW_YIELDING,
+    LEAST_WAY,
+    SEPARATED,
+)
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
 from klack.simulation.kernel import FAST, STATUS_FINE, Damped, add_release, push_on
 from klack.simulation.phase import compiled, phase
 from klack.simulation.rubbing_step import slide
+from klack.simulation.yielding_step import press
 
 __all__ = ["run_one_contact"]
 
@@ -253,6 +260,9 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
             if contacts.law_kind[0] == LAW_RUBBING:
                 start = contacts.law_start[0]
                 lost = slide(contacts.law_data, start, d0, d_free - own * force)
+            if contacts.law_kind[0] == LAW_YIELDING:
+                start = contacts.law_start[0]
+                lost = press(contacts.law_data, start, d0, d_free - own * force, force)
     return _Contact(force, now.F, now.gap, now.e, chi, approaching, now.deepest, hint), lost
 
 
@@ -317,8 +327,8 @@ def run_one_contact(
     pushed_q, pushed_v = np.zeros(push_index.size), np.zeros(push_index.size)
     linear = contacts.law_kind[0] == LAW_LINEAR and contacts.alpha[0] == 0.0
     now = _Contact(0.0, 0.0, contacts.gap[0] + row @ q, 0.0, 0.0, True, 0.0, 0)
-    rubs = contacts.law_kind[0] == LAW_RUBBING
-    contact_loss, friction_loss, release_loss = 0.0, 0.0, 0.0
+    remembers = contacts.law_kind[0] >= LAW_RUBBING
+    contact_loss, memory_loss, release_loss = 0.0, 0.0, 0.0
     damped = Damped(0.0, True, _damped_energy(S, L, 0.0) if losses.damped else 0.0)
 
     for place in range(record.force.shape[0]):
@@ -331,8 +341,8 @@ def run_one_contact(
             for k in range(push_index.size):
                 free += row[push_index[k]] * pushed_q[k]
             now, loss = _press(contacts, linear, now, free)
-            if rubs:
-                friction_loss += loss
+            if remembers:
+                memory_loss += loss
             else:
                 contact_loss += loss
             if losses.damped:
@@ -360,7 +370,7 @@ def run_one_contact(
         contact_loss,
         release_loss,
         damping,
-        friction_loss,
+        memory_loss,
         now.gap,
         now.e,
     )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.rubbing_law import RubbingLaw
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError, require_nonnegative
 from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
@@ -122,7 +123,7 @@ class ReducedSystem:
                 expected="distinct names and at least one contact",
                 hint="rename a body or add a ContactPair.",
             )
-        self._check_rubbing()
+        self._check_memory()
         for contact in self.contacts:
             self._check_axial(contact.body_a, contact.port_a)
             self._check_axial(contact.body_b, contact.port_b)
@@ -150,14 +151,14 @@ class ReducedSystem:
         owner = self.body(body)
         return np.asarray(owner.port_shapes)[:, owner.port_index(port)]
 
-    def _check_rubbing(self) -> None:
-        rubbing = [c for c in self.contacts if isinstance(c.law, RubbingLaw)]
-        if rubbing and (len(self.contacts) > 1 or rubbing[0].series_compliance > 0.0):
+    def _check_memory(self) -> None:
+        remembering = [c for c in self.contacts if isinstance(c.law, RubbingLaw | YieldingLaw)]
+        if remembering and (len(self.contacts) > 1 or remembering[0].series_compliance > 0.0):
             raise InputError(
-                f"contact {rubbing[0].body_a}.{rubbing[0].port_a}",
-                got="a law with friction beside other contacts or a series compliance",
+                f"contact {remembering[0].body_a}.{remembering[0].port_a}",
+                got="a law with memory beside other contacts or a series compliance",
                 expected="one contact, all of whose compliance is in modes and law",
-                hint="leave the friction of the faces out.",
+                hint="leave friction and yield of the faces out.",
             )
 
     def _check_axial(self, name: str, port: str) -> None:

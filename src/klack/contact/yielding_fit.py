@@ -1,0 +1,61 @@
+r"""Law of faces that yield from the static loops of the two full bodies.
+
+Of every approach the kept modes carry their share, :math:`d = \delta - c P`, closing and opening
+alike: the share is linear, so that it drops out of every loop.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from klack.contact.yielding_law import YieldingLaw
+from klack.errors import InputError
+from klack.plasticity.loops import YieldingLoops
+
+__all__ = ["yielding_law"]
+
+Floats = NDArray[np.float64]
+
+_STATES, _PLACES = 129, 65
+"""Of the tables: the elastic curve within 1e-4 of the force, the loss within 1e-4 of itself."""
+
+
+def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
+    """Law for a reduced model.
+
+    Parameters
+    ----------
+    loops : YieldingLoops
+        With at least four states.
+    modal_compliance : float [m/N]
+        Of the kept modes, see :func:`klack.contact.local_law.consistent_law`.
+
+    Raises
+    ------
+    InputError
+        If the modes carry so much that the rest is not monotone.
+    """
+    force = loops.force
+    largest = np.array([s.approach for s in loops.states]) - modal_compliance * force
+    places = (np.arange(_PLACES) / (_PLACES - 1)) ** 2
+    shapes = np.zeros((len(force), _PLACES))
+    for i, one in enumerate(loops.openings):
+        d = one.approach - modal_compliance * one.force
+        if not np.all(np.diff(d) > 0.0):
+            raise InputError(
+                "law of faces that yield",
+                got=f"modes with more than the static compliance below {force[i]:.4g} N",
+                expected="a remainder that rises with the force",
+                hint="keep fewer modes.",
+            )
+        along = PchipInterpolator((d - d[0]) / (d[-1] - d[0]), one.force / one.force[-1])
+        shapes[i] = along(places)
+    parted = np.array([one.set for one in loops.openings])
+    parted[0] = min(parted[0], 0.0)
+    fine = largest[0] + (largest[-1] - largest[0]) * (np.arange(_STATES) / (_STATES - 1)) ** 2
+    return YieldingLaw(
+        largest=fine,
+        set=PchipInterpolator(largest, parted)(fine),
+        force=PchipInterpolator(largest, force)(fine),
+        shape=PchipInterpolator(largest, shapes)(fine),
+    )

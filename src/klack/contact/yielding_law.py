@@ -1,0 +1,174 @@
+r"""Contact law of faces that yield: closing once on one curve, opening on others.
+
+The largest indentation so far, :math:`d_m`, is all that the faces remember.  Below it they are
+elastic,
+
+.. math:: F = P(d_m)\, \varphi\Bigl(\frac{d - d_0(d_m)}{d_m - d_0(d_m)}; d_m\Bigr), \qquad
+    \varphi(0) = 0, \quad \varphi(1) = 1 ,
+
+with the set :math:`d_0` that has stayed; beyond it they close along :math:`P(d)` and yield.  The
+plastic loss is the difference of the work of closing and of the elastic energy,
+
+.. math:: D(d_m) = \int_0^{d_m} P\, \mathrm dd - (d_m - d_0)\, P \int_0^1 \varphi\, \mathrm ds ,
+
+and never falls.  Linear between the states of the ladder, all three; so are the shapes between
+their points, for exact energies.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.contact.laws import FlatLaw
+from klack.contact.step_constants import LAW_YIELDING
+from klack.errors import InputError
+
+__all__ = ["YieldingLaw"]
+
+Floats = NDArray[np.float64]
+
+_LEAST_LOSS = -1e-6  # share of the work by which the loss may fall between two states
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class YieldingLaw:
+    """Loading curve and elastic curves of faces that yield.
+
+    Parameters
+    ----------
+    largest : array, shape (m,) [m]
+        Indentations of the states, increasing; nothing has yielded at the first one.
+    set : array, shape (m,) [m]
+        Indentation at which the faces part after each; 0 at the first.
+    force : array, shape (m,) [N]
+        Of closing, at ``largest``; increasing.
+    shape : array, shape (m, n) [-]
+        Elastic force over ``force`` at ``n`` places from the set to the largest indentation,
+        ``(k / (n - 1))**2`` of the way; from 0 to 1.
+    reached : float [m]
+        Largest indentation so far; up to the first state nothing has yielded.
+
+    Raises
+    ------
+    InputError
+        Where the loss would fall as the faces are pressed further.
+    """
+
+    largest: Floats
+    set: Floats
+    force: Floats
+    shape: Floats
+    reached: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("largest", "set", "force", "shape"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+        falls = float(np.min(np.diff(self.loss), initial=0.0))
+        rising = all(
+            np.all(np.diff(a) > 0) for a in (self.largest, self.force, self.largest - self.set)
+        )
+        if not rising or falls < _LEAST_LOSS * self.taken[-1]:
+            raise InputError(
+                "law of faces that yield",
+                got=f"a loss that falls by {-falls:.2g} J, or a force that does",
+                expected="a force and a loss that rise with the indentation",
+                hint="a finer mesh at the contact, or fewer modes.",
+            )
+
+    @property
+    def places(self) -> Floats:
+        """Places of ``shape`` over the way from the set to the largest indentation [-]."""
+        n = self.shape.shape[1]
+        return np.asarray((np.arange(n) / (n - 1)) ** 2)
+
+    @property
+    def stored(self) -> Floats:
+        """Elastic energy [J] at each state."""
+        area = np.trapezoid(self.shape, self.places, axis=1)
+        return np.asarray(self.force * (self.largest - self.set) * area)
+
+    @property
+    def taken(self) -> Floats:
+        """Work of closing [J] up to each state."""
+        more = np.diff(self.largest) * (self.force[1:] + self.force[:-1]) / 2.0
+        return self.stored[0] + np.concatenate([[0.0], np.cumsum(more)])
+
+    @property
+    def loss(self) -> Floats:
+        """Plastic loss [J] up to each state."""
+        return np.asarray(self.taken - self.stored)
+
+    def require(self, reached: float) -> None:
+        """Refuse an indentation [m] beyond the last state.
+
+        Raises
+        ------
+        InputError
+        """
+        if reached > self.largest[-1] * (1.0 + 1e-9):
+            raise InputError(
+                "law of faces that yield",
+                got=f"an indentation of {reached * 1e6:.4g} um",
+                expected=f"at most {self.largest[-1] * 1e6:.4g} um, {self.force[-1]:.4g} N, where "
+                "its static loops end",
+                hint="compute the loops for a higher energy.",
+            )
+
+    def after(self, reached: float) -> Self:
+        """Return the law of the same faces after they were pressed as far as ``reached`` [m]."""
+        return replace(self, reached=max(reached, self.reached))
+
+    def force_along(self, indentation: ArrayLike) -> Floats:
+        """Force [N] of the faces as they are now, along the elastic curve and beyond it."""
+        d = np.asarray(indentation, dtype=float)
+        deep = max(self.reached, float(self.largest[0]))
+        at = np.interp(deep, self.largest, np.arange(self.largest.size))
+        i = min(int(at), self.largest.size - 2)
+        share = at - i
+        shape = (1 - share) * self.shape[i] + share * self.shape[i + 1]
+        parted = float(np.interp(deep, self.largest, self.set))
+        way = np.sqrt(np.clip((d - parted) / (deep - parted), 0.0, 1.0))
+        k = way * (shape.size - 1)
+        below = np.minimum(k.astype(int), shape.size - 2)
+        inside = (way**2 - self.places[below]) / np.diff(self.places)[below]
+        elastic = shape[below] + inside * np.diff(shape)[below]
+        closing = np.interp(d, self.largest, self.force)
+        return np.where(d > deep, closing, np.interp(deep, self.largest, self.force) * elastic)
+
+    def set_after(self, reached: float) -> float:
+        """Set [m] after the faces were pressed as far as ``reached`` [m]."""
+        return float(np.interp(reached, self.largest, self.set))
+
+    def loss_after(self, reached: float) -> float:
+        """Plastic loss [J] after the faces were pressed as far as ``reached`` [m]."""
+        return float(np.interp(reached, self.largest, self.loss))
+
+    def flat(self) -> FlatLaw:
+        """Return the law as plain numbers for the kernel."""
+        integrals = np.concatenate(
+            [
+                np.zeros((len(self.shape), 1)),
+                np.cumsum(
+                    np.diff(self.places) * (self.shape[:, 1:] + self.shape[:, :-1]) / 2.0, axis=1
+                ),
+            ],
+            axis=1,
+        )
+        deep = max(self.reached, float(self.largest[0]))
+        sizes = [float(self.largest.size), float(self.shape.shape[1]), deep, deep]
+        return FlatLaw(
+            kind=LAW_YIELDING,
+            parameters=np.concatenate(
+                [
+                    sizes,
+                    self.largest,
+                    self.set,
+                    self.force,
+                    self.taken,
+                    self.shape.ravel(),
+                    integrals.ravel(),
+                ]
+            ),
+        )
