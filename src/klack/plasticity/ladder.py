@@ -27,7 +27,8 @@ __all__ = ["LoadingState", "YieldingContact"]
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 15  # of one step
+_ROUNDS = 20  # of one step
+_FREE = 4  # of them without a look at what came out of the last one
 _HALVED = 12  # steps that are halved on the way to one approach
 _SMALL = 1e-9  # forces out of balance, and change of the contact forces, over their size
 
@@ -119,19 +120,23 @@ class YieldingContact:
         space = self.space
         q = space.gap - (self._start + approach) * space.axial
         lam, w, active = self._lam, [body.w for body in self.bodies], self._active
+        best = np.inf
         for rounds in range(1, _ROUNDS + 1):
             answers = [
                 body.answer(lam, one, loading=rounds == 1)
                 for body, one in zip(self.bodies, w, strict=True)
             ]
             new, active = self._closed(q, lam, answers, active)
+            worst = max((answer.residual for answer in answers), default=0.0)
+            # points that yield in every other round: half a step lies between
+            part = 0.5 if rounds > _FREE and worst > 0.5 * best else 1.0
+            best = min(best, worst) if rounds > 1 else np.inf
             w = [
-                one + answer.step + answer.along @ (new - lam)
+                one + part * (answer.step + answer.along @ (new - lam))
                 for one, answer in zip(w, answers, strict=True)
             ]
             change, size = float(np.abs(new - lam).max()), float(new.max())
-            worst = max((answer.residual for answer in answers), default=0.0)
-            lam = new
+            lam = lam + part * (new - lam)
             if rounds > 1 and worst < _SMALL and change <= _SMALL * size:
                 force = float(space.axial @ lam)
                 check_state(
