@@ -28,7 +28,7 @@ imports at first use, so arrows that begin there are not counted."""
 FLOORS: tuple[tuple[str, ...], ...] = (
     # ground: errors, units, files that are whole or not there
     ("errors", "closing", "cores", "swapped_names", "progress"),
-    ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance"),
+    ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance", "hardening"),
     ("units", "unit_systems", "materials", "signals", "held_folder", "cache"),
     ("folder_lock", "stages"),
     ("compiling",),
@@ -38,6 +38,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("mesh",),
     ("elasticity", "model_files"),
     ("contact", "reduction"),
+    ("plasticity",),
     # the valve as a network of components
     ("network",),
     ("hydraulics", "magnetics"),
