@@ -129,7 +129,7 @@ class EnergyBooks:
 
     @property
     def throughput(self) -> float:
-        """Larger of what came in and what was spent or stored [J]: the scale of the residual."""
+        """Larger of what came in and what was spent or stored [J], the scale of the residual."""
         rises = {key: self.stores_after[key] - self.stores_before[key] for key in self.stores_after}
         incoming = [*self.supplies.values(), *(-x for x in self.losses.values())]
         incoming += [-x for x in rises.values()]
