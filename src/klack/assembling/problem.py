@@ -108,17 +108,14 @@ class ContactProblem(PlacedBodies):
             key="contact.friction",
         )
 
-    @cached_property
-    def yielding(self) -> YieldingLoops | None:
-        """Static loops with yield; None where no material has a yield stress.
+    @property
+    def has_yield(self) -> tuple[bool, bool]:
+        """Whether any material of the upper and of the lower body has a yield stress."""
+        upper, lower = self._loaded
+        return upper.yields, lower.yields
 
-        They take the static solutions: first used before :meth:`close`.
-
-        Raises
-        ------
-        InputError
-            For bodies of three dimensions.
-        """
+    @property
+    def _loaded(self) -> tuple[LoadedBody, LoadedBody]:
         upper, lower = (
             LoadedBody(
                 body=body,
@@ -130,7 +127,21 @@ class ContactProblem(PlacedBodies):
                 (self.pair.lower, self.flexibility_lower),
             )
         )
-        if not (upper.yields or lower.yields):
+        return upper, lower
+
+    @cached_property
+    def yielding(self) -> YieldingLoops | None:
+        """Static loops with yield; None where no material has a yield stress.
+
+        They take the static solutions: first used before :meth:`close`.
+
+        Raises
+        ------
+        InputError
+            For bodies of three dimensions.
+        """
+        upper, lower = self._loaded
+        if not any(self.has_yield):
             return None
         space, C = self.space, self.static.compliance
         while True:

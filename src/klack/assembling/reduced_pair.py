@@ -29,8 +29,11 @@ from klack.contact.rubbing_fit import RubbingFit
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import StaticContact
 from klack.contact.submodel import LocalStiffness, local_stiffness
+from klack.contact.yielding_law import YieldingLaw
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
+from klack.plasticity.loops import YieldingLoops
+from klack.plasticity.yielding_fit import yielding_law
 from klack.reduction.ports import Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -81,16 +84,24 @@ class ReducedPair:
         Of the full bodies, with the friction that ``law`` has.
     rubbing : RubbingFit or None
         The law with memory of faces with friction, made of ``local`` and static loops.
+
+    Faces that yield have a :class:`klack.contact.yielding_law.YieldingLaw`, beside the elastic one
+    in ``local``.
     """
 
     upper: ReducedBody
     lower: ReducedBody
     ports: tuple[Port, Port]
-    law: ContactLaw | RubbingLaw
+    law: ContactLaw | RubbingLaw | YieldingLaw
     local: LocalLaw | None
     pattern_force: float
     static: StaticContact | RubbingContact
     rubbing: RubbingFit | None = None
+
+    @property
+    def yields(self) -> bool:
+        """Whether its law has the yield of the faces."""
+        return isinstance(self.law, YieldingLaw)
 
 
 def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
@@ -118,6 +129,7 @@ def own_pair(
     *,
     stiffness: float,
     recovery: bool = False,
+    loops: YieldingLoops | None = None,
 ) -> ReducedPair:
     """Reduce both bodies as in the case; see :func:`reduce_pair`.
 
@@ -139,6 +151,7 @@ def own_pair(
                 selection=selection,
                 stiffness=stiffness,
                 recovery=recovery,
+                loops=loops,
             )
         except OverfullModesError:
             fewer = {name: _fewer(choice) for name, choice in selection.items()}
@@ -172,6 +185,7 @@ def reduce_pair(
     selection: Mapping[str, ModeSelection],
     stiffness: float,
     recovery: bool = False,
+    loops: YieldingLoops | None = None,
 ) -> ReducedPair:
     """Reduce both bodies at the contact, with the port pattern taken at the peak force.
 
@@ -185,12 +199,16 @@ def reduce_pair(
         Of the local contact, for corrections that do not compute their own law.
     recovery : bool
         Keep the displacement of all named surfaces.
+    loops : YieldingLoops or None
+        Of faces that yield, for the consistent law; None for elastic bodies.
     """
     static = _static(problem, correction)
     force = 0.7 * static.max_force
     for _ in range(_PATTERN_ROUNDS):
         with trial() as caught:
-            pair = _reduce_at(problem, pools, force, correction, selection, stiffness, recovery)
+            pair = _reduce_at(
+                problem, pools, force, correction, selection, stiffness, recovery, loops
+            )
             peak = float(
                 np.max(simulate_bodies(problem.case, pair.upper, pair.lower, pair.law).peak_force)
             )
@@ -210,6 +228,7 @@ def _reduce_at(
     selection: Mapping[str, ModeSelection],
     stiffness: float,
     recovery: bool,
+    loops: YieldingLoops | None,
 ) -> ReducedPair:
     static = _static(problem, correction)
     load_upper, load_lower = static.load_patterns(force)
@@ -229,10 +248,14 @@ def _reduce_at(
         )
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )
+    law: ContactLaw | RubbingLaw | YieldingLaw
     law, local = _law(problem, correction, upper, lower, stiffness)
     fit = None
     if isinstance(static, RubbingContact) and local is not None:
         fit = fitted_loops(static, local, key="contact.friction")
+    elif loops is not None and local is not None:
+        modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
+        law = yielding_law(loops, modal)
     return ReducedPair(
         upper=upper,
         lower=lower,
@@ -326,7 +349,7 @@ def impact_system(
     case: Case,
     upper: ReducedBody,
     lower: ReducedBody,
-    law: ContactLaw | RubbingLaw,
+    law: ContactLaw | RubbingLaw | YieldingLaw,
     *,
     ports: tuple[str, str] = (PORT, PORT),
     series_compliance: float = 0.0,
@@ -366,7 +389,7 @@ def impact_system(
 
 
 def simulate_bodies(
-    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw | RubbingLaw
+    case: Case, upper: ReducedBody, lower: ReducedBody, law: ContactLaw | RubbingLaw | YieldingLaw
 ) -> ImpactHistory:
     """Impact of two reduced bodies, as the case starts it."""
     return simulate_impact(
@@ -386,6 +409,7 @@ def static_curve(pair: ReducedPair) -> tuple[NDArray[np.float64], NDArray[np.flo
     """Points (indentation [m], force [N]) of the local law, for a picture."""
     if pair.local is not None:
         return np.append(0.0, pair.local.force_indentation), np.append(0.0, pair.local.force)
+    assert not isinstance(pair.law, YieldingLaw)
     indentation = np.linspace(0.0, _indentation_at(pair.law, 1.2 * pair.pattern_force), 50)
     return indentation, pair.law.force(indentation)
 

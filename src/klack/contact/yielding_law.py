@@ -100,6 +100,14 @@ class YieldingLaw:
         """Plastic loss [J] up to each state."""
         return np.asarray(self.taken - self.stored)
 
+    @property
+    def stiffest(self) -> float:
+        """Highest stiffness [N/m] of closing and of all openings."""
+        slope = np.max(np.diff(self.shape, axis=1) / np.diff(self.places), axis=1)
+        opening = self.force / (self.largest - self.set) * slope
+        closing = np.diff(self.force) / np.diff(self.largest)
+        return float(max(opening.max(), closing.max()))
+
     def require(self, reached: float) -> None:
         """Refuse an indentation [m] beyond the last state.
 

@@ -19,13 +19,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.compile import flatten
-from klack.simulation.system import ReducedSystem
+from klack.simulation.system import ContactPair, ReducedSystem
 
 __all__ = [
     "ModalModel",
@@ -382,6 +383,17 @@ def _motion(
     )
 
 
+def _without_memory(contact: ContactPair) -> InterfaceLaw:
+    if isinstance(contact.law, YieldingLaw):
+        raise InputError(
+            f"contact {contact.body_a}.{contact.port_a}",
+            got="a law of faces that yield",
+            expected="a law without memory",
+            hint="export the bodies without a yield stress.",
+        )
+    return contact.law
+
+
 def _contacts(
     system: ReducedSystem,
     names: Sequence[str],
@@ -394,7 +406,7 @@ def _contacts(
             name=identifier(names[c]),
             shape=rows[c],
             gap=contact.gap - float(rows[c] @ rest),
-            law=contact.law,
+            law=_without_memory(contact),
             series_compliance=contact.series_compliance,
             film=films[c] if films else None,
         )

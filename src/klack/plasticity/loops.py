@@ -36,7 +36,8 @@ _STATES = 32
 _GROWTH = 1.15
 """Force from one state of the ladder to the next."""
 
-_MOST = 400
+_FEWEST, _MOST = 5, 400
+"""States: a law needs some, even where the energy ends just above first yield."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,7 +164,8 @@ def yielding_loops(
         states.append(state)
         openings.append(opening(space, solver, state.plastic_gap, state.approach))
         taken.append(0.0)
-        if openings[-1].energy - closing * state.approach > energy:
+        enough = openings[-1].energy - closing * state.approach > energy
+        if enough and len(states) >= _FEWEST:
             break
     first = openings[0]
     curve = PchipInterpolator(

@@ -18,6 +18,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.yielding_law import YieldingLaw
 from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact_arrays import Contacts, Losses, StepMatrices, Watched
@@ -184,8 +185,10 @@ def propose_step(system: ReducedSystem, *, speed: float) -> float:
     return float(max(m for m in (1.0, 2.0, 5.0) if m * decade <= limit * (1 + 1e-12)) * decade)
 
 
-def _stiffest(law: InterfaceLaw, speed: float, yielding: float) -> float:
+def _stiffest(law: InterfaceLaw | YieldingLaw, speed: float, yielding: float) -> float:
     """Tangent stiffness at the depth that would store all energy of approach."""
+    if isinstance(law, YieldingLaw):
+        return law.stiffest
     energy = 0.5 * speed**2 / yielding if yielding else 0.5e-3 * speed**2
     depth = 1e-9
     while law.potential(depth) > energy > 0.0:

@@ -27,7 +27,7 @@ class ContactPair:
     ----------
     body_a, port_a, body_b, port_b : str
         Both ports point along +z (a contact port made of ``G_b^T lam`` must be turned round).
-    law : LinearLaw, HertzLaw, TableLaw, HuntCrossley, or RubbingLaw of a single contact
+    law : LinearLaw, HertzLaw, TableLaw, HuntCrossley; RubbingLaw or YieldingLaw of a single contact
         Of the compliance that neither the modes nor ``series_compliance`` carry.
     gap : float [m]
         At the start.
@@ -39,7 +39,7 @@ class ContactPair:
     port_a: str
     body_b: str
     port_b: str
-    law: InterfaceLaw
+    law: InterfaceLaw | YieldingLaw
     gap: float
     series_compliance: float = 0.0
 

@@ -29,6 +29,12 @@ from klack.analyses.impact.record import (
 from klack.analyses.impact.section import section_picture
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
+from klack.analyses.impact.yielding_level import (
+    doubt_elastic_levels,
+    elastic_twin,
+    static_loops_of,
+    tell_yield,
+)
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_summary import BodySummary, summarise_body
@@ -66,6 +72,7 @@ from klack.contact.restitution import Deviation
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
 from klack.errors import InputError
+from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, silent
 from klack.reduction.reduce import Correction
 from klack.reduction.transfer import TransferComparison
@@ -252,6 +259,8 @@ def _study(
         with warnings_of("modes of the case"):
             preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
+        has_law = {"reduced", "reduced-participation"} & set(wanted)
+        loops = static_loops_of(problem, clock) if has_law else None
         own, classical = preview, None
         if isinstance(case.contact.local_law, SubmodelLocalLaw):
             classical = classical_stiffness(problem, peak)
@@ -259,20 +268,27 @@ def _study(
         elif is_last:
             what = "the stiffness of the contact zone alone"
             classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
+        if loops is not None:
+            with warnings_of("modes of the case"):
+                own = own_pair(problem, pools, stiffness=first_stiffness(problem), loops=loops)
         clock("radiating surfaces", 0.0)
         structures = impact_structures(problem, pools, own)
         clock("radiating surfaces", 1.0)
         clock("reduced", 0.5)
         results: dict[str, LevelResult] = {}
+        twins: dict[str, ImpactHistory] = {}
         for level in wanted:
             if level == "lumped":
                 with attempts.at(level):
                     results[level] = run_lumped(problem)
             elif level.startswith("reduced"):
                 with attempts.at(level), warnings_of(f"level '{level}'"):
-                    pair = own if level == "reduced" else _variant(level, problem, pools)
-                    setup = clock.spent(_SET_UP)
+                    pair = own if level == "reduced" else _variant(level, problem, pools, loops)
+                    setup = clock.spent((*_SET_UP, *(["faces that yield"] if pair.yields else [])))
                     results[level] = _run_variant(case, level, pair, setup_time=setup)
+                    if pair.yields:
+                        twins[level] = elastic_twin(problem, pair)
+                        tell_yield(results[level], twins[level], _surfaces(case))
         clock("reduced", 1.0)
         if "interface" in wanted:
             with attempts.at("interface"), warnings_of("level 'interface'"):
@@ -281,7 +297,7 @@ def _study(
         if certify and reduced:
             certificate = for_comparison(
                 "the error estimate",
-                lambda: _certificate(problem, pools, results, clock),
+                lambda: _certificate(problem, pools, results, twins, clock),
             )
         certificate = certificate or _Certificate()
         transfer: tuple[TransferComparison, ...] = ()
@@ -307,7 +323,10 @@ def _study(
                 sections = _sections(problem, run)
         attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
-    _take_better(results, certificate)
+    if twins:
+        results = doubt_elastic_levels(results, twins)
+    else:
+        _take_better(results, certificate)
     reference = best_level(results)
     compared = deviations(results, reference)
     missing = failure_notes(attempts.texts)
@@ -388,11 +407,13 @@ def _certificate(
     problem: ContactProblem,
     pools: Mapping[str, Modes],
     results: Mapping[str, LevelResult],
+    twins: Mapping[str, ImpactHistory],
     clock: StageClock,
 ) -> _Certificate:
     """Deviation of every reduced level from one interface-level run with more modes.
 
-    The same run with half as many modes tells whether it can serve as a reference.
+    The same run with half as many modes tells whether it can serve as a reference.  Its bodies are
+    elastic: levels with yield are measured by ``twins`` without it.
     """
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
@@ -416,9 +437,13 @@ def _certificate(
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("error estimate", 1.0)
+    histories = {name: twins.get(name, results[name].history) for name in whole}
+    basis = f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points"
+    if twins:
+        basis += ", both with elastic bodies"
     return _Certificate(
-        estimates={name: compare_histories(history, results[name].history) for name in whole},
-        basis=f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points",
+        estimates={name: compare_histories(history, one) for name, one in histories.items()},
+        basis=basis,
         spread=compare_histories(history, fewer).history_l2,
         doubt=next(iter(level.doubts), ""),
         level=level,
@@ -436,7 +461,12 @@ def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> 
         results["interface"] = replace(level, label=f"{level.label}, run for the estimate")
 
 
-def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) -> ReducedPair:
+def _variant(
+    level: str,
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    loops: YieldingLoops | None,
+) -> ReducedPair:
     names = (problem.pair.upper.name, problem.pair.lower.name)
     selection = {name: selection_of(problem.case.reduction.choice(name)) for name in names}
     if level == "reduced-participation":
@@ -447,6 +477,7 @@ def _variant(level: str, problem: ContactProblem, pools: Mapping[str, Modes]) ->
         correction=_CORRECTIONS[level],
         selection=selection,
         stiffness=_USUAL_STIFFNESS,
+        loops=loops,
     )
 
 
@@ -466,6 +497,8 @@ _CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none":
 def _law_words(pair: ReducedPair) -> str:
     if pair.rubbing is not None:
         return f"consistent law with friction (losses within {100 * pair.rubbing.error:.2g} %)"
+    if pair.yields:
+        return "consistent law with yield"
     if pair.local is not None:
         return "consistent law"
     if isinstance(pair.law, LinearLaw):

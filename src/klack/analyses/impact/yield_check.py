@@ -86,8 +86,9 @@ def check_yield(
     if told:
         warnings.warn(
             f"contact {surfaces} yields before the {format_si(force, 'N', 3)} of this impact: "
-            f"{' and '.join(told)}. Forces and restitution here are those of elastic bodies: the "
-            "first impact on new faces is softer and returns less.",
+            f"{' and '.join(told)}. Elastic levels are too hard there: the first impact on new "
+            "faces is softer and returns less. Only the reduced level of klack impact has yield, "
+            "in the meridian plane.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -1,0 +1,115 @@
+"""``klack impact`` of bodies that yield."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.analyses.impact.run import run_impact
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import impact_system
+from klack.case.reader import read_case
+from klack.contact.yielding_law import YieldingLaw
+from klack.errors import InputError
+from klack.exchange.modal_model import _without_memory
+from klack.plasticity.loops import YieldingLoops
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.compile import propose_step
+
+SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
+YIELD = ", yield: 280 MPa, hardening: {isotropic: 1 GPa}"
+
+
+def _case(given=YIELD, *changes):
+    text = SPHERES.read_text("utf-8")
+    assert YIELD in text
+    text = text.replace(YIELD, given)
+    for old, new in (
+        ("reduced_step: 10 ns", "reduced_step: 10 ns, interface_step: 5 ns"),
+        *changes,
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    return read_case(text, SPHERES)
+
+
+@cache
+def _study(given=YIELD, levels=("reduced", "interface"), *changes):
+    return run_impact(_case(given, *changes), levels=levels)
+
+
+def test_the_answer_is_that_of_the_level_with_yield():
+    """Conservation: the loss of the impact is that of the static loops at its peak force.
+
+    Two per cent: the loops have a state every 15 % of the force, and the law is read between them.
+    """
+    study = _study()
+    reduced = study.levels["reduced"]
+    loops = build_problem(_case(), lambda *_: None).yielding
+    assert isinstance(loops, YieldingLoops)
+
+    assert study.reference == "reduced"
+    assert "with yield" in reduced.label
+    assert not reduced.doubts
+    assert abs(reduced.energy_residual) < 1e-12
+    lost = float(np.interp(reduced.measures.peak_force, loops.force, loops.loss))
+    assert reduced.energies["plastic"] == pytest.approx(lost, rel=0.02)
+    assert 0.01 < lost / reduced.energies["initial kinetic"] < 0.6
+
+
+def test_elastic_levels_are_doubted_and_measured_by_their_own_kind():
+    """Exact: the estimate of the elastic case; the port's pattern is that of another peak, 1e-5."""
+    study, elastic = _study(), _study("")
+
+    assert any("Try: level reduced, which has it" in d for d in study.levels["interface"].doubts)
+    assert study.levels["interface"].measures == elastic.levels["interface"].measures
+    assert study.levels["reduced"].measures.restitution < 0.99 * (
+        elastic.levels["reduced"].measures.restitution
+    )
+    found, known = study.estimates["reduced"], elastic.estimates["reduced"]
+    assert found.peak_force == pytest.approx(known.peak_force, abs=1e-5)
+    assert found.history_l2 == pytest.approx(known.history_l2, abs=1e-5)
+    assert "both with elastic bodies" in study.estimate_basis
+    assert any("first impact on new faces: yield takes" in text for text in study.warnings)
+
+
+def test_a_high_yield_stress_changes_no_bit():
+    """Exact."""
+    hard, elastic = _study(", yield: 4 GPa"), _study("")
+
+    for level in elastic.levels:
+        np.testing.assert_array_equal(
+            hard.levels[level].history.force, elastic.levels[level].history.force
+        )
+        assert not hard.levels[level].doubts
+    assert hard.reference == elastic.reference
+
+
+def test_yield_beside_friction_is_left_out_aloud():
+    study = _study(YIELD, ("reduced",), ("  gap: 0 um", "  gap: 0 um\n  friction: 0.1"))
+
+    assert "plastic" not in study.levels["reduced"].energies or (
+        study.levels["reduced"].energies["plastic"] == 0.0
+    )
+    assert any("its law has either friction or yield" in text for text in study.warnings)
+
+
+def test_a_law_without_a_step_of_its_own_and_an_export():
+    """Bad input: exported models have no memory."""
+    law = YieldingLaw(
+        largest=np.array([1e-6, 2e-6]),
+        set=np.array([0.0, 5e-7]),
+        force=np.array([100.0, 150.0]),
+        shape=np.tile(np.linspace(0.0, 1.0, 5) ** 2, (2, 1)),
+    )
+    # the steepest line: 150 N over 1.5 um between two places of (i/4)^2 is 1 of the secant
+    assert law.stiffest == pytest.approx(1e8, rel=1e-12)
+    system = impact_system(
+        _case(), rigid_mass_body("a", 1e-3, port="contact"), fixed_body("b", port="contact"), law
+    )
+
+    # a hundredth of the half period of that mass on that spring, in steps of 1, 2 and 5
+    assert 5e-8 <= propose_step(system, speed=0.1) <= 0.01 * np.pi * np.sqrt(1e-3 / 1e8)
+    with pytest.raises(InputError, match="without a yield stress"):
+        _without_memory(system.contacts[0])
