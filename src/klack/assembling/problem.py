@@ -19,6 +19,7 @@ from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
 from klack.plasticity.loops import YieldingLoops
+from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
 
@@ -143,6 +144,24 @@ class ContactProblem(PlacedBodies):
         upper, lower = self._loaded
         if not any(self.has_yield):
             return None
+        return self.flexibility_upper.remembered(
+            "static loops with yield",
+            (
+                self.flexibility_lower.key,
+                self.space.gap,
+                self.static.compliance,
+                self.static.approach,
+                *upper.plastic_numbers,
+                *lower.plastic_numbers,
+                impact_energy(self.case, self.pair),
+                closing_force(self.case),
+            ),
+            lambda: self._loops(upper, lower),
+            loops_to_entry,
+            loops_of_entry,
+        )
+
+    def _loops(self, upper: LoadedBody, lower: LoadedBody) -> YieldingLoops:
         space, C = self.space, self.static.compliance
         while True:
             try:

@@ -1,7 +1,7 @@
 """Static loops of a contact whose bodies yield, in the meridian plane."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,15 @@ class LoadedBody:
     def yields(self) -> bool:
         """Whether any of its solids may yield."""
         return any(material.hardening is not None for material in self.materials.values())
+
+    @property
+    def plastic_numbers(self) -> tuple[str | float, ...]:
+        """Names of its solids that may yield, each with yield stress and both slopes [Pa]."""
+        found: list[str | float] = []
+        for solid, material in sorted(self.materials.items()):
+            if material.hardening is not None:
+                found += [solid, *astuple(material.hardening)]
+        return tuple(found)
 
     def elements_near(self, place: Floats, radius: float) -> NDArray[np.bool_]:
         """Elements that may yield, within a radius of a place [m], shape (n_elements,)."""

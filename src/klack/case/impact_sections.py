@@ -229,6 +229,15 @@ class Run(Section):
     transfer: TransferSweep | None = Field(
         default=None, description="Transfer functions to compare."
     )
+    impacts: int = Field(
+        default=1,
+        ge=1,
+        le=1000,
+        description="Impacts of the same start, one after another on the same faces that yield.",
+    )
+    run_in: bool = Field(
+        default=False, description="Further impacts until the faces do not yield any more."
+    )
 
     @model_validator(mode="after")
     def _steps(self) -> Self:

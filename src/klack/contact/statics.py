@@ -39,6 +39,7 @@ __all__ = [
     "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
+    "half_width_of",
     "highest_load",
     "points_across",
     "ring_radius",
@@ -314,7 +315,7 @@ def static_contact(
         pressures=pressures,
         area=active @ space.area,
         active_count=active.sum(axis=1),
-        half_width=np.array([_half_width(space, lam) for lam in pressures]),
+        half_width=np.array([half_width_of(space, lam) for lam in pressures]),
         compliance=C,
     )
     check_rim(result)
@@ -369,8 +370,8 @@ def _approach_for(ladder: _Ladder, target: float) -> float:
     )
 
 
-def _half_width(space: ContactSpace, lam: NDArray[np.float64]) -> float:
-    """Half width from second moments of the pressure.
+def half_width_of(space: ContactSpace, lam: NDArray[np.float64]) -> float:
+    """Half width [m] of a contact from second moments of its pressure.
 
     Semi-elliptic over a strip of half width b: variance b^2/4.  Hertzian over a circle of radius
     a: mean square distance 2 a^2/5.  A single row of hats of elements of size h spreads its load

@@ -24,6 +24,7 @@ from scipy.interpolate import PchipInterpolator
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
+from klack.contact.statics import half_width_of
 from klack.plasticity.ladder import LoadingState, YieldingContact
 
 __all__ = ["Opening", "YieldingLoops", "opening", "yielding_loops"]
@@ -81,6 +82,8 @@ class YieldingLoops:
     openings : tuple of Opening
     taken : array, shape (n,) [J]
         Work of closing up to each state.
+    half_width : array, shape (n,) [m]
+        Of the contact at each state: half the width of the land that it leaves.
     """
 
     first_yield: float
@@ -88,6 +91,7 @@ class YieldingLoops:
     states: tuple[LoadingState, ...]
     openings: tuple[Opening, ...]
     taken: Floats
+    half_width: Floats
 
     @property
     def loss(self) -> Floats:
@@ -152,7 +156,12 @@ def yielding_loops(
     low = contact.first_yield(deepest)
     if low is None:
         return YieldingLoops(
-            first_yield=float("inf"), elastic=elastic, states=(), openings=(), taken=np.empty(0)
+            first_yield=float("inf"),
+            elastic=elastic,
+            states=(),
+            openings=(),
+            taken=np.empty(0),
+            half_width=np.empty(0),
         )
     states, openings, taken = [contact.load(low)], [as_made(low)], [as_made(low).energy]
     slope = openings[0].force[-1] - openings[0].force[-2]
@@ -178,4 +187,5 @@ def yielding_loops(
         states=tuple(states),
         openings=tuple(openings),
         taken=np.array([float(curve.integrate(0.0, state.approach)) for state in states]),
+        half_width=np.array([half_width_of(space, state.pressures) for state in states]),
     )

@@ -21,6 +21,7 @@ from klack.analyses.impact.pressure_figure import pressure_figure
 from klack.analyses.impact.pressure_view import study_views
 from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.impact.record import ImpactStudy, LevelResult
+from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.impact.section_figure import section_figure
 from klack.analyses.impact.summary import no_estimate
 from klack.analyses.impact.wording import answer
@@ -66,6 +67,7 @@ def report_content(study: ImpactStudy) -> Content:
     sections.append(Section(title="Force over time", charts=named("force")))
     sections.append(_pressure(study))
     sections.append(_friction(study))
+    sections.append(_running_in(study))
     sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
     if transfer:
         sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
@@ -223,6 +225,25 @@ def _friction(study: ImpactStudy) -> Section:
         title=title,
         picture=friction_figure(views),
         tables=(Table(columns=("", *(r.label for r in rubbing)), rows=tuple(rows)),),
+    )
+
+
+def _running_in(study: ImpactStudy) -> Section:
+    """Impacts on the same faces side by side; empty where there was one."""
+    title, found = "Running in", study.running_in
+    if found is None:
+        return Section(title=title)
+    text = (
+        f"{len(found.peak_force)} impacts at {quantity(study.speed, 'm/s', 3)} on the same faces, "
+        "level reduced. The land is the strip that has been in contact, as wide as an elliptic "
+        "pressure of the same second moment."
+    )
+    if not found.run_in:
+        text += " The faces still yield at the last one: run.run_in: true adds what is missing."
+    return Section(
+        title=title,
+        paragraphs=(text,),
+        tables=(Table(columns=running_in_columns(found), rows=running_in_rows(found, quantity)),),
     )
 
 

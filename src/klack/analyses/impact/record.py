@@ -26,6 +26,7 @@ __all__ = [
     "LevelResult",
     "ModalEnergy",
     "PressureRecord",
+    "RunningIn",
     "SectionPicture",
 ]
 
@@ -233,6 +234,37 @@ class SectionPicture:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class RunningIn:
+    """Impacts of the same start, one after another on the same faces, at the level reduced.
+
+    Parameters
+    ----------
+    asked : int
+        Impacts that were asked for; those of running-in follow them.
+    peak_force : array, shape (n,) [N]
+    contact_time : array, shape (n,) [s]
+    restitution : array, shape (n,) [-]
+    lost : array, shape (n,) [J]
+        In yield, of each impact.
+    set : array, shape (n,) [m]
+        After each impact: how much lower the bodies touch than new ones.
+    land : array, shape (n,) [m]
+        Width of the strip that has been in contact at the highest force so far.
+    run_in : bool
+        The last impact does not yield any more.
+    """
+
+    asked: int
+    peak_force: NDArray[np.float64]
+    contact_time: NDArray[np.float64]
+    restitution: NDArray[np.float64]
+    lost: NDArray[np.float64]
+    set: NDArray[np.float64]
+    land: NDArray[np.float64]
+    run_in: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ImpactStudy(CaseRecord):
     """All levels of one dry impact, side by side.
 
@@ -259,6 +291,8 @@ class ImpactStudy(CaseRecord):
     sections : tuple of SectionPicture
     failures : mapping of str to str
         Why a level that was asked for has no result, by its name.
+    running_in : RunningIn or None
+        Where faces yield and more than one impact was asked for.
     """
 
     speed: float
@@ -277,6 +311,7 @@ class ImpactStudy(CaseRecord):
     structures: tuple[Structure, ...] = ()
     estimate_doubt: str = ""
     failures: Mapping[str, str] = field(default_factory=dict)
+    running_in: RunningIn | None = None
 
     @property
     def estimates_settled(self) -> bool:

@@ -1,5 +1,6 @@
 """``klack impact``: one dry impact at the requested levels, overlaid."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -26,6 +27,7 @@ from klack.analyses.impact.record import (
     LevelResult,
     SectionPicture,
 )
+from klack.analyses.impact.running_in import running_in
 from klack.analyses.impact.section import section_picture
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
@@ -71,7 +73,7 @@ from klack.contact.laws import LinearLaw
 from klack.contact.restitution import Deviation
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, silent
 from klack.reduction.reduce import Correction
@@ -289,6 +291,14 @@ def _study(
                     if pair.yields:
                         twins[level] = elastic_twin(problem, pair)
                         tell_yield(results[level], twins[level], _surfaces(case))
+        ran = running_in(case, own, loops) if loops is not None and "reduced" in results else None
+        if ran is None and (case.run.impacts > 1 or case.run.run_in):
+            warnings.warn(
+                "run.impacts: all impacts are like the first, for no level with yield was computed "
+                "or nothing yields. Try: level reduced and a material with 'yield'.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         clock("reduced", 1.0)
         if "interface" in wanted:
             with attempts.at("interface"), warnings_of("level 'interface'"):
@@ -349,6 +359,7 @@ def _study(
             *trust_notes(results, reference, compared),
         ),
         failures=attempts.texts,
+        running_in=ran,
         estimates=certificate.estimates,
         estimate_basis=certificate.basis,
         estimate_spread=certificate.spread,

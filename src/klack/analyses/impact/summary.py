@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from typing_extensions import TypedDict
 
@@ -14,11 +16,13 @@ from klack.analyses.impact.measures import (
     LEVEL_MEASURES,
     PEAK_FORCE,
 )
-from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.json_parts import ContactJson
-from klack.analyses.measures import json_of, text_table, with_measures
+from klack.analyses.impact.record import ImpactStudy, LevelResult, RunningIn
+from klack.analyses.impact.running_in import running_in_columns, running_in_rows
+from klack.analyses.json_parts import ContactJson, Real
+from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.contact.restitution import Deviation
 from klack.terminal.tables import TextTable
+from klack.units import format_si
 
 __all__ = [
     "DeviationJson",
@@ -44,6 +48,19 @@ class LevelJson(TypedDict):
     doubts: Annotated[list[str], Field(description="Why the level may be wrong.")]
 
 
+class RunningInJson(TypedDict):
+    """Impacts one after another on the same faces, a number each."""
+
+    asked: int
+    run_in: Annotated[bool, Field(description="The last one does not yield any more.")]
+    peak_force_N: list[Real]
+    contact_time_s: list[Real]
+    restitution: list[Real]
+    lost_J: Annotated[list[Real], Field(description="In yield.")]
+    set_m: Annotated[list[Real], Field(description="How much lower the bodies touch after it.")]
+    land_m: Annotated[list[Real], Field(description="Width of the strip in contact so far.")]
+
+
 class ImpactJson(TypedDict):
     """``klack impact`` and ``klack demo``."""
 
@@ -66,6 +83,9 @@ class ImpactJson(TypedDict):
         Field(description="Of every reduced level, by a run at the interface level."),
     ]
     contact: Annotated[ContactJson, Field(description="All levels but lumped share it.")]
+    running_in: Annotated[
+        RunningInJson | None, Field(description="Null for one impact, or elastic faces.")
+    ]
     warnings: list[str]
 
 
@@ -99,6 +119,7 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
             for name, item in study.estimates.items()
         },
         "contact": contact_to_json(study.contact),
+        "running_in": None if study.running_in is None else _running_in(study.running_in),
         "warnings": list(study.warnings),
     }
 
@@ -112,6 +133,12 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     if line := elastic_above(study.contact):
         yield line
     yield from estimate_lines(study)
+    if found := study.running_in:
+        yield TextTable(
+            title="Running in",
+            columns=running_in_columns(found),
+            rows=running_in_rows(found, format_si),
+        )
 
 
 def study_measured(study: ImpactStudy) -> Iterator[Measured]:
@@ -179,6 +206,22 @@ def _signed(value: float, digits: int) -> str:
 
 def _level(result: LevelResult) -> Any:
     return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts)}
+
+
+def _running_in(found: RunningIn) -> RunningInJson:
+    def numbers(values: NDArray[np.float64]) -> list[Real]:
+        return [number_or_none(float(value)) for value in values]
+
+    return {
+        "asked": found.asked,
+        "run_in": found.run_in,
+        "peak_force_N": numbers(found.peak_force),
+        "contact_time_s": numbers(found.contact_time),
+        "restitution": numbers(found.restitution),
+        "lost_J": numbers(found.lost),
+        "set_m": numbers(found.set),
+        "land_m": numbers(found.land),
+    }
 
 
 def _deviation(deviation: Deviation) -> Any:
