@@ -35,7 +35,7 @@ def test_running_in_follows_the_recursion_of_two_energies():
     """
     case = _case("impacts: 3, run_in: true")
     problem = build_problem(case, lambda *_: None)
-    loops = problem.yielding
+    loops = problem.yielding(lambda *_: None)
     assert loops is not None
     pair = own_pair(
         problem,

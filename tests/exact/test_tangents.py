@@ -14,6 +14,7 @@ from numba.core.registry import cpu_target
 from klack.compiling.jit import inner, njit
 from klack.compiling.tangent_number import tangent_number, with_tangents
 from klack.contact.rubbing_law import RubbingLaw
+from klack.contact.yielding_law import YieldingLaw
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ConstantForce
 from klack.mechanics.rigid_mass import RigidMass
@@ -249,6 +250,62 @@ def test_sliders_carry_their_derivatives():
         largest = max(abs(value) for value in exact.values())
         for name, value in exact.items():
             assert abs(found[name] - value) < 1e-3 * largest, (formula.__name__, name)
+
+
+# --------------------------------------------------------------------------- faces that yield
+
+YIELDING = {"mass": MASS, "speed": 1.0, "stiffness": STIFFNESS, "share": 0.6}
+
+
+def yielding(mass: float, speed: float, stiffness: float, share: float) -> Rows:
+    """A mass that flies against faces that close with a share of the stiffness they open with."""
+    largest = np.linspace(1e-10, 60e-6, 3)
+    law = YieldingLaw(
+        largest=largest,
+        set=largest * (1 - share),
+        closing=share * stiffness * largest,
+        shape=np.tile((np.arange(17) / 16) ** 2, (3, 1)),
+    )
+    stop = EndStop(gap=20e-6, law=LinearStopLaw(kind="linear", stiffness=stiffness)).with_law(law)
+    parts = {
+        "ball": RigidMass(mass=mass, speed=speed),
+        "stop": stop,
+        "push": ConstantForce(force=AGAIN),
+    }
+    joints = [["ball.body", "stop.lower", "push.end"], ["stop.upper", "ground"]]
+    return Network(parts, joints).rows()
+
+
+AGAIN = 60.0  # [N] that press the ball against the stop a second time
+
+
+def test_faces_that_yield_carry_their_derivatives():
+    """Truth: differences of runs; the first peak by its energy."""
+    given = {"duration": 300e-6, "step": 5e-9, "coarse": 1, "start": "free"}
+    run = tangents(yielding, YIELDING, **given)
+
+    reads = {
+        "first force": lambda result: result.events[0].peak_force,
+        "second force": lambda result: result.events[1].peak_force,
+        "second touch": lambda result: result.events[1].time,
+    }
+    for what, read in reads.items():
+        found, differences = slopes(run, YIELDING, read), {}
+        for name, value in YIELDING.items():
+            ends = [
+                read(simulate_network(yielding(**YIELDING | {name: value * (1 + way)}), **given))
+                for way in (1e-3, -1e-3)
+            ]
+            differences[name] = (ends[0] - ends[1]) / 2e-3
+        largest = max(abs(value) for value in differences.values())
+        for name, value in differences.items():
+            # runs know their touches to a step
+            accepted = 5e-9 / 2e-3 if what == "second touch" else 2e-3 * largest
+            assert abs(found[name] - value) < accepted, (what, name, found, differences)
+    first = simulate_network(yielding(**YIELDING), **given).events[0]
+    energy = 0.5 * MASS * YIELDING["speed"] ** 2 + AGAIN * 20e-6
+    force = AGAIN + sqrt(AGAIN**2 + 2 * STIFFNESS * YIELDING["share"] * energy)
+    assert first.peak_force == pytest.approx(force, rel=1e-4)
 
 
 # --------------------------------------------------------------------------- two elastic balls

@@ -94,7 +94,7 @@ def test_a_law_without_a_step_of_its_own_and_an_export():
     law = YieldingLaw(
         largest=np.array([1e-6, 2e-6]),
         set=np.array([0.0, 5e-7]),
-        force=np.array([100.0, 150.0]),
+        closing=np.array([100.0, 150.0]),
         shape=np.tile(np.linspace(0.0, 1.0, 5) ** 2, (2, 1)),
     )
     # the steepest line: 150 N over 1.5 um between two places of (i/4)^2 is 1 of the secant

@@ -23,7 +23,7 @@ def _two_lines(end=10e-6, states=40):
     return YieldingLaw(
         largest=largest,
         set=largest * (1 - RATIO),
-        force=LOADING * largest,
+        closing=LOADING * largest,
         shape=np.tile((np.arange(17) / 16) ** 2, (states, 1)),
     )
 
@@ -76,9 +76,9 @@ def test_elastic_curve_and_closing_meet():
     law = _two_lines().after(4e-6)
     around = 4e-6 + 1e-12 * np.array([-1.0, 1.0])
 
-    assert law.force_along(around) == pytest.approx(LOADING * 4e-6, rel=1e-5)
-    assert law.force_along(law.set_after(4e-6)) == 0.0
-    assert law.force_along(3e-6) == pytest.approx(ELASTIC * (3e-6 - 4e-6 * (1 - RATIO)), rel=1e-12)
+    assert law.force(around) == pytest.approx(LOADING * 4e-6, rel=1e-5)
+    assert law.force(law.set_after(4e-6)) == 0.0
+    assert law.force(3e-6) == pytest.approx(ELASTIC * (3e-6 - 4e-6 * (1 - RATIO)), rel=1e-12)
 
 
 def test_impact_beyond_the_last_state_is_refused():
@@ -91,7 +91,7 @@ def test_loss_that_falls_is_refused():
     law = _two_lines()
     with pytest.raises(InputError, match="a loss that falls"):
         YieldingLaw(
-            largest=law.largest, set=law.set[::-1] * 0, force=law.force, shape=law.shape**0.01
+            largest=law.largest, set=law.set[::-1] * 0, closing=law.closing, shape=law.shape**0.01
         )
 
 
@@ -106,7 +106,7 @@ def test_random_drives_lose_and_never_gain():
         left = largest * rng.uniform(0.0, 0.8) * (1 - np.exp(-largest / 5e-6))
         shape = np.tile((np.arange(33) / 32) ** (2 * rng.uniform(1.0, 1.5)), (60, 1))
         try:
-            law = YieldingLaw(largest=largest, set=left, force=force, shape=shape)
+            law = YieldingLaw(largest=largest, set=left, closing=force, shape=shape)
         except InputError:
             continue
         run += 1

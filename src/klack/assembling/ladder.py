@@ -17,7 +17,7 @@ from klack.contact.statics import (
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress
 
-__all__ = ["closing_force", "effective_mass", "impact_energy", "static_ladder"]
+__all__ = ["closing_force", "effective_mass", "impact_energy", "static_ladder", "wider_space"]
 
 # The first estimate of the compliance loads the points that touch first.
 _FIRST_POINTS = 48
@@ -104,6 +104,18 @@ def static_ladder(
         break
     progress("static contact", 1.0)
     return static
+
+
+def wider_space(pair: BodyPair, space: ContactSpace) -> ContactSpace:
+    """Contact points of the same surfaces with twice the reach; it ends with whole surfaces."""
+    return contact_space(
+        pair.upper.mesh,
+        pair.upper_surface,
+        pair.lower.mesh,
+        pair.lower_surface,
+        reach=_REACH_GROWTH * space.reach,
+        slave=space.slave,
+    )
 
 
 def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibility) -> float:

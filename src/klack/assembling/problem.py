@@ -4,30 +4,32 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from klack.assembling.bodies import BodyPair, build_bodies
-from klack.assembling.ladder import closing_force, impact_energy, static_ladder
+from klack.assembling.ladder import (
+    closing_force,
+    impact_energy,
+    static_ladder,
+    wider_space,
+)
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.assembling.rubbing import static_loops
-from klack.assembling.yielding import LoadedBody, loops_with_yield
+from klack.assembling.yielding import LoadedBody, law_loops
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
-from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.mortar import ContactSpace
 from klack.contact.pairing import axial_distance
-from klack.contact.statics import ReachError, StaticContact, extended_compliance
+from klack.contact.statics import ReachError, StaticContact
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
 from klack.plasticity.loops import YieldingLoops
-from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
 _USUAL_MODES = 50  # of a case that asks for a frequency
-
-_REACH_GROWTH = 2.0  # ends with the whole surfaces, which have no border
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,14 +111,16 @@ class ContactProblem(PlacedBodies):
             key="contact.friction",
         )
 
-    @property
-    def has_yield(self) -> tuple[bool, bool]:
-        """Whether any material of the upper and of the lower body has a yield stress."""
-        upper, lower = self._loaded
-        return upper.yields, lower.yields
+    def yielding(self, progress: Progress) -> YieldingLoops | None:
+        """Static loops of faces that yield, for a law; None where it stays elastic.
 
-    @property
-    def _loaded(self) -> tuple[LoadedBody, LoadedBody]:
+        They take the static solutions: asked for before :meth:`close`.
+
+        Warns
+        -----
+        AccuracyWarning
+            Where yield is left out though the materials have it.
+        """
         upper, lower = (
             LoadedBody(
                 body=body,
@@ -128,57 +132,17 @@ class ContactProblem(PlacedBodies):
                 (self.pair.lower, self.flexibility_lower),
             )
         )
-        return upper, lower
-
-    @cached_property
-    def yielding(self) -> YieldingLoops | None:
-        """Static loops with yield; None where no material has a yield stress.
-
-        They take the static solutions: first used before :meth:`close`.
-
-        Raises
-        ------
-        InputError
-            For bodies of three dimensions.
-        """
-        upper, lower = self._loaded
-        if not any(self.has_yield):
-            return None
-        return self.flexibility_upper.remembered(
-            "static loops with yield",
-            (
-                self.flexibility_lower.key,
-                self.space.gap,
-                self.static.compliance,
-                self.static.approach,
-                *upper.plastic_numbers,
-                *lower.plastic_numbers,
-                impact_energy(self.case, self.pair),
-                closing_force(self.case),
-            ),
-            lambda: self._loops(upper, lower),
-            loops_to_entry,
-            loops_of_entry,
+        return law_loops(
+            self.static,
+            upper,
+            lower,
+            self.wider,
+            energy=impact_energy(self.case, self.pair),
+            closing=closing_force(self.case),
+            friction=self.case.contact.faces.static,
+            key="contact.friction",
+            progress=progress,
         )
-
-    def _loops(self, upper: LoadedBody, lower: LoadedBody) -> YieldingLoops:
-        space, C = self.space, self.static.compliance
-        while True:
-            try:
-                return loops_with_yield(
-                    self.static,
-                    space,
-                    C,
-                    upper,
-                    lower,
-                    energy=impact_energy(self.case, self.pair),
-                    closing=closing_force(self.case),
-                )
-            except ReachError as error:
-                space = self.wider(space, error)
-                C = extended_compliance(
-                    space, self.static, self.flexibility_upper, self.flexibility_lower
-                )
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
         """Contact points of the same surfaces with twice the reach.
@@ -192,15 +156,7 @@ class ContactProblem(PlacedBodies):
         """
         if self.case.contact.reach is not None or self.opposite is not None:
             raise error
-        pair = self.pair
-        return contact_space(
-            pair.upper.mesh,
-            pair.upper_surface,
-            pair.lower.mesh,
-            pair.lower_surface,
-            reach=_REACH_GROWTH * space.reach,
-            slave=space.slave,
-        )
+        return wider_space(self.pair, space)
 
 
 def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:

@@ -13,21 +13,26 @@ import numpy as np
 
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
-from klack.assembling.ladder import effective_mass, static_ladder
+from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
+from klack.assembling.yielding import LoadedBody, law_loops
 from klack.case.valve import ValveCase
+from klack.case.valve_consistency import is_consistent
 from klack.case.valve_sections import CaseStop
 from klack.contact.laws import ContactLaw, LinearLaw, TableLaw
 from klack.contact.local_law import LocalLaw, consistent_law
-from klack.contact.mortar import touching_shift
+from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.rubbing_law import RubbingLaw
-from klack.contact.statics import StaticContact
+from klack.contact.statics import ReachError, StaticContact
+from klack.contact.yielding_law import YieldingLaw
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.rigid import Pose
+from klack.plasticity.loops import YieldingLoops
+from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
@@ -45,6 +50,8 @@ __all__ = [
     "stop_law",
     "without_bulk",
 ]
+
+StopTable = TableLaw | RubbingLaw | YieldingLaw
 
 _FIRST_FORCE = 0.7  # of the end of the ladder: about the peak of an impact of elastic bodies
 _ROUNDS = 3
@@ -72,6 +79,8 @@ class StopContact:
         speed of the case.
     rubbing : RubbingContact or None
         The same with friction between the faces.
+    loops : YieldingLoops or None
+        Of faces that yield.
     """
 
     name: str
@@ -80,6 +89,7 @@ class StopContact:
     ports: tuple[Port, Port]
     pattern_force: float
     rubbing: RubbingContact | None = None
+    loops: YieldingLoops | None = None
 
     @property
     def closing(self) -> StaticContact:
@@ -100,17 +110,17 @@ class StopFaces:
     ----------
     local : LocalLaw
         While the faces close, with its shares.
-    law : TableLaw or RubbingLaw
-        All that the modes miss; with memory where faces have friction.
-    faces : TableLaw or RubbingLaw
+    law : TableLaw, RubbingLaw or YieldingLaw
+        All that the modes miss; with memory where faces have friction or yield.
+    faces : TableLaw, RubbingLaw or YieldingLaw
         The same without the bulk, which a film presses on as well.
     bulk : float [m/N]
         Series compliance behind ``faces``.
     """
 
     local: LocalLaw
-    law: TableLaw | RubbingLaw
-    faces: TableLaw | RubbingLaw
+    law: StopTable
+    faces: StopTable
     bulk: float
 
 
@@ -150,16 +160,65 @@ def build_stop(
             rubbing = static_loops(
                 static, pair, upper, lower, stop.friction, key=_friction_key(name)
             )
+    loops = None
+    if is_consistent(case.network.components[name]):
+        with warnings_of(f"stop '{name}'"):
+            loops = _loops(case, stop, pair, flexibility, static, progress, name)
     loaded = static if rubbing is None else rubbing
-    contact = _contact_at(_FIRST_FORCE * loaded.max_force, name, pair, static, rubbing)
+    found = StopContact(
+        name=name,
+        pair=pair,
+        static=static,
+        ports=_ports_at(_FIRST_FORCE * loaded.max_force, pair, loaded),
+        pattern_force=_FIRST_FORCE * loaded.max_force,
+        rubbing=rubbing,
+        loops=loops,
+    )
     for _ in range(_ROUNDS):
         with trial():  # the law of the stop comes with all its ports, and says what it lacks
-            peak = _peak_force(case, stop, contact, flexibility, pools)
-        settled = abs(peak - contact.pattern_force) <= _SETTLED * contact.pattern_force
-        contact = _contact_at(min(peak, loaded.max_force), name, pair, static, rubbing)
+            peak = _peak_force(case, stop, found, flexibility, pools)
+        settled = abs(peak - found.pattern_force) <= _SETTLED * found.pattern_force
+        force = min(peak, loaded.max_force)
+        found = replace(found, ports=_ports_at(force, pair, loaded), pattern_force=force)
         if settled:
             break
-    return contact
+    return found
+
+
+def _loops(
+    case: ValveCase,
+    stop: CaseStop,
+    pair: BodyPair,
+    flexibilities: list[Flexibility],
+    static: StaticContact,
+    progress: Progress,
+    name: str,
+) -> YieldingLoops | None:
+    upper, lower = (
+        LoadedBody(
+            body=body,
+            flexibility=flexibility,
+            materials=case.materials_of(body.name, body.mesh.solids),
+        )
+        for body, flexibility in zip((pair.upper, pair.lower), flexibilities, strict=True)
+    )
+
+    def wider(space: ContactSpace, error: ReachError) -> ContactSpace:
+        if stop.reach is not None:
+            raise error
+        return wider_space(pair, space)
+
+    return law_loops(
+        static,
+        upper,
+        lower,
+        wider,
+        energy=0.5 * effective_mass(pair) * stop.speed**2,
+        closing=stop.force,
+        friction=stop.friction,
+        key=_friction_key(name),
+        progress=progress,
+    )
 
 
 def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> StopFaces:
@@ -175,6 +234,11 @@ def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> St
         i = body.port_index(port.name)
         modal += float(body.modal_compliance[i, i])
     local, rubbing, key = consistent_law(contact.closing, modal), contact.rubbing, contact.key
+    if contact.loops is not None:
+        yielding = yielding_law(contact.loops, modal)
+        D = bulk_compliance(local, yielding)
+        faces = yielding_law(contact.loops, modal + D)
+        return StopFaces(local=local, law=yielding, faces=faces, bulk=D)
     fit = None if rubbing is None else fitted_loops(rubbing, local, key=key)
     law = local.law if fit is None else fit.law
     D = bulk_compliance(local, law)
@@ -185,19 +249,19 @@ def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> St
     return StopFaces(local=local, law=law, faces=beside.law if fit is None else fit.law, bulk=D)
 
 
-def bulk_compliance(local: LocalLaw, law: TableLaw | RubbingLaw) -> float:
+def bulk_compliance(local: LocalLaw, law: StopTable) -> float:
     r"""Compliance [m/N] of the bulk behind the faces, in series with them and with a film.
 
     .. math:: \delta_{loc}(P) = \delta_{faces}(P) + D P, \qquad D = 0.9 \min \delta_{loc}'(P)
 
     A squeeze film lies between the faces, beside their contact, and presses on the same bulk.  The
     bulk yields in proportion to the force, whatever presses; what is left grows with the contact
-    zone and stays monotone.  Faces with friction are stiffest where all of them hold, and *D* is
-    0.9 of their compliance there.
+    zone and stays monotone.  Faces with friction are stiffest where all of them hold, faces that
+    yield where they open, and *D* is 0.9 of their compliance there.
     """
     force, indentation = np.append(0.0, local.force), np.append(0.0, local.force_indentation)
     least = float(np.min(np.diff(indentation) / np.diff(force)))
-    if isinstance(law, RubbingLaw):
+    if not isinstance(law, TableLaw):
         least = min(least, 1.0 / float(np.max(law.tangent_stiffness(indentation))))
     return _BULK_SHARE * least
 
@@ -243,22 +307,12 @@ def _friction_key(stop: str) -> str:
     return f"stops.{stop}.friction"
 
 
-def _contact_at(
-    force: float,
-    name: str,
-    pair: BodyPair,
-    static: StaticContact,
-    rubbing: RubbingContact | None,
-) -> StopContact:
+def _ports_at(
+    force: float, pair: BodyPair, loaded: StaticContact | RubbingContact
+) -> tuple[Port, Port]:
     """Ports in the shape of the pressure, and of the friction, at a force."""
-    load_upper, load_lower = (static if rubbing is None else rubbing).load_patterns(force)
-    ports = (
-        Port(pair.upper_surface.name, load_upper),
-        Port(pair.lower_surface.name, -load_lower),
-    )
-    return StopContact(
-        name=name, pair=pair, static=static, ports=ports, pattern_force=force, rubbing=rubbing
-    )
+    load_upper, load_lower = loaded.load_patterns(force)
+    return Port(pair.upper_surface.name, load_upper), Port(pair.lower_surface.name, -load_lower)
 
 
 def _peak_force(
@@ -284,7 +338,7 @@ def _peak_force(
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )
     secant = static.max_force / float(static.approach[-1])
-    law: ContactLaw | RubbingLaw = LinearLaw(secant)
+    law: ContactLaw | RubbingLaw | YieldingLaw = LinearLaw(secant)
     if case.reduction.correction == "consistent":
         law = stop_law(touching, upper, lower).law
     contact = ContactPair(

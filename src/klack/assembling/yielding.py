@@ -1,6 +1,11 @@
-"""Static loops of a contact whose bodies yield, in the meridian plane."""
+"""Static loops of a contact whose bodies yield, in the meridian plane.
 
-from collections.abc import Mapping
+The same for the contact of an impact and an end stop of a valve.  Where a law has no yield though
+the materials do, a warning says so and the law stays elastic.
+"""
+
+import warnings
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -8,18 +13,20 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.contact.mortar import ContactSpace
-from klack.contact.statics import StaticContact
+from klack.contact.statics import ReachError, StaticContact, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
-from klack.errors import ConvergenceError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.materials import Material
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.loops import YieldingLoops, yielding_loops
 from klack.plasticity.radial_return import von_mises_of_strain
+from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.plasticity.yielding_body import YieldingBody
 from klack.plasticity.zone import plastic_zone, strain_points
+from klack.progress import Progress
 
-__all__ = ["LoadedBody", "loops_with_yield"]
+__all__ = ["LoadedBody", "law_loops", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +75,91 @@ class LoadedBody:
             yields = self.materials[block.solid].hardening is not None
             near.append((np.linalg.norm(middle - place, axis=1) < radius) & yields)
         return np.concatenate(near)
+
+
+def law_loops(
+    static: StaticContact,
+    upper: LoadedBody,
+    lower: LoadedBody,
+    wider: Callable[[ContactSpace, ReachError], ContactSpace],
+    *,
+    energy: float,
+    closing: float,
+    friction: float,
+    key: str,
+    progress: Progress,
+) -> YieldingLoops | None:
+    """Static loops for the law of a reduced model; None where it stays elastic.
+
+    They are kept in the cache of the upper body.  Bodies of three dimensions are told of by
+    :func:`klack.analyses.impact.yield_check.check_yield`.
+
+    Parameters
+    ----------
+    static : StaticContact
+        Of the elastic bodies, beyond that energy.
+    upper, lower : LoadedBody
+    wider : callable
+        Contact points of the same surfaces that reach further, or the error again.
+    energy : float [J]
+    closing : float [N]
+        Force that keeps working while the bodies approach.
+    friction : float [-]
+        Between the faces: a law has one of the two.
+    key : str
+        Of the friction in the case, for words.
+    progress : callable
+
+    Warns
+    -----
+    AccuracyWarning
+        Where yield is left out though the materials have it.
+    """
+    if not (upper.yields or lower.yields) or upper.body.dimension != 2:
+        return None
+    left = "the reduced level leaves out the yield of its faces"
+    if friction > 0.0:
+        warnings.warn(
+            f"{left}: its law has either friction or yield. Try: the case without {key} beside it.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return None
+    progress("faces that yield", 0.0)
+
+    def computed() -> YieldingLoops:
+        space, C = static.space, static.compliance
+        while True:
+            try:
+                return loops_with_yield(
+                    static, space, C, upper, lower, energy=energy, closing=closing
+                )
+            except ReachError as error:
+                space = wider(space, error)
+                C = extended_compliance(space, static, upper.flexibility, lower.flexibility)
+
+    try:
+        loops = upper.flexibility.remembered(
+            "static loops with yield",
+            (
+                lower.flexibility.key,
+                static.space.gap,
+                static.compliance,
+                static.approach,
+                *upper.plastic_numbers,
+                *lower.plastic_numbers,
+                energy,
+                closing,
+            ),
+            computed,
+            loops_to_entry,
+            loops_of_entry,
+        )
+    except (ConvergenceError, InputError) as error:
+        warnings.warn(f"{left}: {error}", AccuracyWarning, stacklevel=2)
+        return None
+    progress("faces that yield", 1.0)
+    return loops if loops.states else None
 
 
 def loops_with_yield(

@@ -12,7 +12,8 @@ plastic loss is the difference of the work of closing and of the elastic energy,
 .. math:: D(d_m) = \int_0^{d_m} P\, \mathrm dd - (d_m - d_0)\, P \int_0^1 \varphi\, \mathrm ds ,
 
 and never falls.  Linear between the states of the ladder, all three; so are the shapes between
-their points, for exact energies.
+their points, for exact energies.  Beyond the last state closing goes straight on, and the faces
+open along its shape.
 """
 
 from dataclasses import dataclass, replace
@@ -42,10 +43,10 @@ class YieldingLaw:
         Indentations of the states, increasing; nothing has yielded at the first one.
     set : array, shape (m,) [m]
         Indentation at which the faces part after each; 0 at the first.
-    force : array, shape (m,) [N]
-        Of closing, at ``largest``; increasing.
+    closing : array, shape (m,) [N]
+        Force of closing at ``largest``; increasing.
     shape : array, shape (m, n) [-]
-        Elastic force over ``force`` at ``n`` places from the set to the largest indentation,
+        Elastic force over ``closing`` at ``n`` places from the set to the largest indentation,
         ``(k / (n - 1))**2`` of the way; from 0 to 1.
     reached : float [m]
         Largest indentation so far; up to the first state nothing has yielded.
@@ -58,22 +59,21 @@ class YieldingLaw:
 
     largest: Floats
     set: Floats
-    force: Floats
+    closing: Floats
     shape: Floats
     reached: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("largest", "set", "force", "shape"):
+        for name in ("largest", "set", "closing", "shape"):
             object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
         falls = float(np.min(np.diff(self.loss), initial=0.0))
-        rising = all(
-            np.all(np.diff(a) > 0) for a in (self.largest, self.force, self.largest - self.set)
-        )
-        if not rising or falls < _LEAST_LOSS * self.taken[-1]:
+        rising = all(np.all(np.diff(a) > 0) for a in (self.largest, self.closing))
+        apart = bool(np.all(self.set < self.largest))
+        if not (rising and apart) or falls < _LEAST_LOSS * self.taken[-1]:
             raise InputError(
                 "law of faces that yield",
                 got=f"a loss that falls by {-falls:.2g} J, or a force that does",
-                expected="a force and a loss that rise with the indentation",
+                expected="a force and a loss that rise with the indentation, and faces that part",
                 hint="a finer mesh at the contact, or fewer modes.",
             )
 
@@ -87,12 +87,12 @@ class YieldingLaw:
     def stored(self) -> Floats:
         """Elastic energy [J] at each state."""
         area = np.trapezoid(self.shape, self.places, axis=1)
-        return np.asarray(self.force * (self.largest - self.set) * area)
+        return np.asarray(self.closing * (self.largest - self.set) * area)
 
     @property
     def taken(self) -> Floats:
         """Work of closing [J] up to each state."""
-        more = np.diff(self.largest) * (self.force[1:] + self.force[:-1]) / 2.0
+        more = np.diff(self.largest) * (self.closing[1:] + self.closing[:-1]) / 2.0
         return self.stored[0] + np.concatenate([[0.0], np.cumsum(more)])
 
     @property
@@ -104,8 +104,8 @@ class YieldingLaw:
     def stiffest(self) -> float:
         """Highest stiffness [N/m] of closing and of all openings."""
         slope = np.max(np.diff(self.shape, axis=1) / np.diff(self.places), axis=1)
-        opening = self.force / (self.largest - self.set) * slope
-        closing = np.diff(self.force) / np.diff(self.largest)
+        opening = self.closing / (self.largest - self.set) * slope
+        closing = np.diff(self.closing) / np.diff(self.largest)
         return float(max(opening.max(), closing.max()))
 
     def require(self, reached: float) -> None:
@@ -119,8 +119,8 @@ class YieldingLaw:
             raise InputError(
                 "law of faces that yield",
                 got=f"an indentation of {reached * 1e6:.4g} um",
-                expected=f"at most {self.largest[-1] * 1e6:.4g} um, {self.force[-1]:.4g} N, where "
-                "its static loops end",
+                expected=f"at most {self.largest[-1] * 1e6:.4g} um, {self.closing[-1]:.4g} N, "
+                "where its static loops end",
                 hint="compute the loops for a higher energy.",
             )
 
@@ -128,26 +128,51 @@ class YieldingLaw:
         """Return the law of the same faces after they were pressed as far as ``reached`` [m]."""
         return replace(self, reached=max(reached, self.reached))
 
-    def force_along(self, indentation: ArrayLike) -> Floats:
+    def force(self, indentation: ArrayLike) -> Floats:
         """Force [N] of the faces as they are now, along the elastic curve and beyond it."""
+        return self._along(indentation)[0]
+
+    def potential(self, indentation: ArrayLike) -> Floats:
+        """Work [J] that closing the faces as they are now takes."""
+        return self._along(indentation)[1]
+
+    def tangent_stiffness(self, indentation: ArrayLike) -> Floats:
+        """Largest slope [N/m] of all states, whatever the indentation; 0 while open."""
+        return np.where(np.asarray(indentation, dtype=float) > 0.0, self.stiffest, 0.0)
+
+    def _along(self, indentation: ArrayLike) -> tuple[Floats, Floats]:
+        """Force and work of closing the faces as they are now."""
         d = np.asarray(indentation, dtype=float)
         deep = max(self.reached, float(self.largest[0]))
         at = np.interp(deep, self.largest, np.arange(self.largest.size))
         i = min(int(at), self.largest.size - 2)
         share = at - i
         shape = (1 - share) * self.shape[i] + share * self.shape[i + 1]
-        parted = float(np.interp(deep, self.largest, self.set))
-        way = np.sqrt(np.clip((d - parted) / (deep - parted), 0.0, 1.0))
-        k = way * (shape.size - 1)
-        below = np.minimum(k.astype(int), shape.size - 2)
-        inside = (way**2 - self.places[below]) / np.diff(self.places)[below]
-        elastic = shape[below] + inside * np.diff(shape)[below]
-        closing = np.interp(d, self.largest, self.force)
-        return np.where(d > deep, closing, np.interp(deep, self.largest, self.force) * elastic)
+        parted = self.set_after(deep)
+        top, taken = self._closing(np.array(deep))
+        way = np.clip((d - parted) / (deep - parted), 0.0, 1.0)
+        below = np.minimum((np.sqrt(way) * (shape.size - 1)).astype(int), shape.size - 2)
+        x = way - self.places[below]
+        slope = (np.diff(shape) / np.diff(self.places))[below]
+        area = np.cumsum(np.diff(self.places) * (shape[1:] + shape[:-1]) / 2.0)
+        area = np.append(0.0, area)
+        elastic = top * (shape[below] + slope * x)
+        stored = top * (deep - parted) * (area[below] + x * (shape[below] + 0.5 * slope * x))
+        closing, work = self._closing(d)
+        full = top * (deep - parted) * area[-1]
+        return np.where(d > deep, closing, elastic), np.where(d > deep, full + work - taken, stored)
+
+    def _closing(self, d: Floats) -> tuple[Floats, Floats]:
+        """Force and work of the closing curve, which goes straight on behind its last state."""
+        i = np.clip(np.searchsorted(self.largest, d) - 1, 0, self.largest.size - 2)
+        slope = (np.diff(self.closing) / np.diff(self.largest))[i]
+        x = d - self.largest[i]
+        return self.closing[i] + slope * x, self.taken[i] + x * (self.closing[i] + 0.5 * slope * x)
 
     def set_after(self, reached: float) -> float:
         """Set [m] after the faces were pressed as far as ``reached`` [m]."""
-        return float(np.interp(reached, self.largest, self.set))
+        beyond = max(reached - float(self.largest[-1]), 0.0)
+        return float(np.interp(reached, self.largest, self.set)) + beyond
 
     def loss_after(self, reached: float) -> float:
         """Plastic loss [J] after the faces were pressed as far as ``reached`` [m]."""
@@ -165,15 +190,15 @@ class YieldingLaw:
             axis=1,
         )
         deep = max(self.reached, float(self.largest[0]))
-        sizes = [float(self.largest.size), float(self.shape.shape[1]), deep, deep]
+        head = [float(self.largest.size), float(self.shape.shape[1]), deep, 0.0, deep, 0.0]
         return FlatLaw(
             kind=LAW_YIELDING,
             parameters=np.concatenate(
                 [
-                    sizes,
+                    head,
                     self.largest,
                     self.set,
-                    self.force,
+                    self.closing,
                     self.taken,
                     self.shape.ravel(),
                     integrals.ravel(),

@@ -7,6 +7,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
 from klack.contact.rubbing_law import RubbingLaw
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
 from klack.hydraulics.film import FilmShape
 from klack.input.problem import CaseProblem
@@ -36,7 +37,9 @@ class EndStop(Component):
     ``restitution`` adds the dashpot of Hunt and Crossley with the factor of Gonthier et al. (2004);
     for rigid bodies only: in modal bodies the waves take that energy already.
 
-    Faces with friction have a law with memory (:class:`klack.contact.rubbing_law.RubbingLaw`).
+    Faces with friction have a law with memory (:class:`klack.contact.rubbing_law.RubbingLaw`), and
+    so have faces that yield (:class:`klack.contact.yielding_law.YieldingLaw`): the gap is then that
+    of the faces as they are, larger by the set that impacts have left.
 
     Limits: parallel, centred faces.
     """
@@ -54,7 +57,7 @@ class EndStop(Component):
     )
     film: FilmShape | None = Field(default=None, description="Squeeze film between the faces.")
 
-    _computed: ContactLaw | RubbingLaw | None = PrivateAttr(default=None)
+    _computed: ContactLaw | RubbingLaw | YieldingLaw | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _something_acts(self) -> Self:
@@ -75,22 +78,24 @@ class EndStop(Component):
             )
         return self
 
-    def with_law(self, law: ContactLaw | RubbingLaw, series_compliance: float = 0.0) -> Self:
+    def with_law(
+        self, law: ContactLaw | RubbingLaw | YieldingLaw, series_compliance: float = 0.0
+    ) -> Self:
         """Return this end stop with a law that was computed, e.g. the consistent one.
 
         Parameters
         ----------
-        law : ContactLaw or RubbingLaw
+        law : ContactLaw, RubbingLaw or YieldingLaw
         series_compliance : float [m/N]
         """
         stop = self.model_copy(update={"series_compliance": series_compliance})
         stop._computed = law
         return stop
 
-    def contact_law(self) -> ContactLaw | RubbingLaw | None:
+    def contact_law(self) -> ContactLaw | RubbingLaw | YieldingLaw | None:
         """Law that acts; raise :class:`InputError` if a consistent law was not filled in."""
         if self._computed is not None:
-            law: ContactLaw | RubbingLaw = self._computed
+            law: ContactLaw | RubbingLaw | YieldingLaw = self._computed
         elif self.law is None:
             return None
         elif isinstance(self.law, ConsistentStopLaw):
@@ -104,12 +109,13 @@ class EndStop(Component):
             law = self.law.contact_law()
         if self.restitution is None or isinstance(law, HuntCrossley):
             return law
-        if isinstance(law, RubbingLaw):
+        if isinstance(law, RubbingLaw | YieldingLaw):
+            what = "friction between the faces" if isinstance(law, RubbingLaw) else "yield"
             raise InputError(
                 "EndStop.restitution",
-                got=f"{self.restitution:g} beside friction between the faces",
+                got=f"{self.restitution:g} beside {what}",
                 expected="one of them: a restitution stands for all that an impact loses",
-                hint="leave the restitution out; friction and modes take the energy.",
+                hint=f"leave the restitution out; {what} and modes take the energy.",
             )
         return HuntCrossley(law, gonthier_coefficient(self.restitution))
 

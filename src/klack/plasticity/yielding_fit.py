@@ -56,6 +56,6 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
     return YieldingLaw(
         largest=fine,
         set=PchipInterpolator(largest, parted)(fine),
-        force=PchipInterpolator(largest, force)(fine),
+        closing=PchipInterpolator(largest, force)(fine),
         shape=PchipInterpolator(largest, shapes)(fine),
     )

@@ -459,8 +459,8 @@ def _both(
             low, high = z, min(high, z - excess)
         if z != 0.0 and (z > 0.0) != (after > 0.0) and low < 0.0 < high:
             after = 0.0
-        # about sliders that let go Newton's method can turn in a circle
-        elif kind == LAW_RUBBING and 2.0 * abs(step) > before:
+        # about the kinks of laws with memory Newton's method can turn in a circle
+        elif kind >= LAW_RUBBING and 2.0 * abs(step) > before:
             after = 0.5 * (low + high)
         before = abs(step)
         if not low <= after <= high:
@@ -482,7 +482,7 @@ def _contact(
     deep = -min(z0, z)
     if chi_over_h * deep > 1.0:
         deep = 1.0 / chi_over_h
-    longest = (RUBBED_LEFT if kind == LAW_RUBBING else STEP_LEFT) * deep
+    longest = (RUBBED_LEFT if kind >= LAW_RUBBING else STEP_LEFT) * deep
     if kind == LAW_LINEAR and z0 <= 0.0 and z <= 0.0:
         mean, slope = -0.5 * p[start] * (z0 + z), 0.5 * p[start]
         if chi_over_h == 0.0:

@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.step_constants import NO_LAW
+from klack.contact.step_constants import LAW_YIELDING, NO_LAW
 from klack.errors import InputError
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
@@ -46,6 +46,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes
+from klack.simulation.yielding_step import settle
 
 __all__ = [
     "CompiledNetwork",
@@ -453,6 +454,8 @@ def _interfaces(
         film_felt=_FILM_FELT * force,
         rest=np.array(rest, dtype=float),
     )
+    for c in map(int, np.flatnonzero(kind == LAW_YIELDING)):  # run in before
+        gap[c] += settle(interfaces.law, int(law0[c]))
     state = InterfaceState(
         hint=np.zeros(count, np.int64),
         e=np.zeros(count),

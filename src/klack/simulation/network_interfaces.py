@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.contact.step_constants import LAW_RUBBING, SEPARATED, SLOWEST
+from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, SEPARATED, SLOWEST
 from klack.simulation.interface_step import solve_interface
 from klack.simulation.network_arrays import (
     AHEAD,
@@ -21,6 +21,13 @@ from klack.simulation.network_ports import move_body
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
 from klack.simulation.rubbing_step import keep_sliders, slide, take_back_sliders
+from klack.simulation.yielding_step import (
+    keep_faces,
+    press,
+    settle,
+    settled_since,
+    take_back_faces,
+)
 
 __all__ = [
     "HELD",
@@ -256,6 +263,8 @@ def begin_macro_interfaces(
         trial.kept[k + 15] = state.pulled[c]
         if contacts.rows.kind[c] == LAW_RUBBING:
             keep_sliders(contacts.laws, contacts.rows.law0[c])
+        if contacts.rows.kind[c] == LAW_YIELDING:
+            keep_faces(contacts.laws, contacts.rows.law0[c])
         begin_attempt(contacts, c)
 
 
@@ -298,6 +307,9 @@ def take_back_interfaces(
         state.pulled[c] = kept[k + 15]
         if contacts.rows.kind[c] == LAW_RUBBING:
             take_back_sliders(contacts.laws, contacts.rows.law0[c])
+        if contacts.rows.kind[c] == LAW_YIELDING:
+            contacts.rows.gap0[c] -= settled_since(contacts.laws, contacts.rows.law0[c])
+            take_back_faces(contacts.laws, contacts.rows.law0[c])
         begin_attempt(contacts, c)
 
 
@@ -400,6 +412,8 @@ def end_macro_interfaces(contacts: Any, S: Any) -> float:
         begin = trial.kept[KEPT * c + 3]
         state.force_before[c] = begin
         behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
+        if rows.kind[c] == LAW_YIELDING:
+            behind -= settled_since(contacts.laws, rows.law0[c])
         excess += (begin - trial.first[c]) * (behind - trial.kept[KEPT * c + 1])
     return excess
 
@@ -424,10 +438,10 @@ def end_interfaces(
         if state.far[c] != 0.0:
             continue
         acted = trial.contact[c] != 0.0 or trial.film[c] != 0.0 or trial.contact_loss[c] != 0.0
-        gap = gap_between(rows, S, c)
+        gap, settled = gap_between(rows, S, c), 0.0
         if acted or state.since[c] < np.inf:
             gap = trial.gap[c]  # what the others move after that it sees in the next step
-            end_force(contacts, c, step, gap, accounts, recording, sums, peaks)
+            settled = end_force(contacts, c, step, gap, accounts, recording, sums, peaks)
             if first:
                 trial.first[c] = trial.force[c]
             trial.least[c] = min(trial.least[c], trial.force[c])
@@ -436,7 +450,7 @@ def end_interfaces(
             state.force[c] = 0.0
         state.pulled[c] = 1.0 if _pulls(contacts, c) else 0.0
         state.rate[c] = (gap - state.gap[c]) * step.rate
-        state.gap[c] = gap
+        state.gap[c] = gap + settled
         if state.chi[c] != 0.0:
             state.deepest[c] = max(state.deepest[c], -gap)
             if gap > SEPARATED * state.deepest[c]:
@@ -453,14 +467,26 @@ def end_force(
     recording: Recording,
     sums: Any,
     peaks: Any,
-) -> None:
-    """Take over what one interface did in a step that ends at this gap, with its losses."""
+) -> float:
+    """Take over what one interface did in a step that ends at this gap, with its losses.
+
+    Returns
+    -------
+    float [m]
+        By how much the gap is larger from now on, because the faces have yielded.
+    """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    settled = 0.0
     contact, film = trial.contact[c], trial.film[c]
     was_closed = state.since[c] < np.inf
     if rows.kind[c] == LAW_RUBBING:
         before, after = -(state.gap[c] + state.e[c]), -(gap + trial.e[c])
         accounts.contact[c] += slide(contacts.laws, rows.law0[c], before, after)
+    if rows.kind[c] == LAW_YIELDING and contact > 0.0:
+        before, after = -(state.gap[c] + state.e[c]), -(gap + trial.e[c])
+        accounts.contact[c] += press(contacts.laws, rows.law0[c], before, after, contact)
+        settled = settle(contacts.laws, rows.law0[c])
+        rows.gap0[c] += settled
     state.e[c] = trial.e[c]
     state.force[c] = trial.force[c]
     accounts.contact[c] += trial.contact_loss[c]
@@ -478,6 +504,7 @@ def end_force(
     felt = step.level != COARSE and abs(film) > rows.film_felt[c]
     if felt or was_closed or contact > 0.0:
         _record_step(recording, c, step, contact, film, gap)
+    return settled
 
 
 @phase

@@ -1,7 +1,7 @@
 """Result of a network run: channels, impacts, energy balance, and the state to continue from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ __all__ = [
     "IncompleteRunError",
     "InterfaceRecord",
     "NetworkResult",
+    "PressedFaces",
     "StaticStart",
     "StepCounts",
 ]
@@ -194,6 +195,25 @@ class StaticStart:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressedFaces:
+    """Faces of an end stop that yield, as a run left them.
+
+    Parameters
+    ----------
+    set : float [m]
+        By which they part later than when they were new.
+    force : float [N]
+        Largest force so far; they are elastic up to it.
+    known_force : float [N]
+        Up to which their static loops go.
+    """
+
+    set: float
+    force: float
+    known_force: float
+
+
 @dataclass(frozen=True, slots=True)
 class StepCounts:
     """Steps of a run.
@@ -252,6 +272,8 @@ class NetworkResult:
         Why the run ended before its time, all else is the record up to there; empty if it did not.
     start : StaticStart or None
         The equilibrium from which it began; None for a continued or free start.
+    faces : mapping of str to PressedFaces
+        By component, where faces yield.
     """
 
     time: NDArray[np.float64]
@@ -265,6 +287,7 @@ class NetworkResult:
     state: Mapping[str, NDArray[np.generic]]
     failure: str = ""
     start: StaticStart | None = None
+    faces: Mapping[str, PressedFaces] = field(default_factory=dict)
 
     @property
     def step(self) -> float:

@@ -1,5 +1,6 @@
 """Run a network: static equilibrium, time loop, channels, impacts, energy balance."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import energy_balance
-from klack.contact.step_constants import LAW_RUBBING
-from klack.errors import ConvergenceError, InputError, require_positive
+from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
+from klack.contact.yielding_law import YieldingLaw
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
@@ -40,7 +42,12 @@ from klack.simulation.network_compile import (
 from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
 from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder
-from klack.simulation.network_result import IncompleteRunError, NetworkResult, StepCounts
+from klack.simulation.network_result import (
+    IncompleteRunError,
+    NetworkResult,
+    PressedFaces,
+    StepCounts,
+)
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.rubbing_step import slider_places
 from klack.simulation.static_start import start_at_rest
@@ -51,6 +58,7 @@ from klack.simulation.step_status import (
     STATUS_ELEMENT,
     STATUS_PRESSURES,
 )
+from klack.simulation.yielding_step import pressed_state
 from klack.units import format_si
 
 __all__ = ["Grid", "grid_of", "has_python_steps", "simulate_network"]
@@ -192,7 +200,17 @@ def simulate_network(
         state=_save(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
         failure="" if failure is None else str(failure),
         start=begun,
+        faces=_pressed_faces(network),
     )
+    for name, faces in result.faces.items():
+        if faces.force > faces.known_force:
+            warnings.warn(
+                f"the faces of '{name}' were pressed by {format_si(faces.force, 'N', 3)}, but what "
+                f"yield does to them is computed up to {format_si(faces.known_force, 'N', 3)} "
+                f"only; their law is a straight line from there. Raise the speed of stop '{name}'.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
     scale = books.scale or 1.0
@@ -542,6 +560,7 @@ _LAST = "record.last"
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
     """All arrays that a step changes and the next one begins with, as a stored state calls them."""
     line, faces = network.line_state, network.interfaces
+    yielding = np.flatnonzero(faces.kind == LAW_YIELDING)
     groups = {
         "bodies": {"fine": network.bodies.laid_out[: network.bodies.size], "at": network.bodies.at},
         "elements": {"state": network.elements.state},
@@ -554,11 +573,30 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
             network.rows.interfaces[c].component: slider_places(faces.law, int(faces.law0[c]))
             for c in np.flatnonzero(faces.kind == LAW_RUBBING)
         },
+        "faces": {
+            network.rows.interfaces[c].component: pressed_state(faces.law, int(faces.law0[c]))
+            for c in yielding
+        },
+        "gaps": {network.rows.interfaces[c].component: faces.gap0[c : c + 1] for c in yielding},
     }
     arrays = {
         f"{owner}.{name}": array for owner, group in groups.items() for name, array in group.items()
     }
     return {"clock": clock} | arrays
+
+
+def _pressed_faces(network: CompiledNetwork) -> dict[str, PressedFaces]:
+    """What has become of faces that yield."""
+    at, found = network.interfaces, {}
+    for c, row in enumerate(network.rows.interfaces):
+        if isinstance(row.law, YieldingLaw):
+            deep, parted = pressed_state(at.law, int(at.law0[c]))
+            found[row.component] = PressedFaces(
+                set=float(parted),
+                force=float(row.law.after(float(deep)).force(deep)),
+                known_force=float(row.law.closing[-1]),
+            )
+    return found
 
 
 def _everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:

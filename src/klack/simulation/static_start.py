@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.step_constants import LAW_RUBBING
+from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
@@ -60,6 +60,7 @@ from klack.simulation.static_newton import (
     newton_system,
 )
 from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
+from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
 __all__ = ["RestState", "begin_at_rest", "start_at_rest"]
@@ -717,6 +718,11 @@ class _Balance:
         for c in map(int, np.flatnonzero(interfaces.kind == LAW_RUBBING)):
             deep = max(-float(now.gap[c] + now.e[c]), 0.0)
             begin_sliders(interfaces.law, int(interfaces.law0[c]), deep)
+        for c in map(int, np.flatnonzero(interfaces.kind == LAW_YIELDING)):
+            deep = max(-float(now.gap[c] + now.e[c]), 0.0)
+            settled = begin_faces(interfaces.law, int(interfaces.law0[c]), deep)
+            interfaces.gap0[c] += settled
+            now.gap[c] += settled
         owner = {handle: row for row in rows.bodies for handle in row.ports}
         for c, touching in enumerate(rows.interfaces):
             pair = (owner.get(touching.upper), owner.get(touching.lower))

@@ -233,7 +233,8 @@ def _floats(bundle: Any) -> list[Any]:
 
 def state_arrays(numbers: NetworkArrays) -> list[Any]:
     """Arrays that a step changes, but for the modes."""
-    found = [numbers.bodies.at, numbers.interfaces.law]  # with the places of sliders
+    # a law with the places of its sliders, or how far its faces were pressed: their gap shifts
+    found = [numbers.bodies.at, numbers.interfaces.law, numbers.interfaces.gap0]
     for rows in (numbers.elements, numbers.branches):
         found += [rows.state, rows.inputs, rows.outputs]
     groups = (

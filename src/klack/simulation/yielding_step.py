@@ -9,8 +9,11 @@ so that the work of a step is what the faces store and what they lose, for steps
 Trying a force changes nothing; :func:`press` takes the largest indentation along once a step is
 accepted, and takes the loss as the difference, which is right for any tables.
 
-The largest indentation [m] is the third of the numbers of the law, the fourth a copy of it for
-steps that are taken back.
+Indentations count from first touch of the faces as they were when the run began, or, with
+:func:`settle`, as they are now: a film lies on those.
+
+Behind the two sizes of its tables, the numbers of the law are the largest indentation [m], the set
+[m] that indentations count from, and a copy of both for steps that are taken back.
 """
 
 from math import sqrt
@@ -20,22 +23,35 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
 
-__all__ = ["press", "pressed_state", "yielding_mean", "yielding_store"]
+__all__ = [
+    "begin_faces",
+    "keep_faces",
+    "press",
+    "pressed_state",
+    "settle",
+    "settled_since",
+    "take_back_faces",
+    "yielding_mean",
+    "yielding_store",
+]
 
 Vector = NDArray[np.float64]
 
 _SMALL = 1e-6  # way over the indentation below which the force is that of its middle
 
 
+_DEEP, _FROM, _KEPT, _TABLES = 2, 3, 4, 6  # places of the numbers
+
+
 def pressed_state(p: Vector, start: int) -> Vector:
-    """Largest indentation so far [m], shape (1,), as a view."""
-    return p[start + 2 : start + 3]
+    """Largest indentation so far, and the set that indentations count from [m], as a view."""
+    return p[start + _DEEP : start + _KEPT]
 
 
 @inner
 def _state(p: Vector, start: int, deep: float) -> tuple[int, float]:
     """State below a largest indentation, and the share of the way to the next one."""
-    count, first = int(p[start]), start + 4
+    count, first = int(p[start]), start + _TABLES
     low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -50,8 +66,15 @@ def _state(p: Vector, start: int, deep: float) -> tuple[int, float]:
 @inner
 def _between(p: Vector, start: int, table: int, i: int, share: float) -> float:
     """One of the tables over the states: set 1, force 2, work 3."""
-    at = start + 4 + table * int(p[start]) + i
+    at = start + _TABLES + table * int(p[start]) + i
     return p[at] + share * (p[at + 1] - p[at])
+
+
+@inner
+def _parted(p: Vector, start: int, deep: float, i: int, share: float) -> float:
+    """Set; the way of opening is that of the last state beyond it."""
+    last = p[start + _TABLES + int(p[start]) - 1]
+    return _between(p, start, 1, i, min(share, 1.0)) + max(deep - last, 0.0)
 
 
 @inner
@@ -59,10 +82,11 @@ def _elastic(p: Vector, start: int, deep: float, d: float) -> tuple[float, float
     """Force [N], stiffness [N/m] and energy [J] of the elastic curve up to ``deep``."""
     count, places = int(p[start]), int(p[start + 1])
     i, share = _state(p, start, deep)
-    parted = _between(p, start, 1, i, share)
+    parted, size = _parted(p, start, deep, i, share), _between(p, start, 2, i, share)
+    share = min(share, 1.0)
     if d <= parted:
         return 0.0, 0.0, 0.0
-    way, size = deep - parted, _between(p, start, 2, i, share)
+    way = deep - parted
     s = min((d - parted) / way, 1.0)
     k = min(int(sqrt(s) * (places - 1)), places - 2)
     n = float(places - 1)
@@ -71,7 +95,7 @@ def _elastic(p: Vector, start: int, deep: float, d: float) -> tuple[float, float
     if s < s0:
         k -= 1
         s0, s1 = (k / n) * (k / n), s0
-    a = start + 4 + 4 * count + i * places + k
+    a = start + _TABLES + 4 * count + i * places + k
     b = a + places
     low = p[a] + share * (p[b] - p[a])
     high = p[a + 1] + share * (p[b + 1] - p[a + 1])
@@ -89,7 +113,7 @@ def _elastic(p: Vector, start: int, deep: float, d: float) -> tuple[float, float
 @inner
 def _closing(p: Vector, start: int, d: float) -> tuple[float, float, float]:
     """Force [N], stiffness [N/m] and work [J] of the loading curve."""
-    first, count = start + 4, int(p[start])
+    first, count = start + _TABLES, int(p[start])
     i, share = _state(p, start, d)
     width = p[first + i + 1] - p[first + i]
     f0, f1 = p[first + 2 * count + i], p[first + 2 * count + i + 1]
@@ -100,7 +124,7 @@ def _closing(p: Vector, start: int, d: float) -> tuple[float, float, float]:
 @inner
 def _along(p: Vector, start: int, d: float) -> tuple[float, float, float]:
     """Force, stiffness and work of the faces as they are now, up to an indentation."""
-    deep = p[start + 2]
+    deep = p[start + _DEEP]
     if d <= deep:
         return _elastic(p, start, deep, d)
     force, slope, work = _closing(p, start, d)
@@ -112,12 +136,12 @@ def _along(p: Vector, start: int, d: float) -> tuple[float, float, float]:
 @njit
 def yielding_mean(p: Vector, start: int, d0: float, d1: float) -> tuple[float, float]:
     """Mean force between two indentations, and its slope over ``d1``."""
-    way = d1 - d0
-    if abs(way) <= _SMALL * max(d0, d1):
-        force, slope, _ = _along(p, start, 0.5 * (d0 + d1))
+    way, a, b = d1 - d0, d0 + p[start + _FROM], d1 + p[start + _FROM]
+    if abs(way) <= _SMALL * max(a, b):
+        force, slope, _ = _along(p, start, 0.5 * (a + b))
         return force, 0.5 * slope
-    force, _, work = _along(p, start, d1)
-    _, _, before = _along(p, start, d0)
+    force, _, work = _along(p, start, b)
+    _, _, before = _along(p, start, a)
     mean = (work - before) / way
     return mean, (force - mean) / way
 
@@ -125,15 +149,57 @@ def yielding_mean(p: Vector, start: int, d0: float, d1: float) -> tuple[float, f
 @njit
 def yielding_store(p: Vector, start: int, d: float) -> float:
     """Elastic energy [J] at an indentation."""
-    _, _, energy = _elastic(p, start, p[start + 2], d)
+    _, _, energy = _elastic(p, start, p[start + _DEEP], d + p[start + _FROM])
     return energy
 
 
 @njit
 def press(p: Vector, start: int, d0: float, d1: float, force: float) -> float:
     """Take the largest indentation along from d0 to d1, in place; returns the loss [J]."""
-    if d1 <= p[start + 2]:
+    if d1 + p[start + _FROM] <= p[start + _DEEP]:
         return 0.0
     before = yielding_store(p, start, d0)
-    p[start + 2] = d1
+    p[start + _DEEP] = d1 + p[start + _FROM]
     return before + force * (d1 - d0) - yielding_store(p, start, d1)
+
+
+@njit
+def settle(p: Vector, start: int) -> float:
+    """Count indentations from the faces as they are now, in place.
+
+    Returns
+    -------
+    float [m]
+        By how much they become smaller, and gaps larger.
+    """
+    i, share = _state(p, start, p[start + _DEEP])
+    before = p[start + _FROM]
+    p[start + _FROM] = _parted(p, start, p[start + _DEEP], i, share)
+    return p[start + _FROM] - before
+
+
+@njit
+def begin_faces(p: Vector, start: int, d: float) -> float:
+    """Let the faces be as after pressing to an indentation; returns as :func:`settle`."""
+    p[start + _DEEP] = max(p[start + _DEEP], d + p[start + _FROM])
+    return settle(p, start)
+
+
+@njit
+def keep_faces(p: Vector, start: int) -> None:
+    """Remember how far the faces were pressed."""
+    p[start + _KEPT] = p[start + _DEEP]
+    p[start + _KEPT + 1] = p[start + _FROM]
+
+
+@njit
+def settled_since(p: Vector, start: int) -> float:
+    """By how much gaps have become larger since the faces were remembered [m]."""
+    return p[start + _FROM] - p[start + _KEPT + 1]
+
+
+@njit
+def take_back_faces(p: Vector, start: int) -> None:
+    """Put the faces back to how they were remembered."""
+    p[start + _DEEP] = p[start + _KEPT]
+    p[start + _FROM] = p[start + _KEPT + 1]

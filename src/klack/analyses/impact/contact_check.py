@@ -93,7 +93,13 @@ class ContactCheck:
 
 
 def check_contact(
-    case: CaseFile, pair: BodyPair, static: StaticContact, force: float, surfaces: str
+    case: CaseFile,
+    pair: BodyPair,
+    static: StaticContact,
+    force: float,
+    surfaces: str,
+    *,
+    has_yield: bool = False,
 ) -> ContactCheck:
     """Judge a static contact at an axial force, and warn of what makes it doubtful.
 
@@ -108,6 +114,8 @@ def check_contact(
         Peak force of the impact.
     surfaces : str
         The two surfaces, for the messages.
+    has_yield : bool
+        Whether the law of the contact has the yield of its faces.
 
     Warns
     -----
@@ -140,7 +148,7 @@ def check_contact(
         expected=nan if corner is not None else expected,
         needed_yield=nan
         if corner is not None
-        else check_yield(case, pair, static, force, surfaces).needed,
+        else check_yield(case, pair, static, force, surfaces, computed=has_yield).needed,
         doubts=tuple(doubts),
     )
 

@@ -46,7 +46,7 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         measures, before = measure_impact(history), law.loss_after(law.reached)
         law = law.after(history.pressed)
         lost = law.loss_after(law.reached) - before
-        force = float(np.interp(law.reached, law.largest, law.force))
+        force = float(np.interp(law.reached, law.largest, law.closing))
         width = 2.0 * float(np.interp(force, loops.force, loops.half_width))
         rows.append(
             (

@@ -42,7 +42,13 @@ class YieldCheck:
 
 
 def check_yield(
-    case: CaseFile, pair: BodyPair, static: StaticContact, force: float, surfaces: str
+    case: CaseFile,
+    pair: BodyPair,
+    static: StaticContact,
+    force: float,
+    surfaces: str,
+    *,
+    computed: bool = False,
 ) -> YieldCheck:
     """Compare the pressure with the yield stress of both bodies.
 
@@ -57,11 +63,13 @@ def check_yield(
         Peak force of the impact.
     surfaces : str
         The two surfaces, for the message.
+    computed : bool
+        Whether the law of the contact has the yield.
 
     Warns
     -----
     AccuracyWarning
-        Where a body with a yield stress yields, though all levels compute it as elastic.
+        Where a body with a yield stress yields, though levels compute it as elastic.
     """
     if not 0.0 < force <= static.max_force:
         return YieldCheck()
@@ -83,12 +91,12 @@ def check_yield(
                 f"{format_si(first, 'N', 2)} on, at {100 * _speed(static, first, force):.2g} % of "
                 "the speed of this impact"
             )
-    if told:
+    if told and not computed:
         warnings.warn(
             f"contact {surfaces} yields before the {format_si(force, 'N', 3)} of this impact: "
             f"{' and '.join(told)}. Elastic levels are too hard there: the first impact on new "
-            "faces is softer and returns less. Only the reduced level of klack impact has yield, "
-            "in the meridian plane.",
+            "faces is softer and returns less. Only the reduced level of klack impact and "
+            "the stops of klack stroke have yield, in the meridian plane.",
             AccuracyWarning,
             stacklevel=2,
         )

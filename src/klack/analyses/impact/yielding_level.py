@@ -14,7 +14,7 @@ from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
 from klack.case.impact_sections import ConsistentLocalLaw
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
-from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.errors import AccuracyWarning
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress
 from klack.units import format_si
@@ -37,31 +37,11 @@ def static_loops_of(problem: ContactProblem, progress: Progress) -> YieldingLoop
     Warns
     -----
     AccuracyWarning
-        Where yield is left out though the materials have it; bodies of three dimensions are told
-        of by :func:`klack.analyses.impact.yield_check.check_yield`.
+        Where yield is left out though the materials have it.
     """
-    case, pair = problem.case, problem.pair
-    if not isinstance(case.contact.local_law, ConsistentLocalLaw) or pair.upper.dimension != 2:
+    if not isinstance(problem.case.contact.local_law, ConsistentLocalLaw):
         return None
-    if not any(problem.has_yield):
-        return None
-    left = "the reduced level leaves out the yield of its faces"
-    if not case.contact.faces.is_none:
-        warnings.warn(
-            f"{left}: its law has either friction or yield. Try: the case without "
-            "contact.friction beside it.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
-        return None
-    progress("faces that yield", 0.0)
-    try:
-        loops = problem.yielding
-    except (ConvergenceError, InputError) as error:
-        warnings.warn(f"{left}: {error}", AccuracyWarning, stacklevel=2)
-        return None
-    progress("faces that yield", 1.0)
-    return loops if loops is not None and loops.states else None
+    return problem.yielding(progress)
 
 
 def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:

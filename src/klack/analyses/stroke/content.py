@@ -290,6 +290,10 @@ def _number_table(study: StrokeStudy) -> Table:
             for measure in _SHOWN
             if measure.key in _OF_FIRST
         ]
+    rows += [
+        (f"set left on {stop}", *(_set_left(variant, stop) for variant in variants))
+        for stop in dict.fromkeys(stop for variant in variants for stop in variant.result.faces)
+    ]
     rows += shown[first:]
     heads = [
         f"{variant.name}{' (reference)' if variant is variants[0] and len(variants) > 1 else ''}"
@@ -297,6 +301,11 @@ def _number_table(study: StrokeStudy) -> Table:
         for variant in variants
     ]
     return Table(columns=("", *heads), rows=tuple(rows))
+
+
+def _set_left(variant: StrokeVariant, stop: str) -> str:
+    faces = variant.result.faces.get(stop)
+    return "–" if faces is None else quantity(faces.set, "m", 3)
 
 
 def _row(measure: Measure[StrokeVariant], variants: list[StrokeVariant]) -> tuple[str, ...]:

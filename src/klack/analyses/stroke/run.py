@@ -422,7 +422,14 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
     check = None
     if contact is not None:
         force = contact.pattern_force
-        check = check_contact(valve.case, contact.pair, contact.closing, force, surfaces)
+        check = check_contact(
+            valve.case,
+            contact.pair,
+            contact.closing,
+            force,
+            surfaces,
+            has_yield=contact.loops is not None,
+        )
     return StopSummary(
         name=name,
         surfaces=surfaces,

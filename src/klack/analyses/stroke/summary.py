@@ -94,6 +94,15 @@ class StartJson(TypedDict):
     notes: Annotated[list[str], Field(description="Quantities without a steady state.")]
 
 
+class FacesJson(TypedDict):
+    """Faces of an end stop that yield, at the end."""
+
+    set_m: Annotated[float, Field(description="By which they part later than when new.")]
+    largest_force_N: Annotated[
+        float, Field(description="So far: up to it they are elastic from now on.")
+    ]
+
+
 @with_measures(VARIANT_MEASURES)
 class VariantJson(TimesJson):
     """One variant of a stroke; opening and closing are those of the needle."""
@@ -109,6 +118,7 @@ class VariantJson(TimesJson):
     bodies: Annotated[
         dict[str, TimesJson], Field(description="Of every other body between stops, by name.")
     ]
+    faces: Annotated[dict[str, FacesJson], Field(description="By end stop, where its faces yield.")]
 
 
 class StrokeJson(VariantJson):
@@ -160,6 +170,7 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
         events = variant.result.events[:_TOLD]
         yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
+        yield from yield_told(variant)
     for stop in study.stops:
         if doubt := contact_doubt(stop):
             yield f"Impacts on '{stop.name}': {doubt}"
@@ -195,6 +206,18 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
         for times in variant.times
         for way, passage in times.in_order
     )
+
+
+def yield_told(variant: StrokeVariant) -> Iterator[str]:
+    """What yield has left on the faces of each stop; nothing where they stay elastic."""
+    for stop, faces in variant.result.faces.items():
+        if faces.set > 0.0:
+            lost = variant.result.books.losses.get(f"{stop} contact", 0.0)
+            yield (
+                f"{variant.name}: the faces of '{stop}' have yielded: a set of "
+                f"{format_si(faces.set, 'm', 3)} after {format_si(faces.force, 'N', 4)}, "
+                f"{format_si(lost, 'J', 3)} lost; up to that force they are elastic from now on"
+            )
 
 
 def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
@@ -254,6 +277,10 @@ def _numbers(variant: StrokeVariant) -> VariantJson:
         **_times(variant.needle_times),
         "bodies": {times.body: _times(times) for times in variant.times[1:]},
         "start": _start(variant),
+        "faces": {
+            stop: {"set_m": faces.set, "largest_force_N": faces.force}
+            for stop, faces in result.faces.items()
+        },
     }
     return cast(VariantJson, found)
 
