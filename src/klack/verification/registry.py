@@ -27,6 +27,8 @@ COVERS = {
     "guides, energy over many impacts.",
     "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, "
     "jams, and a measurement.",
+    "plasticity": "Faces that yield: one point, spheres and a seat on finite elements, running-in, "
+    "impacts in time.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
     "vibration": "Mobility, force on the support, energy injected, plates, and radiation of "
     "pistons.",
