@@ -7,7 +7,7 @@ from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.assembling.rubbing import static_loops
-from klack.assembling.yielding import LoadedBody, loops_with_yield
+from klack.assembling.yielding import loops_with_yield
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
@@ -18,6 +18,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.progress import Progress, remark
