@@ -146,7 +146,7 @@ class ContactProblem(PlacedBodies):
         if not any(self.has_yield):
             return None
         return self.flexibility_upper.remembered(
-            "static loops with yield",
+            "static loops with yield, strain",
             (
                 self.flexibility_lower.key,
                 self.space.gap,

@@ -49,6 +49,8 @@ class LoadingState:
     plastic_gap : array, shape (nc,) [m]
     plastic_work : float [J]
         Of both bodies since the beginning.
+    plastic_strain : float [-]
+        Largest equivalent one of both.
     rounds : int
         Of Newton's method.
     """
@@ -58,6 +60,7 @@ class LoadingState:
     pressures: Floats
     plastic_gap: Floats
     plastic_work: float
+    plastic_strain: float
     rounds: int
 
 
@@ -133,6 +136,7 @@ class YieldingContact:
             pressures=self._now.lam,
             plastic_gap=self.plastic_gap(),
             plastic_work=sum(body.work for body in self.bodies),
+            plastic_strain=max((body.largest_strain for body in self.bodies), default=0.0),
             rounds=rounds,
         )
 

@@ -24,6 +24,7 @@ __all__ = ["Answer", "YieldingBody"]
 Floats = NDArray[np.float64]
 
 _WIDER, _TRIES = 1.5, 4
+_BEGUN = 1e-3  # of the contact force of a point: smaller plastic forces need not be exact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +43,8 @@ class Answer:
     along : array, shape (nz, nc) [m/N]
         Change of w per contact force.
     residual : float [-]
-        Forces out of balance over the plastic ones.
+        Forces out of balance over the plastic ones; where these begin, over a thousandth of the
+        contact force of a point.
     """
 
     plastic_gap: Floats
@@ -141,7 +143,7 @@ class YieldingBody:
         moves[kept] = solved
         step, along = moves[:, 0], moves[:, 1:]
         compliance = self.U.T @ V + V.T @ along
-        size = float(np.abs(f).max(initial=0.0))
+        size = max(float(np.abs(f).max(initial=0.0)), _BEGUN * float(lam.max(initial=0.0)))
         wrong = float(np.abs(out_of_balance[kept]).max(initial=0.0))
         return Answer(
             plastic_gap=self.U.T @ f + V.T @ step,
@@ -185,9 +187,9 @@ class YieldingBody:
         return self._forces([state.strain for state in self.states])
 
     @property
-    def has_yielded(self) -> bool:
-        """Whether any point has."""
-        return any(bool(np.any(state.equivalent > 0.0)) for state in self.states)
+    def largest_strain(self) -> float:
+        """Largest equivalent plastic strain [-] of the accepted history."""
+        return max(float(state.equivalent.max(initial=0.0)) for state in self.states)
 
     def _plastic_forces(self, lam: Floats, w: Floats) -> Floats:
         """Forces [N] of the plastic strain at a state that is being tried, shape (nz,)."""
