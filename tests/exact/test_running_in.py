@@ -1,5 +1,7 @@
 """Impacts one after another on faces that yield."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,14 @@ from scipy.optimize import brentq
 
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.running_in import running_in
+from klack.analyses.impact.yielding_level import doubt_large_strain
 from klack.assembling.ladder import impact_energy
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.case.reader import read_case
+from klack.errors import ConvergenceError
+from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
@@ -69,6 +74,59 @@ def test_running_in_follows_the_recursion_of_two_energies():
     assert np.all(np.diff(found.set) >= 0.0)
     assert np.all(np.diff(found.land) >= 0.0)
     assert np.all(found.lost >= 0.0)
+
+
+def _fails_above(monkeypatch, force):
+    """Let the ladder find no state above a force [N]."""
+    load = YieldingContact.load
+
+    def limited(self, approach):
+        state = load(self, approach)
+        if state.force > force:
+            raise ConvergenceError("no state found.\nTry: more hardening.")
+        return state
+
+    monkeypatch.setattr(YieldingContact, "load", limited)
+
+
+def test_loops_that_end_below_the_impact_say_how_far_they_go(monkeypatch):
+    """Bad input: one warning with force, share of the speed and what to try; elastic otherwise."""
+    _fails_above(monkeypatch, 0.1)
+    study = run_impact(_case("impacts: 3"), levels=("reduced",), certify=False)
+
+    (told,) = [text for text in study.warnings if "leaves out the yield" in text]
+    assert re.search(r"they end at 0\.09\d* N, the peak of an impact at 1\d % of this speed", told)
+    assert told.endswith("Try: more hardening.")
+    assert study.running_in is None
+
+
+def test_loops_that_end_above_the_first_impact_answer_it(monkeypatch):
+    """Exact: the first two impacts as with whole loops; 1e-3 for tables between other states."""
+    whole = run_impact(_case("impacts: 9"), levels=("reduced",), certify=False).running_in
+    assert whole is not None
+    _fails_above(monkeypatch, 0.5 * float(whole.peak_force[1] + whole.peak_force[2]))
+    study = run_impact(_case("impacts: 9"), levels=("reduced",), certify=False)
+
+    found = study.running_in
+    assert found is not None
+    assert not found.run_in
+    count = len(found.peak_force)
+    assert 1 <= count < 3
+    np.testing.assert_allclose(found.peak_force, whole.peak_force[:count], rtol=1e-3)
+    assert any("where the static loops end" in text for text in study.warnings)
+
+
+def test_a_plastic_strain_beyond_small_strain_is_doubted():
+    """Bad input: the same loops with the strain of softer faces."""
+    case = _case("impacts: 1")
+    loops = build_problem(case, lambda *_: None).yielding(lambda *_: None)
+    assert loops is not None
+    result = run_impact(case, levels=("reduced",), certify=False).levels["reduced"]
+    assert doubt_large_strain(result, loops) is result
+    softer = tuple(replace(one, plastic_strain=0.2) for one in loops.states)
+
+    (doubt,) = doubt_large_strain(result, replace(loops, states=softer)).doubts
+    assert doubt.startswith("plastic strain reaches 20 % at the peak")
 
 
 def test_elastic_faces_say_that_all_impacts_are_alike():

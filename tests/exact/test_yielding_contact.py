@@ -9,10 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from klack.assembling.problem import build_problem
-from klack.assembling.yielding import LoadedBody
 from klack.case.reader import load_case, read_case
+from klack.plasticity.ladder import YieldingContact
+from klack.plasticity.loaded_body import LoadedBody
+from klack.plasticity.yielding_body import YieldingBody
 from klack.plasticity.zone import plastic_zone
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
@@ -87,6 +90,36 @@ def test_bodies_that_do_not_yield_have_no_states():
     problem = build_problem(read_case(text, SPHERES), lambda *_: None)
 
     assert problem.yielding(lambda *_: None) is None
+
+
+def test_no_step_needs_to_be_halved(loops):
+    """Exact: Newton's method with its line search, to 70 times first yield."""
+    assert loops.force[-1] > 60.0 * loops.first_yield
+    assert max(state.rounds for state in loops.states) <= 20
+
+
+def _contact(problem, radius):
+    rows = problem.space.G_a, problem.space.G_b
+    bodies = [
+        YieldingBody(one, csr_array(one_rows), np.zeros(2), radius)
+        for one, one_rows in zip(problem.loaded, rows, strict=True)
+    ]
+    return YieldingContact(problem.space, problem.static.compliance, bodies)
+
+
+def test_a_zone_that_is_widened_on_the_way_keeps_what_has_yielded(problem, loops):
+    """Exact: the rest is elastic at every state of both; 1e-6 for what Newton's method leaves."""
+    narrow, wide = _contact(problem, 1.2e-5), _contact(problem, 1e-4)
+    sizes = [len(body.zone.dofs) for body in narrow.bodies]
+    for known in loops.states[:24]:
+        one, other = narrow.load(known.approach), wide.load(known.approach)
+        assert one.force == pytest.approx(other.force, rel=1e-6)
+        assert one.plastic_work == pytest.approx(other.plastic_work, rel=1e-6, abs=1e-15)
+        scale = np.abs(other.plastic_gap).max()
+        np.testing.assert_allclose(one.plastic_gap, other.plastic_gap, rtol=0, atol=1e-6 * scale)
+
+    for body, size in zip(narrow.bodies, sizes, strict=True):
+        assert 2 * size < len(body.zone.dofs)
 
 
 def test_whatever_yields_the_stiffness_stays_positive(problem):

@@ -12,7 +12,7 @@ from klack.assembling.ladder import (
 )
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.assembling.rubbing import static_loops
-from klack.assembling.yielding import LoadedBody, law_loops
+from klack.assembling.yielding import law_loops
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
@@ -23,6 +23,7 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
@@ -111,16 +112,9 @@ class ContactProblem(PlacedBodies):
             key="contact.friction",
         )
 
-    def yielding(self, progress: Progress) -> YieldingLoops | None:
-        """Static loops of faces that yield, for a law; None where it stays elastic.
-
-        They take the static solutions: asked for before :meth:`close`.
-
-        Warns
-        -----
-        AccuracyWarning
-            Where yield is left out though the materials have it.
-        """
+    @property
+    def loaded(self) -> tuple[LoadedBody, LoadedBody]:
+        """Upper and lower body with their materials."""
         upper, lower = (
             LoadedBody(
                 body=body,
@@ -132,10 +126,21 @@ class ContactProblem(PlacedBodies):
                 (self.pair.lower, self.flexibility_lower),
             )
         )
+        return upper, lower
+
+    def yielding(self, progress: Progress) -> YieldingLoops | None:
+        """Static loops of faces that yield, for a law; None where it stays elastic.
+
+        They take the static solutions: asked for before :meth:`close`.
+
+        Warns
+        -----
+        AccuracyWarning
+            Where yield is left out though the materials have it.
+        """
         return law_loops(
             self.static,
-            upper,
-            lower,
+            *self.loaded,
             self.wider,
             energy=impact_energy(self.case, self.pair),
             closing=closing_force(self.case),

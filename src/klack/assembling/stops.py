@@ -16,7 +16,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
-from klack.assembling.yielding import LoadedBody, law_loops
+from klack.assembling.yielding import law_loops
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_sections import CaseStop
@@ -31,6 +31,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.rigid import Pose
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress

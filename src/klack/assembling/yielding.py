@@ -5,8 +5,7 @@ the materials do, a warning says so and the law stays elastic.
 """
 
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import astuple, dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,67 +13,20 @@ from scipy.sparse import csr_array
 
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.materials import Material
 from klack.plasticity.ladder import YieldingContact
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops, yielding_loops
-from klack.plasticity.radial_return import von_mises_of_strain
 from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.plasticity.yielding_body import YieldingBody
-from klack.plasticity.zone import plastic_zone, strain_points
 from klack.progress import Progress
 
-__all__ = ["LoadedBody", "law_loops", "loops_with_yield"]
+__all__ = ["law_loops", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""
-
-_WIDER, _TRIES = 1.5, 5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LoadedBody:
-    """One of the two bodies of a contact.
-
-    Parameters
-    ----------
-    body : ElasticBody
-        In the meridian plane.
-    flexibility : Flexibility
-    materials : mapping of str to Material
-        Of its solids; those with hardening yield.
-    """
-
-    body: ElasticBody
-    flexibility: Flexibility
-    materials: Mapping[str, Material]
-
-    @property
-    def yields(self) -> bool:
-        """Whether any of its solids may yield."""
-        return any(material.hardening is not None for material in self.materials.values())
-
-    @property
-    def plastic_numbers(self) -> tuple[str | float, ...]:
-        """Names of its solids that may yield, each with yield stress and both slopes [Pa]."""
-        found: list[str | float] = []
-        for solid, material in sorted(self.materials.items()):
-            if material.hardening is not None:
-                found += [solid, *astuple(material.hardening)]
-        return tuple(found)
-
-    def elements_near(self, place: Floats, radius: float) -> NDArray[np.bool_]:
-        """Elements that may yield, within a radius of a place [m], shape (n_elements,)."""
-        near = []
-        for block in self.body.mesh.blocks:
-            middle = self.body.mesh.points[block.connectivity].mean(axis=1)
-            yields = self.materials[block.solid].hardening is not None
-            near.append((np.linalg.norm(middle - place, axis=1) < radius) & yields)
-        return np.concatenate(near)
 
 
 def law_loops(
@@ -140,7 +92,7 @@ def law_loops(
 
     try:
         loops = upper.flexibility.remembered(
-            "static loops with yield",
+            "static loops with yield, strain",
             (
                 lower.flexibility.key,
                 static.space.gap,
@@ -174,12 +126,10 @@ def loops_with_yield(
 ) -> YieldingLoops:
     """Static loops up to the energy of an impact.
 
-    The zone that may yield is widened until the rest stays elastic.
-
     Parameters
     ----------
     static : StaticContact
-        Of the elastic bodies, beyond that energy: it says where they may yield.
+        Of the elastic bodies, beyond that energy: it says where they may yield first.
     space : ContactSpace
         Of that contact, or wider.
     C : array, shape (nc, nc) [m/N]
@@ -192,7 +142,7 @@ def loops_with_yield(
     Raises
     ------
     ConvergenceError
-        Where a zone as large as the contact does not hold what yields.
+        Where the loops end below the impact.
     ReachError
         Where the contact grows to the border of the candidate points.
     """
@@ -201,43 +151,14 @@ def loops_with_yield(
     if place[0] < static.half_width[-1]:
         place[0] = 0.0
     radius = _ZONE * max(float(static.half_width[-1]), 2.0 * float(weight @ static.space.size))
-    bodies = (upper, csr_array(space.G_a)), (lower, csr_array(space.G_b))
-    for _ in range(_TRIES):
-        held = []
-        for one, rows in bodies:
-            near = one.elements_near(place, radius)
-            if near.any():
-                zone = plastic_zone(one.body, one.materials, near)
-                U = one.flexibility.solve(rows.T.toarray())[zone.dofs]
-                held.append((one, rows, near, YieldingBody(zone, U)))
-        contact = YieldingContact(space, C, [body for *_, body in held])
-        loops = yielding_loops(
-            contact, deepest=float(static.approach[-1]), energy=energy, closing=closing
-        )
-        if not loops.states or all(
-            _rest_is_elastic(one, near, rows.T @ loops.states[-1].pressures, body)
-            for one, rows, near, body in held
-        ):
-            return loops
-        radius *= _WIDER
-    raise ConvergenceError(
-        f"elastic-plastic contact: material yields more than {1e3 * radius / _WIDER:.3g} mm from "
-        "the contact.\nTry: a lower speed, or a yield stress that suits the body; this is no "
-        "local contact any more."
+    bodies = [
+        YieldingBody(one, csr_array(rows), place, radius)
+        for one, rows in ((upper, space.G_a), (lower, space.G_b))
+        if one.elements_near(place, radius).any()
+    ]
+    return yielding_loops(
+        YieldingContact(space, C, bodies),
+        deepest=float(static.approach[-1]),
+        energy=energy,
+        closing=closing,
     )
-
-
-def _rest_is_elastic(
-    one: LoadedBody, near: NDArray[np.bool_], load: Floats, body: YieldingBody
-) -> bool:
-    """Whether no point outside of the zone is beyond its yield stress."""
-    load = load.copy()
-    load[body.zone.dofs] += body.plastic_forces()
-    u = one.flexibility.solve(load)
-    yields = one.elements_near(np.zeros(2), np.inf)
-    for block in strain_points(one.body.mesh, one.materials, yields & ~near, one.body.name):
-        stress = von_mises_of_strain(block.strain(u), block.material.shear_modulus)
-        assert block.material.hardening is not None
-        if np.any(stress > block.material.hardening.yield_stress):
-            return False
-    return True

@@ -6,12 +6,13 @@ With the plastic gap :math:`g_p` of both bodies (:mod:`klack.plasticity.zone`),
     \lambda \ge 0, \quad \lambda^T g = 0 .
 
 Newton's method takes the tangent of the plastic gap and solves the complementarity problem exactly
-in every round.  Once the load falls the plastic gap stays as it is: the contact opens elastically
+in every round, starts on the line of the last two states, and goes as far as the energy of the
+bodies falls.  Once the load falls the plastic gap stays as it is: the contact opens elastically
 on the deformed faces, which :func:`klack.contact.statics.static_contact` solves.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import check_state
 from klack.errors import ConvergenceError
+from klack.plasticity.line_search import lowest_share
 from klack.plasticity.yielding_body import Answer, YieldingBody
 
 __all__ = ["LoadingState", "YieldingContact"]
@@ -28,9 +30,9 @@ __all__ = ["LoadingState", "YieldingContact"]
 Floats = NDArray[np.float64]
 
 _ROUNDS = 20  # of one step
-_FREE = 4  # of them without a look at what came out of the last one
 _HALVED = 12  # steps that are halved on the way to one approach
 _SMALL = 1e-9  # forces out of balance, and change of the contact forces, over their size
+_ROUND_OFF = 1e-12  # of the elastic energy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,6 +49,8 @@ class LoadingState:
     plastic_gap : array, shape (nc,) [m]
     plastic_work : float [J]
         Of both bodies since the beginning.
+    plastic_strain : float [-]
+        Largest equivalent one of both.
     rounds : int
         Of Newton's method.
     """
@@ -56,7 +60,25 @@ class LoadingState:
     pressures: Floats
     plastic_gap: Floats
     plastic_work: float
+    plastic_strain: float
     rounds: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """Contact forces [N], and displacements [m] of each body beyond those of elastic bodies."""
+
+    approach: float
+    lam: Floats
+    w: tuple[Floats, ...]
+
+    def towards(self, other: "_Trial", share: float) -> "_Trial":
+        """State on the line to another one; beyond it for a share above 1."""
+        return _Trial(
+            approach=self.approach + share * (other.approach - self.approach),
+            lam=self.lam + share * (other.lam - self.lam),
+            w=tuple(w + share * (end - w) for w, end in zip(self.w, other.w, strict=True)),
+        )
 
 
 class YieldingContact:
@@ -75,9 +97,11 @@ class YieldingContact:
         self.space, self.C, self.bodies = space, C, tuple(bodies)
         self._start = min(space.clearance, space.touch)
         self._elastic = ComplementaritySolver(C)
-        self._lam = np.zeros(space.count)
+        self._now = _Trial(
+            approach=0.0, lam=np.zeros(space.count), w=tuple(body.w for body in self.bodies)
+        )
+        self._before: _Trial | None = None
         self._active: NDArray[np.bool_] | None = None
-        self._approach = 0.0
 
     def load(self, approach: float) -> LoadingState:
         """Press the bodies together by ``approach`` [m] from first touch.
@@ -96,22 +120,23 @@ class YieldingContact:
             found = self._step(targets[-1])
             rounds += _ROUNDS if found is None else found
             if found is not None:
-                self._approach = targets.pop()
+                targets.pop()
                 continue
             halved += 1
             if halved > _HALVED:
                 raise ConvergenceError(
                     f"elastic-plastic contact: no state found beyond an approach of "
-                    f"{self._approach * 1e6:.4g} um, on the way to {approach * 1e6:.4g} um.\n"
+                    f"{self._now.approach * 1e6:.4g} um, on the way to {approach * 1e6:.4g} um.\n"
                     "Try: smaller elements at the contact, or more hardening."
                 )
-            targets.append((self._approach + targets[-1]) / 2.0)
+            targets.append((self._now.approach + targets[-1]) / 2.0)
         return LoadingState(
             approach=approach,
-            force=float(self.space.axial @ self._lam),
-            pressures=self._lam,
+            force=float(self.space.axial @ self._now.lam),
+            pressures=self._now.lam,
             plastic_gap=self.plastic_gap(),
             plastic_work=sum(body.work for body in self.bodies),
+            plastic_strain=max((body.largest_strain for body in self.bodies), default=0.0),
             rounds=rounds,
         )
 
@@ -119,39 +144,89 @@ class YieldingContact:
         """Rounds of Newton's method that the step took; None where it found nothing."""
         space = self.space
         q = space.gap - (self._start + approach) * space.axial
-        lam, w, active = self._lam, [body.w for body in self.bodies], self._active
-        best = np.inf
+        now, active = self._ahead(approach), self._active
         for rounds in range(1, _ROUNDS + 1):
             answers = [
-                body.answer(lam, one, loading=rounds == 1)
-                for body, one in zip(self.bodies, w, strict=True)
+                body.answer(now.lam, w, loading=rounds == 1)
+                for body, w in zip(self.bodies, now.w, strict=True)
             ]
-            new, active = self._closed(q, lam, answers, active)
+            lam, active = self._closed(q, now.lam, answers, active)
+            w = tuple(
+                w + answer.step + answer.along @ (lam - now.lam)
+                for w, answer in zip(now.w, answers, strict=True)
+            )
             worst = max((answer.residual for answer in answers), default=0.0)
-            # points that yield in every other round: half a step lies between
-            part = 0.5 if rounds > _FREE and worst > 0.5 * best else 1.0
-            best = min(best, worst) if rounds > 1 else np.inf
-            w = [
-                one + part * (answer.step + answer.along @ (new - lam))
-                for one, answer in zip(w, answers, strict=True)
-            ]
-            change, size = float(np.abs(new - lam).max()), float(new.max())
-            lam = lam + part * (new - lam)
+            change, size = float(np.abs(lam - now.lam).max()), float(lam.max())
             if rounds > 1 and worst < _SMALL and change <= _SMALL * size:
-                force = float(space.axial @ lam)
-                check_state(
-                    space,
-                    approach,
-                    lam,
-                    below=float(space.axial @ self._lam),
-                    needed=force,
-                    deepest=approach,
-                )
-                self._lam, self._active = lam, active
-                for body, one in zip(self.bodies, w, strict=True):
-                    body.accept(lam, one)
+                now = _Trial(approach=approach, lam=lam, w=w)
+                if self._widened(now):
+                    return self._step(approach)
+                self._accept(now, active)
                 return rounds
+            # the first one may penetrate, which has no energy to compare with
+            new = _Trial(approach=approach, lam=lam, w=w)
+            now = new if rounds == 1 else self._lowest(now, new)
         return None
+
+    def _ahead(self, approach: float) -> "_Trial":
+        """State on the line of the last two."""
+        if self._before is None:
+            return self._now
+        way = self._now.approach - self._before.approach
+        return self._before.towards(self._now, (approach - self._before.approach) / way)
+
+    def _widened(self, found: "_Trial") -> bool:
+        """Whether a body yields outside of its zone, which is wider now."""
+        outgrown = [
+            body
+            for body, w in zip(self.bodies, found.w, strict=True)
+            if not body.rest_is_elastic(found.lam, w)
+        ]
+        for body in outgrown:
+            body.widen()
+        if outgrown:
+            self._now = replace(self._now, w=tuple(body.w for body in self.bodies))
+            self._before = None
+        return bool(outgrown)
+
+    def _accept(self, found: "_Trial", active: NDArray[np.bool_]) -> None:
+        """Take a state into the history."""
+        check_state(
+            self.space,
+            found.approach,
+            found.lam,
+            below=float(self.space.axial @ self._now.lam),
+            needed=float(self.space.axial @ found.lam),
+            deepest=found.approach,
+        )
+        self._before, self._now, self._active = self._now, found, active
+        for body, w in zip(self.bodies, found.w, strict=True):
+            body.accept(found.lam, w)
+
+    def _lowest(self, now: "_Trial", new: "_Trial") -> "_Trial":
+        r"""State between two where the energy of the bodies is lowest.
+
+        Both keep the gaps closed or open, and so do all between them.  With the gaps opened on the
+        way, :math:`\Delta g`, the energy of the step of time rises there by
+        :math:`\lambda^T \Delta g + (\hat K w - f_p)^T \Delta u`; it is convex, so that Newton's
+        method with this line search finds its minimum from anywhere.
+        """
+        pressed = new.lam - now.lam
+        opened = self.C @ pressed
+        moved = []
+        for body, w, end in zip(self.bodies, now.w, new.w, strict=True):
+            opened += body.opened(end - w)
+            moved.append(body.U @ pressed + end - w)
+
+        def slope(share: float) -> float:
+            at = now.towards(new, share)
+            return float(at.lam @ opened) + sum(
+                float(body.out_of_balance(at.lam, w) @ move)
+                for body, w, move in zip(self.bodies, at.w, moved, strict=True)
+            )
+
+        noise = _ROUND_OFF * float(new.lam @ (self.C @ new.lam))
+        return now.towards(new, lowest_share(slope, noise))
 
     def first_yield(self, deepest: float) -> float | None:
         """Approach [m] at which the first point yields; None where none does up to ``deepest``."""

@@ -17,6 +17,7 @@ shakedown), so that the largest force is all that the faces remember.
 """
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from scipy.interpolate import PchipInterpolator
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import half_width_of
+from klack.errors import ConvergenceError
 from klack.plasticity.ladder import LoadingState, YieldingContact
 
 __all__ = ["Opening", "YieldingLoops", "opening", "yielding_loops"]
@@ -36,6 +38,9 @@ _STATES = 32
 
 _GROWTH = 1.15
 """Force from one state of the ladder to the next."""
+
+_STRAIN = 0.3
+"""Plastic strain at which loops end: theirs is small strain."""
 
 _FEWEST, _MOST = 5, 400
 """States: a law needs some, even where the energy ends just above first yield."""
@@ -84,6 +89,9 @@ class YieldingLoops:
         Work of closing up to each state.
     half_width : array, shape (n,) [m]
         Of the contact at each state: half the width of the land that it leaves.
+    limit : str
+        Why they end before an opening gives back the energy of the impact, so that running-in may
+        go beyond them; empty where they do not.
     """
 
     first_yield: float
@@ -92,6 +100,7 @@ class YieldingLoops:
     openings: tuple[Opening, ...]
     taken: Floats
     half_width: Floats
+    limit: str = ""
 
     @property
     def loss(self) -> Floats:
@@ -145,6 +154,13 @@ def yielding_loops(
         Of the impact.
     closing : float [N]
         Force that keeps working while the bodies approach.
+
+    Raises
+    ------
+    ConvergenceError
+        Where they end below the first impact.
+    ReachError
+        Where the contact grows to the border of the candidate points.
     """
     space, solver = contact.space, ComplementaritySolver(contact.C)
     untouched = np.zeros(space.count)
@@ -163,29 +179,50 @@ def yielding_loops(
             taken=np.empty(0),
             half_width=np.empty(0),
         )
-    states, openings, taken = [contact.load(low)], [as_made(low)], [as_made(low).energy]
+    states, openings = [contact.load(low)], [as_made(low)]
     slope = openings[0].force[-1] - openings[0].force[-2]
     slope /= openings[0].approach[-1] - openings[0].approach[-2]
+    limit = f"more than {_MOST} states.\nTry: a lower speed."
     while len(states) < _MOST:
         last = states[-1]
-        state = contact.load(last.approach + (_GROWTH - 1.0) * last.force / slope)
+        try:
+            state = contact.load(last.approach + (_GROWTH - 1.0) * last.force / slope)
+        except ConvergenceError as error:
+            limit = str(error)
+            break
         slope = (state.force - last.force) / (state.approach - last.approach)
         states.append(state)
         openings.append(opening(space, solver, state.plastic_gap, state.approach))
-        taken.append(0.0)
-        enough = openings[-1].energy - closing * state.approach > energy
+        # one state more: modes may press a little harder than a static impact
+        enough = openings[-2].energy - closing * last.approach > energy
         if enough and len(states) >= _FEWEST:
+            limit = ""
+            break
+        if state.plastic_strain > _STRAIN:
+            limit = (
+                f"plastic strain of {100 * state.plastic_strain:.2g} %, far beyond small strain.\n"
+                "Try: a lower speed, or a yield stress that suits the body."
+            )
             break
     first = openings[0]
     curve = PchipInterpolator(
         np.concatenate([first.approach, [state.approach for state in states[1:]]]),
         np.concatenate([first.force, [state.force for state in states[1:]]]),
     )
+    taken = np.array([float(curve.integrate(0.0, state.approach)) for state in states])
+    covered = float(taken[-1]) - closing * states[-1].approach
+    if limit and (covered < energy or len(states) < _FEWEST):
+        share = sqrt(max(covered, 0.0) / energy)
+        raise ConvergenceError(
+            f"static loops of faces that yield: they end at {states[-1].force:.4g} N, the peak of "
+            f"an impact at {100 * min(share, 1.0):.2g} % of this speed. {limit}"
+        )
     return YieldingLoops(
         first_yield=states[0].force,
         elastic=elastic,
         states=tuple(states),
         openings=tuple(openings),
-        taken=np.array([float(curve.integrate(0.0, state.approach)) for state in states]),
+        taken=taken,
         half_width=np.array([half_width_of(space, state.pressures) for state in states]),
+        limit=limit,
     )

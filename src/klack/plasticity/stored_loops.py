@@ -21,13 +21,17 @@ def loops_to_entry(loops: YieldingLoops) -> Entry:
             "approach": np.array([one.approach for one in openings]).reshape(-1, count),
             "force": np.array([one.force for one in openings]).reshape(-1, count),
             "states": np.array(
-                [(s.approach, s.force, s.plastic_work, float(s.rounds)) for s in loops.states]
-            ).reshape(-1, 4),
+                [
+                    (s.approach, s.force, s.plastic_work, s.plastic_strain, float(s.rounds))
+                    for s in loops.states
+                ]
+            ).reshape(-1, 5),
             "pressures": np.array([s.pressures for s in loops.states]).reshape(shape),
             "plastic gap": np.array([s.plastic_gap for s in loops.states]).reshape(shape),
             "taken": loops.taken,
             "half width": loops.half_width,
-        }
+        },
+        text=loops.limit,
     )
 
 
@@ -49,11 +53,13 @@ def loops_of_entry(entry: Entry) -> YieldingLoops:
                 pressures=pressures,
                 plastic_gap=plastic_gap,
                 plastic_work=float(state[2]),
-                rounds=int(state[3]),
+                plastic_strain=float(state[3]),
+                rounds=int(state[4]),
             )
             for state, pressures, plastic_gap in rows
         ),
         openings=tuple(openings),
         taken=arrays["taken"],
         half_width=arrays["half width"],
+        limit=entry.text,
     )

@@ -1,5 +1,6 @@
 """A body that yields: its zone, its history, and its linear answer at one state."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,18 +8,23 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.elasticity.factorization import factorize
+from klack.errors import ConvergenceError
 from klack.hardening import Hardening
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.radial_return import (
     PlasticState,
     Returned,
     radial_return,
     von_mises_of_strain,
 )
-from klack.plasticity.zone import PlasticZone, StrainPoints
+from klack.plasticity.zone import PlasticZone, StrainPoints, plastic_zone, strain_points
 
 __all__ = ["Answer", "YieldingBody"]
 
 Floats = NDArray[np.float64]
+
+_WIDER, _TRIES = 1.5, 4
+_BEGUN = 1e-3  # of the contact force of a point: smaller plastic forces need not be exact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,7 +43,8 @@ class Answer:
     along : array, shape (nz, nc) [m/N]
         Change of w per contact force.
     residual : float [-]
-        Forces out of balance over the plastic ones.
+        Forces out of balance over the plastic ones; where these begin, over a thousandth of the
+        contact force of a point.
     """
 
     plastic_gap: Floats
@@ -50,18 +57,71 @@ class Answer:
 class YieldingBody:
     """One of the two bodies; the state of the last accepted step, and of the step being tried.
 
+    Only a zone about the contact may yield.  Where the rest would, the zone is widened, and keeps
+    what has yielded so far.
+
     Parameters
     ----------
-    zone : PlasticZone
-    U : array, shape (nz, nc) [m/N]
-        Elastic displacements of the zone under unit forces of the contact points.
+    body : LoadedBody
+    rows : csr_array, shape (nc, n_dof) [-]
+        Gaps of the contact points per displacement.
+    place : array, shape (2,) [m]
+        Middle of the contact.
+    radius : float [m]
+        Of the first zone about it.
     """
 
-    def __init__(self, zone: PlasticZone, U: Floats) -> None:
-        self.zone, self.U = zone, U
-        self.w = np.zeros(len(zone.dofs))
-        self.states = [PlasticState.none(block.volume.size) for block in zone.points]
+    def __init__(self, body: LoadedBody, rows: csr_array, place: Floats, radius: float) -> None:
+        self._body, self._rows, self._place = body, rows, place
+        self._radius, self._widest = radius, radius * _WIDER**_TRIES
         self.work = 0.0
+        self._choose()
+        self.w = np.zeros(len(self.zone.dofs))
+        self.states = [PlasticState.none(block.volume.size) for block in self.zone.points]
+
+    def _choose(self) -> None:
+        """Condense onto the elements within the radius."""
+        one = self._body
+        near = one.elements_near(self._place, self._radius)
+        beyond = one.elements_near(self._place, np.inf) & ~near
+        self.zone: PlasticZone = plastic_zone(one.body, one.materials, near)
+        self.U: Floats = one.flexibility.solve(self._rows.T.toarray())[self.zone.dofs]
+        self._rest = strain_points(one.body.mesh, one.materials, beyond, one.body.name)
+
+    def rest_is_elastic(self, lam: Floats, w: Floats) -> bool:
+        """Whether no point outside of the zone is beyond its yield stress."""
+        if not self._rest:
+            return True
+        load = self._rows.T @ lam
+        load[self.zone.dofs] += self._plastic_forces(lam, w)
+        u = self._body.flexibility.solve(load)
+        for block in self._rest:
+            stress = von_mises_of_strain(block.strain(u), block.material.shear_modulus)
+            if np.any(stress > _hardening(block).yield_stress):
+                return False
+        return True
+
+    def widen(self) -> None:
+        """Widen the zone; the history stays.
+
+        Raises
+        ------
+        ConvergenceError
+            Where the zone is as wide as no local contact is.
+        """
+        if self._radius * _WIDER > self._widest:
+            raise ConvergenceError(
+                f"elastic-plastic contact: '{self._body.body.name}' yields more than "
+                f"{1e3 * self._radius:.3g} mm from the contact.\nTry: a lower speed, or a yield "
+                "stress that suits the body; this is no local contact any more."
+            )
+        self._radius *= _WIDER
+        load = np.zeros(self._body.body.dof_count)
+        load[self.zone.dofs] = self.plastic_forces()
+        former, states = self.zone.points, self.states
+        self._choose()
+        self.w = self._body.flexibility.solve(load)[self.zone.dofs]
+        self.states = [_carried(block, former, states) for block in self.zone.points]
 
     def answer(self, lam: Floats, w: Floats, *, loading: bool) -> Answer:
         """Linear answer about forces ``lam`` [N] and displacements ``w`` [m].
@@ -83,7 +143,7 @@ class YieldingBody:
         moves[kept] = solved
         step, along = moves[:, 0], moves[:, 1:]
         compliance = self.U.T @ V + V.T @ along
-        size = float(np.abs(f).max(initial=0.0))
+        size = max(float(np.abs(f).max(initial=0.0)), _BEGUN * float(lam.max(initial=0.0)))
         wrong = float(np.abs(out_of_balance[kept]).max(initial=0.0))
         return Answer(
             plastic_gap=self.U.T @ f + V.T @ step,
@@ -92,6 +152,14 @@ class YieldingBody:
             along=along,
             residual=wrong / size if size > 0.0 else 0.0,
         )
+
+    def out_of_balance(self, lam: Floats, w: Floats) -> Floats:
+        """Forces [N] that hold ``w`` less those of the plastic strain, shape (nz,)."""
+        return np.asarray(self.zone.K @ w - self._plastic_forces(lam, w))
+
+    def opened(self, w: Floats) -> Floats:
+        """Gaps [m] that displacements ``w`` [m] open, shape (nc,)."""
+        return np.asarray(self.U.T @ (self.zone.K @ w))
 
     def elastic_utilisation(self, lam: Floats) -> float:
         """Largest von Mises stress over the yield stress in the zone, were it all elastic."""
@@ -119,9 +187,14 @@ class YieldingBody:
         return self._forces([state.strain for state in self.states])
 
     @property
-    def has_yielded(self) -> bool:
-        """Whether any point has."""
-        return any(bool(np.any(state.equivalent > 0.0)) for state in self.states)
+    def largest_strain(self) -> float:
+        """Largest equivalent plastic strain [-] of the accepted history."""
+        return max(float(state.equivalent.max(initial=0.0)) for state in self.states)
+
+    def _plastic_forces(self, lam: Floats, w: Floats) -> Floats:
+        """Forces [N] of the plastic strain at a state that is being tried, shape (nz,)."""
+        returned = self._returned(lam, w, loading=False)
+        return self._forces([result.state.strain for result in returned])
 
     def _plastic(self, lam: Floats, w: Floats, *, loading: bool) -> tuple[Floats, csr_array]:
         count = len(w)
@@ -150,6 +223,20 @@ class YieldingBody:
         for block, strain in zip(self.zone.points, strains, strict=True):
             f += block.forces(2.0 * block.material.shear_modulus * strain, count)
         return f[:-1]
+
+
+def _carried(
+    block: StrainPoints, former: Sequence[StrainPoints], states: Sequence[PlasticState]
+) -> PlasticState:
+    """History of points that were partly in a smaller zone."""
+    state = PlasticState.none(block.volume.size)
+    strain = state.strain.reshape(*block.volume.shape, 4)
+    equivalent = state.equivalent.reshape(block.volume.shape)
+    for old, known in zip(former, states, strict=True):
+        _, here, there = np.intersect1d(block.elements, old.elements, return_indices=True)
+        strain[here] = known.strain.reshape(*old.volume.shape, 4)[there]
+        equivalent[here] = known.equivalent.reshape(old.volume.shape)[there]
+    return state
 
 
 def _hardening(block: StrainPoints) -> Hardening:

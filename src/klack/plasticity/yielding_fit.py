@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 _STATES, _PLACES = 129, 65
 """Of the tables: the elastic curve within 1e-4 of the force, the loss within 1e-4 of itself."""
 
+_LITTLE = 1e-2
+"""Of the work of closing: what the loss may fall between two states of a coarse mesh."""
+
 
 def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
     """Law for a reduced model.
@@ -50,12 +53,30 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
             )
         along = PchipInterpolator((d - d[0]) / (d[-1] - d[0]), one.force / one.force[-1])
         shapes[i] = along(places)
-    parted = np.array([one.set for one in loops.openings])
-    parted[0] = min(parted[0], 0.0)
+    # faces as made meet at a weighted gap that a coarse mesh closes late
+    parted = np.array([one.set for one in loops.openings]) - loops.openings[0].set
     fine = largest[0] + (largest[-1] - largest[0]) * (np.arange(_STATES) / (_STATES - 1)) ** 2
+    closing, shape = (
+        PchipInterpolator(largest, force)(fine),
+        PchipInterpolator(largest, shapes)(fine),
+    )
     return YieldingLaw(
         largest=fine,
-        set=PchipInterpolator(largest, parted)(fine),
-        closing=PchipInterpolator(largest, force)(fine),
-        shape=PchipInterpolator(largest, shapes)(fine),
+        set=_rising_loss(fine, PchipInterpolator(largest, parted)(fine), closing, shape, places),
+        closing=closing,
+        shape=shape,
     )
+
+
+def _rising_loss(
+    largest: Floats, parted: Floats, force: Floats, shape: Floats, places: Floats
+) -> Floats:
+    """Sets [m] with which the loss does not fall, where it falls by little on a coarse mesh."""
+    full = force * np.trapezoid(shape, places, axis=1)  # per way from the set
+    stored = full * (largest - parted)
+    more = np.diff(largest) * (force[1:] + force[:-1]) / 2.0
+    taken = stored[0] + np.concatenate([[0.0], np.cumsum(more)])
+    lacking = np.maximum.accumulate(taken - stored) - (taken - stored)
+    if lacking.max() > _LITTLE * taken[-1]:
+        return parted
+    return np.asarray(parted + lacking / full)

@@ -63,12 +63,15 @@ class StrainPoints:
     volume : array, shape (e, q) [m^3]
         Of the whole ring.
     material : Material
+    elements : int array, shape (e,)
+        Their numbers in the mesh, in the order of its blocks.
     """
 
     dofs: Ints
     B: Floats
     volume: Floats
     material: Material
+    elements: Ints
 
     def strain(self, u: Floats) -> Floats:
         """Strain [-] of displacements [m], shape (e q, 4), with the tensor's shear."""
@@ -121,6 +124,7 @@ def strain_points(
     found, at = [], 0
     for block in mesh.blocks:
         here = chosen[at : at + len(block.connectivity)]
+        elements = at + np.flatnonzero(here)
         at += len(block.connectivity)
         if not here.any():
             continue
@@ -131,13 +135,14 @@ def strain_points(
                 expected=" or ".join(_LINEAR),
                 hint="give a mesh of second order; elements of first order lock.",
             )
-        found.append(
-            _strain_points(mesh, block.family, block.connectivity[here], materials[block.solid])
-        )
+        nodes, material = block.connectivity[here], materials[block.solid]
+        found.append(_strain_points(mesh, block.family, nodes, material, elements))
     return found
 
 
-def _strain_points(mesh: Mesh, family: str, nodes: Ints, material: Material) -> StrainPoints:
+def _strain_points(
+    mesh: Mesh, family: str, nodes: Ints, material: Material, elements: Ints
+) -> StrainPoints:
     xi, weights = quadrature(family, "stiffness")
     N, dN = shape_functions(family, xi)
     x = mesh.points[nodes]
@@ -153,7 +158,7 @@ def _strain_points(mesh: Mesh, family: str, nodes: Ints, material: Material) -> 
     c = np.einsum("eiq,eq->ei", chi, volume)
     averaged = np.einsum("eiq,eq,eqab->eiab", chi, volume, B, optimize=True) / c[..., None, None]
     dofs = (2 * nodes[:, :, None] + np.arange(2)).reshape(len(nodes), -1)
-    return StrainPoints(dofs=dofs, B=averaged, volume=c**2, material=material)
+    return StrainPoints(dofs=dofs, B=averaged, volume=c**2, material=material, elements=elements)
 
 
 def _near_points(family: str, xi: Floats) -> Floats:

@@ -33,6 +33,7 @@ from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
 from klack.analyses.impact.yielding_level import (
     doubt_elastic_levels,
+    doubt_large_strain,
     elastic_twin,
     static_loops_of,
     tell_yield,
@@ -291,6 +292,8 @@ def _study(
                     if pair.yields:
                         twins[level] = elastic_twin(problem, pair)
                         tell_yield(results[level], twins[level], _surfaces(case))
+                        assert loops is not None
+                        results[level] = doubt_large_strain(results[level], loops)
         ran = running_in(case, own, loops) if loops is not None and "reduced" in results else None
         if ran is None and (case.run.impacts > 1 or case.run.run_in):
             warnings.warn(

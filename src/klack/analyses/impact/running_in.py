@@ -5,6 +5,7 @@ body of energy E the limit is the force :math:`P_\infty` whose elastic opening g
 :math:`W_e(P_\infty) = E` (shakedown), and what is missing falls geometrically.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,7 +15,9 @@ from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
 from klack.case.schema import Case
 from klack.contact.restitution import measure_impact
 from klack.contact.yielding_law import YieldingLaw
+from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
+from klack.units import format_si
 
 __all__ = ["running_in", "running_in_columns", "running_in_rows"]
 
@@ -35,14 +38,32 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         With a law of faces that yield.
     loops : YieldingLoops
         Behind that law.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where the faces are pressed further than the loops go.
     """
     law = pair.law
     asked = case.run.impacts
     if not isinstance(law, YieldingLaw) or (asked == 1 and not case.run.run_in):
         return None
     rows: list[tuple[float, ...]] = []
+    settled = False
     while len(rows) < (_MOST if case.run.run_in else asked):
-        history = simulate_bodies(case, pair.upper, pair.lower, law)
+        try:
+            history = simulate_bodies(case, pair.upper, pair.lower, law)
+        except InputError:
+            if not rows or not loops.limit:
+                raise
+            warnings.warn(
+                f"running in ends after {len(rows)} impacts: the next one presses harder than "
+                f"{format_si(float(loops.force[-1]), 'N', 4)}, where the static loops end. "
+                f"{loops.limit}",
+                AccuracyWarning,
+                stacklevel=2,
+            )
+            break
         measures, before = measure_impact(history), law.loss_after(law.reached)
         law = law.after(history.pressed)
         lost = law.loss_after(law.reached) - before

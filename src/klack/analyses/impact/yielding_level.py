@@ -8,6 +8,8 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from klack.analyses.impact.record import LevelResult
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
@@ -19,10 +21,19 @@ from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress
 from klack.units import format_si
 
-__all__ = ["doubt_elastic_levels", "elastic_twin", "static_loops_of", "tell_yield"]
+__all__ = [
+    "doubt_elastic_levels",
+    "doubt_large_strain",
+    "elastic_twin",
+    "static_loops_of",
+    "tell_yield",
+]
 
 _SHARE = 2e-3
 """Of the energy: what elastic bodies may miss without a doubt."""
+
+_LARGE = 0.1
+"""Plastic strain from which on the elements themselves are turned and stretched too much."""
 
 
 def static_loops_of(problem: ContactProblem, progress: Progress) -> YieldingLoops | None:
@@ -86,6 +97,28 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
         AccuracyWarning,
         stacklevel=2,
     )
+
+
+def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult:
+    """Level with a doubt where the faces yield further than small strain holds.
+
+    Parameters
+    ----------
+    result : LevelResult
+        With the law of faces that yield.
+    loops : YieldingLoops
+        Behind that law.
+    """
+    strains = [state.plastic_strain for state in loops.states]
+    strain = float(np.interp(result.measures.peak_force, loops.force, strains))
+    if strain < _LARGE:
+        return result
+    doubt = (
+        f"plastic strain reaches {100 * strain:.2g} % at the peak, where small strain and linear "
+        "hardening hold to about 10 %; set and land are estimates. Try: a lower speed, or a yield "
+        "stress that suits the body."
+    )
+    return replace(result, doubts=(*result.doubts, doubt))
 
 
 def doubt_elastic_levels(
