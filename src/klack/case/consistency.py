@@ -7,6 +7,7 @@ import numpy as np
 from klack.case.bodies import CaseFile, SurfaceName
 from klack.case.given_consistency import check_given, check_port
 from klack.case.impact_sections import ImpactSections
+from klack.case.outputs import check_outputs
 from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
@@ -31,6 +32,7 @@ def check_consistency(case: ImpactSections) -> None:
     _check_solid_only(case)
     _check_guide(case)
     _check_shots(case)
+    _check_outputs(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
             ("run", "levels"),
@@ -211,6 +213,16 @@ def _check_solid_only(case: ImpactSections) -> None:
             hint="take 'model: swept' with 'layers: 18' for both of them.",
             on_key=True,
         )
+
+
+def _check_outputs(case: ImpactSections) -> None:
+    for i, output in enumerate(case.outputs):
+        require_known(("outputs", i, "body"), output.body, case.bodies, "body")
+    given = [name for name, body in case.bodies.items() if not body.has_surfaces]
+    others = [f"bodies.{name}" for name in given]
+    others += [key for key in ("guide", "opposite", "shots") if getattr(case, key) is not None]
+    dimensions = {name: body.geometry.dimension for name, body in case.bodies.items()}
+    check_outputs(case.outputs, dimensions, next(iter(others), ""))
 
 
 def _check_guide(case: ImpactSections) -> None:

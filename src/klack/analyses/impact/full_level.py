@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from klack.analyses.impact.gauges import FullGauges
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
@@ -105,6 +106,7 @@ def run_full(
     """
     case, pair, space = problem.case, problem.pair, problem.space
     while True:
+        reading = FullGauges(pair)
         try:
             result = simulate_in_full(
                 problem,
@@ -113,6 +115,7 @@ def run_full(
                 longest_period=_longest_period(pools[pair.upper.name]),
                 progress=progress,
                 threads=threads,
+                snapshots=reading.snapshots(case),
             )
         except ReachError as error:
             space = problem.wider(space, error)
@@ -143,7 +146,7 @@ def run_full(
             history, result.point_force, space.points, space.area, _friction(case, result)
         ),
     )
-    return level, result
+    return replace(level, gauges=reading.records(case.run.full_step)), result
 
 
 def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
