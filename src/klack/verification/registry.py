@@ -32,6 +32,7 @@ COVERS = {
     "pistons.",
     "sound": "From force to ear: one-third octaves, weighting, levels, and loudness of ISO 532-1.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
+    "measured": "Recordings of others: strain pulses of struck bars, six shots.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "

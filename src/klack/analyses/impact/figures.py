@@ -32,6 +32,7 @@ from klack.report.looks import OTHER, PART_LOOKS, Look, look_of
 from klack.report.wording import quantity, sentence
 
 __all__ = [
+    "OUTPUT_UNITS",
     "approach_chart",
     "charts",
     "energy_bars",
@@ -56,12 +57,14 @@ _LOOKS: dict[str, Look] = {
     "lumped": Look("pink", "sparse", 2.1),
 }
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
-_OUTPUT_UNITS: dict[GaugeKind, tuple[str, float]] = {
+OUTPUT_UNITS: dict[GaugeKind, tuple[str, float]] = {
     "displacement": ("µm", 1e6),
     "velocity": ("m/s", 1.0),
     "strain": ("µm/m", 1e6),
     "stress": ("MPa", 1e-6),
 }
+"""Unit of a chart of each kind of output, and the factor from SI."""
+
 _TIME = AxisSpec(label="time since first touch", unit="µs")
 
 
@@ -196,7 +199,7 @@ def output_charts(study: ImpactStudy) -> tuple[Chart, ...]:
             if record.name == name
         ]
         record = pairs[0][1]
-        unit, factor = _OUTPUT_UNITS[record.kind]
+        unit, factor = OUTPUT_UNITS[record.kind]
         curves = [
             _level_curve(_since_touch(level, one.time), factor * one.values, level)
             for level, one in pairs
