@@ -75,6 +75,7 @@ def case_models(
         return _of_valve(_smooth_valve(case), progress, threads)
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
+    case.require_ends("an exported model")
     case = _frictionless(case)
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=1, progress=progress)

@@ -68,6 +68,7 @@ def run_reduce(
         return ReductionStudy(
             case=case.name, title=case.title, bodies=(given.upper, given.lower), transfer=()
         )
+    case.require_ends("a reduction")
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=TRANSFER_MODES, progress=progress)
     progress("reduced", 0.0)
