@@ -12,13 +12,17 @@ import numpy as np
 import pytest
 
 from klack.analyses.impact.run import run_impact
+from klack.assembling.bodies import build_bodies
 from klack.case.reader import read_case
+from klack.elasticity.loads import traction_load
+from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.gauges.located_point import locate
 from klack.gauges.rows import Line, displacement_row, strain_row, stress_row
 from klack.low_pass import LowPass
 from klack.materials import Material
 from klack.mesh.mesh import ElementBlock, Mesh
+from klack.progress import silent
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 
@@ -187,6 +191,22 @@ def test_all_levels_read_the_same_where_their_contact_is_the_same():
             other = found[level][name]
             apart = np.interp(full.time, other.time, other.exact) - full.exact
             assert np.abs(apart).max() < 0.03 * np.abs(full.exact).max(), (level, name)
+
+
+def test_a_held_force_strains_a_rod_by_its_stress():
+    """Statics: under an even pressure p on its end a held rod has the strain p / E everywhere."""
+    text = ROD.replace("name: far}", "name: foot}", 2).replace("    mesh: {size: 1 mm}\ncontact",
+                       "    mesh: {size: 1 mm}\n    fixed: [{surface: foot}]\ncontact")  # fmt: skip
+    pair = build_bodies(read_case(text, Path("case.yaml")), silent)
+    bar = pair.lower
+    load = traction_load(bar.mesh, bar.mesh.surface("end"), lambda x, n: -1e6 * n)
+    with Flexibility(bar) as flexibility:
+        u = flexibility.deflections(load[:, None])[:, 0]
+
+    read = {gauge.name: float(gauge.row @ u) for gauge in pair.gauges if gauge.body == "bar"}
+    assert read["strain"] == pytest.approx(-1e6 / 210e9, rel=1e-9)
+    assert read["stress"] == pytest.approx(-1e6, rel=1e-9)
+    assert read["speed"] == pytest.approx(-30e-3 * 1e6 / 210e9, rel=1e-9)
 
 
 def test_a_gauge_outside_stops_the_case():

@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import klack
 from klack.analyses.comparison.analysis import MEASURED_IMPACT
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.run import run_impact
 from klack.case.reader import read_case
 from klack.cli.main import main
+from klack.exchange.results.study_table import result_table
 
 CASE = (Path(__file__).parents[1] / "data" / "struck_rod.yaml").read_text(encoding="utf-8")
 
@@ -66,6 +68,30 @@ def test_a_known_speed_keeps_the_factor(result, tmp_path, capsys):
 
     assert code == 0
     assert "No factor was fitted" in " ".join(capsys.readouterr().out.split())
+
+
+def test_outputs_are_in_files_reports_and_json(result, tmp_path):
+    assert main(["export", str(result), "--to", "csv", "--out", str(tmp_path), "--quiet"]) == 0
+    text = "".join(path.read_text() for path in tmp_path.rglob("*.csv"))
+    assert "output front" in text
+    assert "output stress" in text
+    study = IMPACT.load(result)
+    record = study.levels["full"].gauges[0]
+    table = result_table(study).runs[0].channel("output front")
+    np.testing.assert_array_equal(table.values, record.values)
+    assert (table.unit, table.meaning) == ("1", record.label)
+    outputs = IMPACT.to_json(study)["levels"]["full"]["outputs"]
+    assert outputs["front"]["lowest"] == record.values.min()
+    assert outputs["stress"]["unit"] == "Pa"
+    charts = [chart.name for part in IMPACT.content(study).sections for chart in part.charts]
+    assert {"output-front", "output-stress"} <= set(charts)
+
+
+def test_python_compares_the_same(result, tmp_path):
+    file = recording(tmp_path / "shot.csv", result)
+    record = klack.compare(klack.load_result(result), file, output="front").record
+
+    assert record.pulses[0].factor == pytest.approx(1.5, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -315,6 +315,10 @@ class ImpactSections(CaseFile):
         smooth = {"friction": 0.0, "static_friction": None, "stribeck_speed": 0.0}
         return self.model_copy(update={"contact": self.contact.model_copy(update=smooth)})
 
+    def without_outputs(self) -> Self:
+        """The same without sensors, for models whose outputs are displacements of ports."""
+        return self.model_copy(update={"outputs": ()})
+
     @property
     def has_surfaces(self) -> bool:
         """False where a body is a reduced model or nodes alone; see :class:`CaseBody`."""
