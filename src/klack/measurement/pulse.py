@@ -86,9 +86,11 @@ def measure_pulse(time: Floats, values: Floats, where: str) -> Pulse:
     InputError
         For a record without a front, without an end, or without a plateau.
     """
+    if len(values) < _FEWEST:
+        _refuse(where, f"no pulse: {len(values)} samples")
     size = np.abs(values - np.median(values[: max(3, len(values) // 50)]))
-    if len(values) < _FEWEST or not float(size.max()) > 0.0:
-        _refuse(where, "no pulse: the record is constant" if len(values) else "no samples")
+    if not float(size.max()) > 0.0:
+        _refuse(where, "no pulse: the record is constant")
     first = int(np.argmax(size > 0.5 * size.max()))
     rest = float(np.mean(values[: max(1, first // 2)]))
     sign = 1.0 if values[first] >= rest else -1.0
