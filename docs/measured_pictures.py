@@ -1,7 +1,7 @@
 """Make the pictures of the page of measured comparisons: ``python docs/measured_pictures.py``.
 
 From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
-struck-bar.svg and struck-bar-ends.svg; alumina.svg from the checks of friction.
+struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres.
 """
 
 from pathlib import Path
@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
-from klack.verification.friction import checks as friction_checks
 from klack.verification.measured import SHOTS, struck_bar
+from klack.verification.oblique_spheres import oblique_spheres
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -56,11 +56,7 @@ def figures() -> dict[str, Figure]:
 
 def alumina() -> Figure:
     """Tangential restitution of alumina on glass over the angle of incidence."""
-    curve = next(
-        check.curve
-        for check in friction_checks()
-        if check.name.startswith("alumina") and check.curve is not None
-    )
+    curve = next(check.curve for check in oblique_spheres() if check.curve is not None)
     figure = Figure(figsize=(5.4, 3.2), layout="constrained")
     axes = figure.add_subplot()
     axes.plot(*curve.expected, "o", color=COLOURS["blue"], ms=4, label="measured")

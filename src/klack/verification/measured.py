@@ -1,4 +1,4 @@
-"""Checks against measurements: strain pulses of struck bars, recorded by others.
+"""Checks against measurements of others: strain pulses of struck bars, oblique impacts of spheres.
 
 The recordings are shipped with the case ``struck-bar``; its README says what is known of them.  The
 end face of the strikers and the low pass of the amplifier are not: one dome and one low pass for
@@ -18,6 +18,7 @@ from klack.case.reader import read_case, text_of
 from klack.case.shipped import find_case
 from klack.stages import collected_warnings
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.oblique_spheres import oblique_spheres
 
 __all__ = ["checks", "struck_bar"]
 
@@ -85,6 +86,7 @@ def checks() -> list[Check]:
             source=_SOURCE,
             reason=_FLAT,
         ),
+        *oblique_spheres(),
     ]
 
 
