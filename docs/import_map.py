@@ -29,7 +29,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     # ground: errors, units, files that are whole or not there
     ("errors", "closing", "cores", "swapped_names", "progress"),
     ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance", "hardening"),
-    ("units", "unit_systems", "materials", "signals", "held_folder", "cache"),
+    ("units", "unit_systems", "materials", "signals", "low_pass", "held_folder", "cache"),
     ("folder_lock", "stages"),
     ("compiling",),
     ("stage",),
@@ -37,7 +37,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     # bodies
     ("mesh",),
     ("elasticity", "model_files"),
-    ("contact", "reduction"),
+    ("contact", "reduction", "gauges"),
     ("plasticity",),
     # the valve as a network of components
     ("network",),

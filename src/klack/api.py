@@ -659,25 +659,40 @@ def compare(
     measurement: str | Path | Sequence[str | Path] | Mapping[str, str | Path],
     *,
     case: Given | None = None,
+    level: str = "full",
+    output: str | None = None,
     progress: Progress = silent,
 ) -> Result:
-    """Compare a stroke or shots with a measurement, like ``klack compare --measurement``.
+    """Compare a result with a measurement, like ``klack compare --measurement``.
 
     Parameters
     ----------
     result : Result
-        Of :func:`run_stroke` or :func:`run_shots`.
+        Of :func:`run_stroke`, :func:`run_shots` or :func:`run_impact`.
     measurement : path, sequence of paths, or mapping of variant to path
     case : str, Path or CaseOnHand, optional
         Whose section ``measurement`` is used; that of the result by default.
+    level, output : str
+        Of an impact; its output may be left out where there is one.
     """
-    from klack.analyses.comparison.analysis import MEASURED_SHOTS, MEASURED_STROKES
+    from klack.analyses.comparison.analysis import (
+        MEASURED_IMPACT,
+        MEASURED_SHOTS,
+        MEASURED_STROKES,
+    )
+    from klack.analyses.comparison.impacts import compare_impact
     from klack.analyses.comparison.shots import compare_shots
     from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.shots.record import ShotsStudy
     from klack.analyses.stroke.record import StrokeStudy
 
     record = result.record
+    if isinstance(record, ImpactStudy) and not isinstance(measurement, Mapping):
+        pulses = compare_impact(
+            record, _paths(measurement), level=level, output=output, progress=progress
+        )
+        return Result(pulses, MEASURED_IMPACT)
     if case is None:
         section = read_any_case(record.case_text, Path("case.yaml")).measurement
         text = None
@@ -700,7 +715,7 @@ def compare(
     raise InputError(
         "compare",
         got=f"a result of '{result.analysis.form.command}'",
-        expected="one of run_stroke, or one of run_shots with a list of files",
+        expected="one of run_stroke, or one of run_shots or run_impact with a list of files",
         hint="run the stroke first: klack.run_stroke(case).",
     )
 

@@ -17,6 +17,7 @@ from klack.analyses.shots.run import run_shots
 from klack.case import load_case, read_case, shipped_cases
 from klack.case.schema import Case
 from klack.contact.laws import LinearLaw
+from klack.measurement.pulse import measure_pulse
 from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import ContactPair, ReducedSystem
@@ -46,9 +47,23 @@ def test_all_shipped_cases_are_tested():
         "needle-from-inp",
         "quieter",
         "sphere-on-rod",
+        "struck-bar",
         "two-rods",
         "witness",  # in test_calculix_impact.py
     }
+
+
+def test_the_struck_bar_carries_the_wave_of_one_dimension():
+    """Truth: St Venant, strain v / (2 c) for 2 L / c, later by the distance over c."""
+    study = study_of("struck-bar", "full")
+    (gauge,) = study.levels["full"].gauges
+    c, length, speed = sqrt(204.6e9 / 7800.0), 0.2, 14.4
+    pulse = measure_pulse(gauge.time, gauge.values, "struck-bar")
+
+    assert pulse.plateau == pytest.approx(speed / (2 * c), rel=5e-3)  # ripple of lateral inertia
+    # the dome makes the pulse 2.8 % longer, the low pass late by its delay and half of the front
+    assert pulse.length == pytest.approx(2 * length / c, rel=0.035)
+    assert pulse.front == pytest.approx(1.26 / c, rel=0.05)
 
 
 def test_axisymmetric_valve_reduced_against_full():

@@ -74,6 +74,7 @@ ANALYSES: tuple[Entry, ...] = (
     Entry("advice.analysis:ADVICE", example="klack advise demo-valve-axisymmetric --error '2 %'"),
     Entry("comparison.analysis:MEASURED_STROKES", "klack measured strokes"),
     Entry("comparison.analysis:MEASURED_SHOTS", "klack measured shots"),
+    Entry("comparison.analysis:MEASURED_IMPACT", "klack measured impact"),
     Entry("comparison.analysis:CALCULIX"),
     Entry(
         "calibration.analysis:CALIBRATION",

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.assembling.gauges import place_gauges
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.held_nodes import held_nodes
@@ -20,6 +21,7 @@ from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
+from klack.gauges.gauge import Gauge
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import Pose
@@ -45,6 +47,8 @@ class BodyPair:
         Where they meet.
     pose : Pose
         Where the upper body stands, compared with its drawing.
+    gauges : tuple of Gauge
+        On either body.
     """
 
     upper: ElasticBody
@@ -52,6 +56,7 @@ class BodyPair:
     upper_surface: Surface
     lower_surface: Surface
     pose: Pose
+    gauges: tuple[Gauge, ...] = ()
 
     @property
     def shift(self) -> float:
@@ -92,6 +97,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         upper_surface=upper_surface,
         lower_surface=lower_surface,
         pose=pose,
+        gauges=place_gauges(case, {moving.body: (upper, pose), stop.body: (lower, None)}),
     )
 
 

@@ -34,7 +34,7 @@ from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
 from klack.plasticity.yielding_fit import yielding_law
-from klack.reduction.ports import Port
+from klack.reduction.ports import Observer, Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ModeSelection
@@ -245,6 +245,11 @@ def _reduce_at(
             modes_pool=pools[body.name],
             flexibility=flexibility,
             recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
+            observers=[
+                Observer(gauge.name, gauge.row)
+                for gauge in problem.pair.gauges
+                if gauge.body == body.name
+            ],
         )
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )

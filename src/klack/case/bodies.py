@@ -198,6 +198,10 @@ class CaseBody(Section):
     fixed: tuple[Support, ...] | None = Field(
         default=None, min_length=1, description="Held surfaces; none: the body is free."
     )
+    non_reflecting: Name | None = Field(
+        default=None,
+        description="Surface at which a long bar continues: axial waves leave there; level full.",
+    )
     damping: BodyDamping = Field(
         default=BodyDamping(loss_factor=0.0), description="Losses inside the body; none by default."
     )

@@ -7,6 +7,7 @@ import numpy as np
 from klack.case.bodies import CaseFile, SurfaceName
 from klack.case.given_consistency import check_given, check_port
 from klack.case.impact_sections import ImpactSections
+from klack.case.outputs import check_outputs
 from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
@@ -31,6 +32,8 @@ def check_consistency(case: ImpactSections) -> None:
     _check_solid_only(case)
     _check_guide(case)
     _check_shots(case)
+    _check_outputs(case)
+    _check_ends(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
             ("run", "levels"),
@@ -211,6 +214,58 @@ def _check_solid_only(case: ImpactSections) -> None:
             hint="take 'model: swept' with 'layers: 18' for both of them.",
             on_key=True,
         )
+
+
+def _check_ends(case: ImpactSections) -> None:
+    """Non-reflecting ends: of the body that is hit, off its contact and supports, of one bar."""
+    for name, body in case.bodies.items():
+        if body.non_reflecting is None:
+            continue
+        key: Key = ("bodies", name, "non_reflecting")
+        stop = case.contact.stop
+        if case.shots is not None or case.opposite is not None:
+            raise CaseProblem(
+                key,
+                got="a non-reflecting end together with 'shots' or 'opposite'",
+                expected="neither of them: both are for the interface level",
+                hint="remove non_reflecting.",
+                on_key=True,
+            )
+        if name != stop.body or not body.has_surfaces or not isinstance(body.material, str):
+            raise CaseProblem(
+                key,
+                got=f"a non-reflecting end of '{name}'",
+                expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
+                hint="the body that moves would be braked by it from the start.",
+                on_key=True,
+            )
+        check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
+        held = [support.surface for support in body.fixed or ()]
+        if body.non_reflecting in (stop.surface, *held):
+            raise CaseProblem(
+                key,
+                got=f"'{body.non_reflecting}', a surface that is hit or held",
+                expected="another surface, the far end of a bar",
+                hint="waves leave where nothing holds the body.",
+            )
+        others = [level for level in case.run.levels if level != "full"]
+        if others:
+            raise CaseProblem(
+                ("run", "levels"),
+                got=f"the level '{others[0]}' with a non-reflecting end of '{name}'",
+                expected="the level full alone: modes of a body without an end are not computed",
+                hint="levels: [full].",
+            )
+
+
+def _check_outputs(case: ImpactSections) -> None:
+    for i, output in enumerate(case.outputs):
+        require_known(("outputs", i, "body"), output.body, case.bodies, "body")
+    given = [name for name, body in case.bodies.items() if not body.has_surfaces]
+    others = [f"bodies.{name}" for name in given]
+    others += [key for key in ("guide", "opposite", "shots") if getattr(case, key) is not None]
+    dimensions = {name: body.geometry.dimension for name, body in case.bodies.items()}
+    check_outputs(case.outputs, dimensions, next(iter(others), ""))
 
 
 def _check_guide(case: ImpactSections) -> None:

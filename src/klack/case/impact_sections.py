@@ -15,6 +15,7 @@ from klack.case.levels import Level
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.case.opposite import CaseOpposite
+from klack.case.outputs import CaseOutput
 from klack.case.placement import Placement
 from klack.case.shots import Shots
 from klack.case.study import CaseStudy
@@ -282,6 +283,9 @@ class ImpactSections(CaseFile):
     )
     run: Run = Field(description="Levels, steps, duration.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
+    outputs: tuple[CaseOutput, ...] = Field(
+        default=(), description="Sensors on the bodies, each a channel of the results."
+    )
     shots: Shots | None = Field(default=None, description="Input of klack shots.")
     measurement: CaseMeasurement | None = Field(
         default=None, description="Measurement of drops of this valve."
@@ -310,6 +314,10 @@ class ImpactSections(CaseFile):
         """The same with smooth faces."""
         smooth = {"friction": 0.0, "static_friction": None, "stribeck_speed": 0.0}
         return self.model_copy(update={"contact": self.contact.model_copy(update=smooth)})
+
+    def without_outputs(self) -> Self:
+        """The same without sensors, for models whose outputs are displacements of ports."""
+        return self.model_copy(update={"outputs": ()})
 
     @property
     def has_surfaces(self) -> bool:

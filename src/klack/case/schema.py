@@ -31,6 +31,8 @@ class Case(ImpactSections):
         """Check that this case can run the levels; return them without repetition."""
         wanted = tuple(dict.fromkeys(levels))
         for level in wanted:
+            if level != "full":
+                self.require_ends(f"the level '{level}'")
             if level not in LEVELS:
                 raise InputError(
                     "level",
@@ -46,3 +48,14 @@ class Case(ImpactSections):
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
         return tuple(level for level in LEVELS if level in wanted)
+
+    def require_ends(self, what: str) -> None:
+        """Raise for a non-reflecting end, which modes, exported models and decks leave out."""
+        for name, body in self.bodies.items():
+            if body.non_reflecting is not None:
+                raise InputError(
+                    f"{self._path or 'case'}: bodies.{name}.non_reflecting",
+                    got=f"{what} of a body with a non-reflecting end",
+                    expected="klack impact with --level full",
+                    hint="remove the end, and make the bar so long that no echo returns in time.",
+                )

@@ -16,6 +16,14 @@ def check_valve(case: ValveSections) -> None:
         require_surfaces(case, name)
         check_body(case, name)
         _check_ports(case, name)
+        if case.bodies[name].non_reflecting is not None:
+            raise CaseProblem(
+                ("bodies", name, "non_reflecting"),
+                got="a non-reflecting end of a body of a valve",
+                expected="none: strokes have modes alone",
+                hint="use it in an impact, at level full.",
+                on_key=True,
+            )
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_flexible_bodies(case)

@@ -1,6 +1,7 @@
 """``klack compare``: a stored result against that of another program, or against a measurement."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,8 +15,10 @@ from klack.terminal.progress import show_progress
 from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
+    from klack.analyses.impact.record import ImpactStudy
     from klack.case.measurement import CaseMeasurement
     from klack.case.valve_reader import OwnComponents
+    from klack.low_pass import LowPass
 
 __all__ = ["compare"]
 
@@ -44,8 +47,9 @@ def compare(
             name="--measurement",
             consume_multiple=True,
             negative="",
-            help="Recording of the valve, for results of klack stroke and shots; several files "
-            "make one set. VARIANT=FILE for another variant than the first: dry=FILE.",
+            help="Recording of the valve, or of a sensor on a body, for results of klack impact, "
+            "stroke and shots; several files make one set. VARIANT=FILE for another variant than "
+            "the first: dry=FILE.",
         ),
     ] = None,
     variant: Annotated[list[str] | None, Parameter(name="--variant", show=False)] = None,
@@ -71,6 +75,29 @@ def compare(
             help="Folder for the output. [default: RESULT, or RESULT/measured for a measurement]",
         ),
     ] = None,
+    output: Annotated[
+        str | None,
+        Parameter(
+            name="--output",
+            help="Output of an impact that is compared. [default: the only one of the case]",
+        ),
+    ] = None,
+    channel: Annotated[
+        str | None,
+        Parameter(
+            name="--channel",
+            help="Channel of the recordings of an impact. [default: the only one of the file]",
+        ),
+    ] = None,
+    known_speed: Annotated[
+        bool,
+        Parameter(
+            name="--known-speed",
+            negative="",
+            help="For impacts: the speed is known and the recordings are absolute, so no factor is "
+            "fitted.",
+        ),
+    ] = False,
     component: Components = None,
     wanted: Shown = SHOWN,
 ) -> int:
@@ -96,7 +123,8 @@ def compare(
     folder = out if out is not None else result / _MEASURED
     own = imported(component)
     ending = Ending(json=wanted.json, quiet=wanted.quiet, folder=folder, report=report)
-    return _with_measurement(result, measurement or [], case, own, ending)
+    sensor = _Sensor(level=level, output=output, channel=channel, known_speed=known_speed)
+    return _with_measurement(result, measurement or [], case, own, sensor, ending)
 
 
 # --------------------------------------------------------------------------- measurement
@@ -107,22 +135,27 @@ def _with_measurement(
     given: Sequence[str],
     case: Path | None,
     own: "OwnComponents",
+    sensor: "_Sensor",
     ending: Ending,
 ) -> int:
     from klack.analyses.catalogue import analysis_in, load_result
     from klack.analyses.comparison.analysis import MEASURED_SHOTS, MEASURED_STROKES
     from klack.analyses.comparison.shots import compare_shots
     from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.shots.record import ShotsStudy
     from klack.analyses.stroke.record import StrokeStudy
 
     study = load_result(result)
+    if isinstance(study, ImpactStudy):
+        return _with_pulses(study, given, case, sensor, ending)
     if not isinstance(study, StrokeStudy | ShotsStudy):
         raise InputError(
             f"result {result}",
             got=f"a result of another kind ({analysis_in(result).form.name})",
-            expected="one of klack stroke or klack shots",
-            hint="run `klack stroke CASE` for strokes, `klack shots CASE` for drops.",
+            expected="one of klack impact, klack stroke or klack shots",
+            hint="run `klack impact CASE` for a sensor on a body, `klack stroke CASE` for strokes, "
+            "`klack shots CASE` for drops.",
         )
     section, text = _section(study.case_text, result, case, own)
     if isinstance(study, StrokeStudy):
@@ -134,6 +167,68 @@ def _with_measurement(
     with show_progress(ending.quiet) as progress:
         drops = compare_shots(study, paths, section, case_text=text, progress=progress)
     return ending.end(MEASURED_SHOTS, drops)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sensor:
+    """Which output of an impact is compared with which channel."""
+
+    level: str
+    output: str | None
+    channel: str | None
+    known_speed: bool
+
+
+def _with_pulses(
+    study: "ImpactStudy", given: Sequence[str], case: Path | None, sensor: _Sensor, ending: Ending
+) -> int:
+    from klack.analyses.comparison.analysis import MEASURED_IMPACT
+    from klack.analyses.comparison.impacts import compare_impact
+
+    paths = [Path(text) for text in given]
+    for path in paths:
+        _require_file(str(path), path, "a recording of the sensor")
+    with show_progress(ending.quiet) as progress:
+        found = compare_impact(
+            study,
+            paths,
+            level=sensor.level,
+            output=sensor.output,
+            channel=sensor.channel,
+            low_pass=None if case is None else _low_pass_in(case, study, sensor),
+            known_speed=sensor.known_speed,
+            progress=progress,
+        )
+    return ending.end(MEASURED_IMPACT, found)
+
+
+def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass | None":
+    """Low pass of the same output in another case."""
+    from klack.analyses.comparison.impacts import gauge_of
+    from klack.case.reader import load_case
+    from klack.case.shipped import find_case
+
+    name = gauge_of(study, sensor.level, sensor.output).name
+    outputs = {item.name: item for item in load_case(find_case(case)).outputs}
+    if name not in outputs:
+        raise InputError(
+            f"--case {case}",
+            got=f"no output '{name}'",
+            expected=f"an output of the same name, one of: {', '.join(outputs) or 'none'}",
+            hint="its low pass is used; leave --case out for that of the result.",
+        )
+    low_pass = outputs[name].low_pass
+    return None if low_pass is None else low_pass.filter
+
+
+def _require_file(text: str, path: Path, expected: str) -> None:
+    if not path.is_file():
+        raise InputError(
+            f"--measurement {text}",
+            got="a folder" if path.is_dir() else "no such file",
+            expected=expected,
+            hint="check spelling and folder.",
+        )
 
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:

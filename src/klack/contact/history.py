@@ -70,6 +70,8 @@ class EnergyLedger:
         Lost in friction of the faces, never below zero.
     plastic : float [J]
         Lost to faces that yield; a tenth of it stays in them as energy of residual stress.
+    radiated : float [J]
+        Carried away through non-reflecting ends, never below zero.
     """
 
     initial: float
@@ -81,11 +83,14 @@ class EnergyLedger:
     spring: float = 0.0
     friction: float = 0.0
     plastic: float = 0.0
+    radiated: float = 0.0
 
     @property
     def lost(self) -> float:
         """Sum of all losses [J]."""
-        return self.contact_dissipation + self.damping + self.friction + self.plastic
+        return (
+            self.contact_dissipation + self.damping + self.friction + self.plastic + self.radiated
+        )
 
     @property
     def residual(self) -> float:
@@ -103,7 +108,7 @@ class EnergyLedger:
     def least_loss(self) -> float:
         """Smallest loss, relative to the energy turned over [-], of those that are there."""
         losses = [self.contact_dissipation, self.damping]
-        losses += [loss for loss in (self.friction, self.plastic) if loss]
+        losses += [loss for loss in (self.friction, self.plastic, self.radiated) if loss]
         scale = self.turned_over
         return min(losses) / scale if scale else 0.0
 
@@ -122,6 +127,8 @@ class EnergyLedger:
             out["friction"] = self.friction
         if self.plastic:
             out["plastic"] = self.plastic
+        if self.radiated:
+            out["through non-reflecting ends"] = self.radiated
         return out
 
 

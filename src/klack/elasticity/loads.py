@@ -9,12 +9,13 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
 
 from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["traction_load"]
+__all__ = ["face_dashpots", "traction_load"]
 
 Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -42,6 +43,44 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
         forces = np.einsum("qi,fqa,fq->fia", N, t.reshape(x.shape), size)
         np.add.at(load, block.connectivity, forces)
     return load.ravel()
+
+
+def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
+    r"""Matrix of dashpots spread over a surface, along its normals.
+
+    .. math:: C_{ij} = \int_\Gamma z \, (N_i n)(N_j n)^T \, dA
+
+    With :math:`z = \sqrt{E \varrho}`, density times the speed of waves in bars, the traction on the
+    end of a bar is :math:`-z v`, that of the outgoing wave alone: the bar seems to have no end
+    (Lysmer & Kuhlemeyer 1969).  Exact for axial waves that are long against the thickness; shorter
+    ones and bending are reflected in part.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    surface : Surface
+    resistance : float [Pa s/m]
+        z.
+
+    Returns
+    -------
+    csr_array, shape (n_dof, n_dof) [N s/m]
+    """
+    d = mesh.dimension
+    rows, columns, values = [], [], []
+    for block in surface.blocks:
+        N, _, area = _face_points(mesh, block)
+        size = np.linalg.norm(area, axis=-1)
+        normal = area / size[..., None]
+        along = np.einsum("qi,fqa->fqia", N, normal).reshape(*size.shape, -1)
+        matrices = resistance * np.einsum("fqi,fqj,fq->fij", along, along, size)
+        dofs = (d * block.connectivity[..., None] + np.arange(d)).reshape(len(matrices), -1)
+        rows.append(np.repeat(dofs, dofs.shape[1], axis=1).ravel())
+        columns.append(np.tile(dofs, dofs.shape[1]).ravel())
+        values.append(matrices.ravel())
+    entries = (np.concatenate(rows), np.concatenate(columns))
+    shape = (mesh.dof_count, mesh.dof_count)
+    return csr_array(coo_array((np.concatenate(values), entries), shape=shape))
 
 
 def _face_points(

@@ -37,6 +37,7 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             "one layer, with a different contact problem",
             hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
+    case.require_ends("a deck")
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
     if left_out:
         warnings.warn(

@@ -75,7 +75,8 @@ def case_models(
         return _of_valve(_smooth_valve(case), progress, threads)
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
-    case = _frictionless(case)
+    case.require_ends("an exported model")
+    case = _frictionless(case).without_outputs()
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)

@@ -13,8 +13,9 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter
+from scipy.signal import butter
 
+from klack.low_pass import low_passed
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.uniform import uniform_step
 
@@ -27,8 +28,7 @@ def sense(
     """Lift as the sensor shows it [m].
 
     The low pass is solved exactly for a motion that runs straight between the samples, at any
-    step; before the first sample the valve is taken to rest there.  A sine sampled at the step h
-    loses a further ``sinc^2(f h)`` by these straight lines: 0.8 % at 50 kHz and 1 us.
+    step (:mod:`klack.low_pass`); before the first sample the valve is taken to rest there.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def sense(
     step = uniform_step(time, "sense: time")
     shown = np.asarray(lift, dtype=np.float64)
     if sensor.bandwidth is not None:
-        shown = _low_pass(shown, sensor, step)
+        shown = low_passed(shown, sensor_poles(sensor), step)
     shown = sensor.sensitivity * shown + sensor.offset
     if sensor.resolution > 0.0:
         shown = sensor.resolution * np.round(shown / sensor.resolution)
@@ -84,28 +84,3 @@ def sensor_polynomial(sensor: LiftSensor) -> NDArray[np.float64]:
     _, denominator = butter(sensor.order, 2.0 * pi * sensor.bandwidth, analog=True)
     ascending = np.asarray(denominator[::-1], dtype=np.float64)
     return np.asarray(ascending / ascending[0])
-
-
-def _low_pass(lift: NDArray[np.float64], sensor: LiftSensor, step: float) -> NDArray[np.float64]:
-    """Sum over the poles of ``z' = p z + r x``, each exact for straight lines between samples."""
-    shown = np.zeros_like(lift)
-    for pole, residue in zip(*_partial_fractions(sensor), strict=True):
-        decay = np.exp(pole * step)
-        whole = (decay - 1.0) / pole  # integral of exp(p (h - s)) over the step
-        end = (decay - 1.0 - pole * step) / (pole**2 * step)  # the same, weighted by s / h
-        b = residue * np.array([end, whole - end])
-        a = np.array([1.0, -decay])
-        at_rest = (b.sum() / (1.0 - decay) - b[0]) * lift[..., :1]
-        part, _ = lfilter(b, a, lift.astype(np.complex128), axis=-1, zi=at_rest)
-        shown += part.real
-    return shown
-
-
-def _partial_fractions(
-    sensor: LiftSensor,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Poles and residues of ``1 / D``; a Butterworth polynomial has no double roots."""
-    poles = sensor_poles(sensor)
-    distance = poles[:, None] - poles[None, :]
-    np.fill_diagonal(distance, 1.0)
-    return poles, np.prod(-poles) / np.prod(distance, axis=1)

@@ -14,6 +14,10 @@ thin :math:`Z`.  With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}`
     x = S^{-1}\left(b - Z P \, Y^T b + G^T \lambda\right) - Y P \, (G Y)^T \lambda
 
 which costs two thin products beside the solve with *S*.
+
+A non-reflecting end adds the sparse matrix of its dashpots
+(:func:`klack.elasticity.loads.face_dashpots`), which brakes rigid motion as well: the body
+continues beyond that face.
 """
 
 from dataclasses import dataclass
@@ -45,12 +49,15 @@ class BodyDamping:
         ``2 zeta omega`` of each.
     alpha : float [1/s]
     beta : float [s]
+    ends : sparse array, shape (n_dof, n_dof), optional [N s/m]
+        Dashpots of non-reflecting ends.
     """
 
     shapes: NDArray[np.float64]
     rate: NDArray[np.float64]
     alpha: float = 0.0
     beta: float = 0.0
+    ends: csr_array | None = None
 
     def __post_init__(self) -> None:
         lowest = float(np.min(self.rate, initial=np.inf))
@@ -96,11 +103,14 @@ class DampingMatrix:
         Z.
     rate : array, shape (r,) [rad/s]
         Below zero for what takes the drag of ``alpha M`` off the rigid motion.
+    ends : sparse array, shape (n, n), or None [N s/m]
+        What non-reflecting ends have in ``sparse``.
     """
 
     sparse: csr_array
     columns: NDArray[np.float64]
     rate: NDArray[np.float64]
+    ends: csr_array | None = None
 
     @classmethod
     def of(cls, damping: BodyDamping, body: ElasticBody, M: csr_array) -> "DampingMatrix":
@@ -127,10 +137,15 @@ class DampingMatrix:
                 columns = np.hstack([columns, loads])
                 rate = np.append(rate, np.full(loads.shape[1], -damping.alpha))
         sparse = csr_array(damping.alpha * M + damping.beta * csr_array(body.K))
+        ends = None
+        if damping.ends is not None:
+            sparse = csr_array(sparse + damping.ends)
+            ends = csr_array(damping.ends[free][:, free])
         return cls(
             sparse=csr_array(sparse[free][:, free]),
             columns=columns[free],
             rate=rate,
+            ends=ends,
         )
 
     def force(self, v: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -59,6 +59,8 @@ class FullBody:
         fixed = np.ones(self.dof_count, dtype=bool)
         fixed[self.free] = False
         self.supported = bool(np.any(fixed & (axis > 0)))
+        # a body that continues beyond its mesh does not move as a whole
+        self.endless = damping is not None and damping.ends is not None
         self.whole_mass = csr_array(body.M)
         self.body, self.damping, self.spring = body, damping, spring
         self.C: DampingMatrix | None = None
@@ -161,7 +163,7 @@ class FullBody:
         self.next = self.w + self.change
         return self.rows @ self.next
 
-    def commit(self, lam: NDArray[np.float64]) -> tuple[float, float]:
+    def commit(self, lam: NDArray[np.float64]) -> tuple[float, float, float]:
         """Make the end of the step the new state.
 
         Parameters
@@ -173,6 +175,8 @@ class FullBody:
         -------
         damped : float [J]
             Energy that the damping took.
+        radiated : float [J]
+            Energy that left through non-reflecting ends.
         rounded : float [J]
             Energy that the defect of the solve gave.
         """
@@ -180,10 +184,12 @@ class FullBody:
         elastic = self.K @ change
         defect = (4.0 / self.step**2) * (self.M @ change) + elastic
         defect -= self.right + self.rows_transposed @ lam
-        damped = 0.0
+        damped = radiated = 0.0
         if self.C is not None:
             drag = self.C.force(moved)
-            damped = float(moved @ drag) / self.step
+            if self.C.ends is not None:
+                radiated = float(moved @ (self.C.ends @ moved)) / self.step
+            damped = float(moved @ drag) / self.step - radiated
             defect += (2.0 / self.step) * (drag - self.step * self.drag)
         if self.spring > 0.0:
             along = float(self.axial_mass @ change) / self.mass
@@ -198,7 +204,7 @@ class FullBody:
         if len(self.light):
             self.v[self.light] = moved[self.light] / self.step
             self.refresh()
-        return damped, rounded
+        return damped, radiated, rounded
 
     def across(self, velocity: tuple[float, float]) -> NDArray[np.float64]:
         """Rigid motion along x and y [m/s].

@@ -157,7 +157,7 @@ def simulate_full_order(
         Of a massless spring from the centre of mass of a to ground, without force at the given
         placement.
     damping : pair of BodyDamping or None
-        Of body a and of body b; without any by default.
+        Of body a and of body b; without any by default.  Non-reflecting ends are for body b.
     friction : FaceFriction, optional
         Between the faces, of these contact points.
     sideways : tuple of float [m/s]
@@ -319,7 +319,7 @@ class _Run:
         self.learned = np.zeros(count, dtype=bool)
         self.share = 1.0 if scheme == "massless" else 2.0
         self.contact_loss = self.overshoot_loss = self.damped = self.work = self.stored = 0.0
-        self.friction_loss = 0.0
+        self.friction_loss = self.radiated = 0.0
         self.outside = axial_force
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
@@ -467,8 +467,10 @@ class _Run:
                 self.y = (2.0 / self.step) * self.mu - self.y
         centre = self.bodies[0].centre()
         given = self.share * lam
-        for damped, rounded in self.together([partial(b.commit, given) for b in self.bodies]):
+        done = self.together([partial(b.commit, given) for b in self.bodies])
+        for damped, radiated, rounded in done:
             self.damped += damped
+            self.radiated += radiated
             self.contact_loss -= rounded
         needle = self.bodies[0]
         travel, spring = needle.centre() - centre, needle.spring * 0.5 * (needle.centre() + centre)
@@ -539,7 +541,7 @@ class _Record:
         kinetic = [body.kinetic(run.y) for body in run.bodies]
         strain = [body.strain() for body in run.bodies]
         losses = (run.contact_loss, run.overshoot_loss, run.work, run.damped, run.stored)
-        self.energy.append((*kinetic, *strain, *losses, run.friction_loss))
+        self.energy.append((*kinetic, *strain, *losses, run.friction_loss, run.radiated))
         self.energy_step.append(run.steps)
 
     def keep_step(self, run: _Run, force: float, gap: float) -> None:
@@ -646,7 +648,7 @@ def _result(
     bodies, count = run.bodies, len(run.bodies)
     velocity = np.array(record.velocity)
     for i, body in enumerate(bodies):
-        if body.supported:
+        if body.supported or body.endless:
             velocity[:, i] = 0.0
     energy = np.array(record.energy)
     book = EnergyRecord(
@@ -659,6 +661,7 @@ def _result(
         damping=energy[:, 2 * count + 3],
         spring=energy[:, 2 * count + 4],
         friction=energy[:, 2 * count + 5],
+        radiated=energy[:, 2 * count + 6],
     )
     history = ImpactHistory(
         step=run.step,
@@ -669,7 +672,7 @@ def _result(
         velocity_b=velocity[:, 1] if count > 1 else np.zeros(len(velocity)),
         speed=run.speed,
         mass_a=bodies[0].mass,
-        mass_b=inf if count == 1 or bodies[1].supported else bodies[1].mass,
+        mass_b=inf if count == 1 or bodies[1].supported or bodies[1].endless else bodies[1].mass,
         ledger=_ledger(bodies, book, velocity[-1]),
         external_force=np.array(record.outside),
         longest_period=longest_period,
@@ -723,6 +726,7 @@ def _ledger(
         work=float(book.work[-1]),
         spring=float(book.spring[-1]),
         friction=float(book.friction[-1]),
+        radiated=float(book.radiated[-1]),
     )
 
 

@@ -27,6 +27,7 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
 from klack.contact.face_friction import FaceFriction
@@ -66,12 +67,15 @@ class InterfaceBody:
         The kept elastic modes.
     damping : array, shape (m,) [-]
         Damping ratio of each of them.
+    observers : array, shape (k, n_dof)
+        Rows on its displacements that are read.
     """
 
     body: ElasticBody
     flexibility: Flexibility
     modes: Modes
     damping: NDArray[np.float64]
+    observers: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -180,6 +184,10 @@ class InterfaceModel:
         The same per unit translation of the moving body along +z.
     friction : tuple of Friction
         Of each contact; empty without.
+    observed : array, shape (k, M) [1/sqrt(kg)]
+        What the observers of all bodies read per unit modal coordinate.
+    observed_residual : array, shape (k, nc), with friction (k, d nc) [m/N]
+        What they read besides, per unit contact force of each row of ``compliance``.
     """
 
     bodies: tuple[str, ...]
@@ -204,6 +212,8 @@ class InterfaceModel:
     tangents: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     axial_across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     friction: tuple[Friction, ...] = ()
+    observed: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    observed_residual: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def ways(self) -> int:
@@ -219,6 +229,7 @@ class InterfaceModel:
             tangents=np.zeros((0, 0)),
             axial_across=np.zeros(0),
             friction=(),
+            observed_residual=self.observed_residual[:, :n],
         )
 
     @property
@@ -293,6 +304,9 @@ def interface_model(
     _require_sound(checks)
     periods = 2.0 * np.pi / bodies[0].modes.omega
     counts = [block.shape[1] for block in blocks]
+    observed = block_diag(*(_observed(item) for item in bodies))
+    flexible = observed[:, elastic] / omega[elastic] ** 2
+    static = np.vstack([_observed_static(item, contacts, places) for item in bodies])
     return InterfaceModel(
         bodies=tuple(names),
         masses=tuple(inf if item.body.is_fixed else item.body.mass for item in bodies),
@@ -324,7 +338,32 @@ def interface_model(
         tangents=np.ascontiguousarray(traces[count:]),
         axial_across=_axial_across(contacts, names[0], places, count),
         friction=tuple(contact.faces.law for contact in contacts if contact.faces is not None),
+        observed=observed,
+        observed_residual=static - flexible @ traces[:, elastic].T,
     )
+
+
+def _observed(item: InterfaceBody) -> NDArray[np.float64]:
+    """Rows of the observers of a body on its modes, rigid ones first."""
+    shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
+    return np.asarray(item.observers.reshape(-1, item.body.dof_count) @ shapes)
+
+
+def _observed_static(
+    item: InterfaceBody,
+    contacts: Sequence[InterfaceContact],
+    places: Sequence[NDArray[np.int64]],
+) -> NDArray[np.float64]:
+    """What the observers read of a body per unit of each contact force, by reciprocity."""
+    rows = item.observers.reshape(-1, item.body.dof_count)
+    out = np.zeros((len(rows), sum(len(place) for place in places)))
+    if len(rows):
+        deflections = item.flexibility.deflections(np.ascontiguousarray(rows.T))
+        for contact, place in zip(contacts, places, strict=True):
+            G = contact.rows(item.body.name)
+            if G is not None:
+                out[:, place] += (G @ deflections).T
+    return out
 
 
 def _common_ways(contacts: Sequence[InterfaceContact]) -> int:

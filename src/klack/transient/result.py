@@ -42,6 +42,8 @@ class EnergyRecord:
         Taken up by the spring since the start.
     friction : array, shape (k,) [J]
         Lost in friction of the faces, >= 0; grows only.
+    radiated : array, shape (k,) [J]
+        Carried away through non-reflecting ends, >= 0; grows only.
     """
 
     time: NDArray[np.float64]
@@ -53,6 +55,7 @@ class EnergyRecord:
     damping: NDArray[np.float64]
     spring: NDArray[np.float64]
     friction: NDArray[np.float64]
+    radiated: NDArray[np.float64]
 
     @property
     def total(self) -> NDArray[np.float64]:
@@ -62,7 +65,7 @@ class EnergyRecord:
     @property
     def residual(self) -> NDArray[np.float64]:
         """Energy from nowhere, shape (k,) [J]: round-off in a sound run."""
-        lost = self.contact + self.overshoot + self.damping + self.friction
+        lost = self.contact + self.overshoot + self.damping + self.friction + self.radiated
         return self.total - self.total[0] + self.spring + lost - self.work
 
 
@@ -227,5 +230,5 @@ class FullOrderResult:
         """Energy that the scheme lost, relative to the energy at the start [-]."""
         given = self.energy.total[0] + self.energy.work[-1]
         kept = self.energy.total[-1] + self.energy.spring[-1] + self.energy.damping[-1]
-        lost = given - kept - self.energy.friction[-1]
+        lost = given - kept - self.energy.friction[-1] - self.energy.radiated[-1]
         return float(lost / max(self.energy.total[0], abs(self.energy.work[-1])))

@@ -25,8 +25,7 @@ COVERS = {
     "thick block.",
     "interface": "Contact point by point on modal bodies: statics, Hertz impacts, sub-impacts, "
     "guides, energy over many impacts.",
-    "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, "
-    "jams, and a measurement.",
+    "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, jams.",
     "plasticity": "Faces that yield: one point, spheres and a seat on finite elements, running-in, "
     "impacts in time.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
@@ -34,6 +33,7 @@ COVERS = {
     "pistons.",
     "sound": "From force to ear: one-third octaves, weighting, levels, and loudness of ISO 532-1.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
+    "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "

@@ -159,6 +159,7 @@ def advise_impact(
     case = explicit_modes(case)
     chosen = _level(case, level)
     _require_surfaces(case)
+    case.require_ends("advice")
     log = _Log()
     with collected_warnings() as warned:
         base = _base(case, chosen, progress, threads)

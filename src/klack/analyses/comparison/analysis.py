@@ -7,6 +7,14 @@ from klack.analyses.comparison.calculix import (
     comparison_to_json,
     comparison_told,
 )
+from klack.analyses.comparison.impacts_measures import PULSE_MEASURES
+from klack.analyses.comparison.impacts_record import MeasuredImpactStudy
+from klack.analyses.comparison.impacts_summary import (
+    ImpactPulsesJson,
+    measured_impact_to_json,
+    measured_impact_told,
+    pulses_measured,
+)
 from klack.analyses.comparison.measures import (
     DISTRIBUTION_MEASURES,
     DROPS_MEASURES,
@@ -30,7 +38,7 @@ from klack.analyses.comparison.strokes_summary import (
 )
 from klack.analyses.store import RecordFormat
 
-__all__ = ["CALCULIX", "MEASURED_SHOTS", "MEASURED_STROKES"]
+__all__ = ["CALCULIX", "MEASURED_IMPACT", "MEASURED_SHOTS", "MEASURED_STROKES"]
 
 _COMMAND = "klack compare RESULT --measurement"
 
@@ -86,6 +94,22 @@ MEASURED_SHOTS = StoredAnalysis(
         "distribution beside a measurement": DISTRIBUTION_MEASURES,
     },
     measured=drops_measured,
+)
+
+MEASURED_IMPACT = StoredAnalysis(
+    form=RecordFormat(
+        name="klack measured impact",
+        version=1,
+        kind=MeasuredImpactStudy,
+        command=_COMMAND,
+        units={"time": "s"},
+    ),
+    page="comparison.impacts_page:measured_impact_content",
+    json=ImpactPulsesJson,
+    to_json=measured_impact_to_json,
+    told=measured_impact_told,
+    measures={"pulse beside a measurement": PULSE_MEASURES},
+    measured=pulses_measured,
 )
 
 CALCULIX = Analysis(

@@ -35,6 +35,7 @@ _UNITS = {
     "displacement": "m",
     "magnitude": "m",
     "share": "1",
+    "exact": "SI",
 }
 
 

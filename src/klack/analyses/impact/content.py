@@ -23,7 +23,7 @@ from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.impact.section_figure import section_figure
-from klack.analyses.impact.summary import no_estimate
+from klack.analyses.impact.summary import GAUGE_COLUMNS, gauge_rows, no_estimate
 from klack.analyses.impact.wording import answer
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
@@ -76,6 +76,8 @@ def report_content(study: ImpactStudy) -> Content:
         Section(title="Energy", charts=named("energy", "modes"), tables=(_energy_table(study),))
     )
     sections.append(Section(title="Motion", charts=named("motion")))
+    outputs = tuple(chart for chart in found if chart.name.startswith("output-"))
+    sections.append(Section(title="Outputs", charts=outputs, tables=_outputs(study)))
     return page_of(
         study,
         "Dry impact",
@@ -226,6 +228,11 @@ def _friction(study: ImpactStudy) -> Section:
         picture=friction_figure(views),
         tables=(Table(columns=("", *(r.label for r in rubbing)), rows=tuple(rows)),),
     )
+
+
+def _outputs(study: ImpactStudy) -> tuple[Table, ...]:
+    rows = gauge_rows(study)
+    return (Table(columns=GAUGE_COLUMNS, rows=rows),) if rows else ()
 
 
 def _running_in(study: ImpactStudy) -> Section:

@@ -14,6 +14,7 @@ from klack.acoustics.spectrum import impulse_level, impulse_spectrum
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.contact.history import ImpactHistory
+from klack.gauges.gauge import GaugeKind
 from klack.reduction.transfer import TransferComparison
 from klack.report.chart import (
     AnyChart,
@@ -31,6 +32,7 @@ from klack.report.looks import OTHER, PART_LOOKS, Look, look_of
 from klack.report.wording import quantity, sentence
 
 __all__ = [
+    "OUTPUT_UNITS",
     "approach_chart",
     "charts",
     "energy_bars",
@@ -38,6 +40,7 @@ __all__ = [
     "law_chart",
     "modal_energy_chart",
     "motion_chart",
+    "output_charts",
     "spectrum_chart",
     "transfer_chart",
 ]
@@ -54,6 +57,14 @@ _LOOKS: dict[str, Look] = {
     "lumped": Look("pink", "sparse", 2.1),
 }
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
+OUTPUT_UNITS: dict[GaugeKind, tuple[str, float]] = {
+    "displacement": ("µm", 1e6),
+    "velocity": ("m/s", 1.0),
+    "strain": ("µm/m", 1e6),
+    "stress": ("MPa", 1e-6),
+}
+"""Unit of a chart of each kind of output, and the factor from SI."""
+
 _TIME = AxisSpec(label="time since first touch", unit="µs")
 
 
@@ -61,6 +72,7 @@ def charts(study: ImpactStudy) -> tuple[AnyChart, ...]:
     """Every figure that the study has data for, in the order of the report."""
     found: list[AnyChart] = [force_chart(study), spectrum_chart(study)]
     found.append(motion_chart(study))
+    found += output_charts(study)
     found += [transfer_chart(comparison) for comparison in study.transfer]
     found += [law_chart(study), approach_chart(study), energy_bars(study)]
     if any(result.modal_energy for result in study.levels.values()):
@@ -173,6 +185,41 @@ def _way(history: ImpactHistory, time: Floats) -> Floats:
     mean = 0.5 * (history.velocity_a[1:] + history.velocity_a[:-1])
     way = np.concatenate([[0.0], np.cumsum(mean) * history.step])
     return way - np.interp(0.0, time, way)
+
+
+def output_charts(study: ImpactStudy) -> tuple[Chart, ...]:
+    """One chart for each output of the case: what its sensor shows at every level."""
+    names = dict.fromkeys(record.name for level in study.ordered for record in level.gauges)
+    found = []
+    for name in names:
+        pairs = [
+            (level, record)
+            for level in study.ordered
+            for record in level.gauges
+            if record.name == name
+        ]
+        record = pairs[0][1]
+        unit, factor = OUTPUT_UNITS[record.kind]
+        curves = [
+            _level_curve(_since_touch(level, one.time), factor * one.values, level)
+            for level, one in pairs
+        ]
+        found.append(
+            Chart(
+                name=f"output-{name}",
+                title=f"Output {name}",
+                x=_TIME,
+                panels=(
+                    Panel(
+                        y=AxisSpec(label=record.kind, unit=unit),
+                        curves=tuple(curves),
+                        marks=(Mark(value=0.0, axis="y"),),
+                    ),
+                ),
+                note=sentence(f"{record.label[:1].upper()}{record.label[1:]}"),
+            )
+        )
+    return tuple(found)
 
 
 # --------------------------------------------------------------------------- frequency

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from klack.analyses.impact.gauges import FullGauges
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
@@ -20,6 +21,7 @@ from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
+from klack.elasticity.loads import face_dashpots
 from klack.progress import Progress
 from klack.transient.body_damping import BodyDamping, body_damping
 from klack.transient.full_order import simulate_full_order
@@ -105,6 +107,7 @@ def run_full(
     """
     case, pair, space = problem.case, problem.pair, problem.space
     while True:
+        reading = FullGauges(pair)
         try:
             result = simulate_in_full(
                 problem,
@@ -113,6 +116,7 @@ def run_full(
                 longest_period=_longest_period(pools[pair.upper.name]),
                 progress=progress,
                 threads=threads,
+                snapshots=reading.snapshots(case),
             )
         except ReachError as error:
             space = problem.wider(space, error)
@@ -143,7 +147,7 @@ def run_full(
             history, result.point_force, space.points, space.area, _friction(case, result)
         ),
     )
-    return level, result
+    return replace(level, gauges=reading.records(case.run.full_step)), result
 
 
 def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
@@ -157,9 +161,18 @@ def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
 
 
 def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:
-    if not is_damped(case, body.name):
-        return None
-    return body_damping(damping_of(case.bodies[body.name].damping), kept[body.name])
+    damping = None
+    if is_damped(case, body.name):
+        damping = body_damping(damping_of(case.bodies[body.name].damping), kept[body.name])
+    surface = case.bodies[body.name].non_reflecting
+    if surface is None:
+        return damping
+    (material,) = case.materials_of(body.name, body.mesh.solids).values()
+    resistance = material.density * material.bar_wave_speed
+    ends = face_dashpots(body.mesh, body.mesh.surface(surface), resistance)
+    if damping is None:
+        damping = BodyDamping(shapes=np.zeros((body.dof_count, 0)), rate=np.zeros(0))
+    return replace(damping, ends=ends)
 
 
 def _longest_period(pool: Modes) -> float:

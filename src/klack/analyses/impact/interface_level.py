@@ -1,12 +1,13 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.impact.gauges import interface_gauges
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
@@ -110,6 +111,9 @@ def build_interface(
             flexibility=flexibility,
             modes=(modes := _kept(problem, body, pools[body.name], ports, count)),
             damping=damping_of(problem.case.bodies[body.name].damping).ratios(modes.omega),
+            observers=np.array(
+                [gauge.row for gauge in problem.pair.gauges if gauge.body == body.name]
+            ).reshape(-1, body.dof_count),
         )
         for body, flexibility in _sides(problem)
     ]
@@ -405,7 +409,7 @@ def run_interface(
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
-    return level_result(
+    level = level_result(
         result.history,
         level="interface",
         label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}",
@@ -418,3 +422,4 @@ def run_interface(
         ),
         frictionless=frictionless,
     )
+    return replace(level, gauges=interface_gauges(problem, model, result))

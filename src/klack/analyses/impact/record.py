@@ -14,6 +14,7 @@ from klack.analyses.record import CaseRecord
 from klack.assembling.body_summary import BodySummary
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures
+from klack.gauges.gauge import GaugeRecord
 from klack.reduction.structure import Structure
 from klack.reduction.transfer import TransferComparison
 
@@ -183,6 +184,8 @@ class LevelResult:
         What the level computes without the friction of the faces, where they rub.
     doubts : tuple of str
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
+    gauges : tuple of GaugeRecord
+        Output channels of the case; none at the level lumped.
     """
 
     level: str
@@ -200,6 +203,7 @@ class LevelResult:
     pressure: PressureRecord | None = None
     frictionless: ImpactMeasures | None = None
     doubts: tuple[str, ...] = ()
+    gauges: tuple[GaugeRecord, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

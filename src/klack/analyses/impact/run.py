@@ -10,6 +10,7 @@ import numpy as np
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.contact_check import ContactCheck, check_contact, ends_reached
 from klack.analyses.impact.full_level import run_full
+from klack.analyses.impact.gauges import with_reduced_gauges
 from klack.analyses.impact.given_models import run_given_impact
 from klack.analyses.impact.interface_level import (
     build_guide,
@@ -289,6 +290,7 @@ def _study(
                     pair = own if level == "reduced" else _variant(level, problem, pools, loops)
                     setup = clock.spent((*_SET_UP, *(["faces that yield"] if pair.yields else [])))
                     results[level] = _run_variant(case, level, pair, setup_time=setup)
+                    results[level] = with_reduced_gauges(results[level], problem, pair)
                     if pair.yields:
                         twins[level] = elastic_twin(problem, pair)
                         tell_yield(results[level], twins[level], _surfaces(case))

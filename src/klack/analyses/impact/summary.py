@@ -21,14 +21,18 @@ from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.json_parts import ContactJson, Real
 from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
 from klack.contact.restitution import Deviation
+from klack.gauges.gauge import GaugeRecord
 from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
+    "GAUGE_COLUMNS",
     "DeviationJson",
     "ImpactJson",
     "answer_line",
     "estimate_lines",
+    "gauge_rows",
+    "gauge_text",
     "no_estimate",
     "study_measured",
     "study_to_json",
@@ -41,11 +45,23 @@ class DeviationJson(TypedDict):
     """Deviation of one result from another."""
 
 
+class OutputJson(TypedDict):
+    """What one sensor shows during the impact."""
+
+    kind: Annotated[str, Field(description="displacement, velocity, strain or stress.")]
+    unit: Annotated[str, Field(description="Of the two values; 1 for a strain.")]
+    lowest: Real
+    lowest_at_s: Real
+    highest: Real
+    highest_at_s: Real
+
+
 @with_measures(LEVEL_MEASURES)
 class LevelJson(TypedDict):
     """Impact at one level."""
 
     doubts: Annotated[list[str], Field(description="Why the level may be wrong.")]
+    outputs: Annotated[dict[str, OutputJson], Field(description="By the name of the channel.")]
 
 
 class RunningInJson(TypedDict):
@@ -133,12 +149,44 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     if line := elastic_above(study.contact):
         yield line
     yield from estimate_lines(study)
+    if rows := gauge_rows(study):
+        yield TextTable(title="Outputs", columns=GAUGE_COLUMNS, rows=rows, left=3)
     if found := study.running_in:
         yield TextTable(
             title="Running in",
             columns=running_in_columns(found),
             rows=running_in_rows(found, format_si),
         )
+
+
+GAUGE_COLUMNS = ("output", "what", "level", "lowest", "at", "highest", "at")
+"""Heads of :func:`gauge_rows`."""
+
+
+def gauge_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
+    """Extremes of every output at every level."""
+    return tuple(
+        (record.name, record.label, level.level, *_extremes(record))
+        for level in study.ordered
+        for record in level.gauges
+    )
+
+
+def _extremes(record: GaugeRecord) -> tuple[str, ...]:
+    values = record.values
+    ends = (int(np.argmin(values)), int(np.argmax(values)))
+    return tuple(
+        text
+        for k in ends
+        for text in (gauge_text(record, float(values[k])), format_si(float(record.time[k]), "s"))
+    )
+
+
+def gauge_text(record: GaugeRecord, value: float) -> str:
+    """Value of an output with its unit; a strain in um/m."""
+    if record.kind == "strain":
+        return f"{1e6 * value:.4g} um/m"
+    return format_si(value, record.unit)
 
 
 def study_measured(study: ImpactStudy) -> Iterator[Measured]:
@@ -205,7 +253,21 @@ def _signed(value: float, digits: int) -> str:
 
 
 def _level(result: LevelResult) -> Any:
-    return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts)}
+    outputs = {record.name: _output(record) for record in result.gauges}
+    return json_of(LEVEL_MEASURES, result) | {"doubts": list(result.doubts), "outputs": outputs}
+
+
+def _output(record: GaugeRecord) -> OutputJson:
+    values = record.values
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    return {
+        "kind": record.kind,
+        "unit": record.unit,
+        "lowest": number_or_none(float(values[low])),
+        "lowest_at_s": number_or_none(float(record.time[low])),
+        "highest": number_or_none(float(values[high])),
+        "highest_at_s": number_or_none(float(record.time[high])),
+    }
 
 
 def _running_in(found: RunningIn) -> RunningInJson:

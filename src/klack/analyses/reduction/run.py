@@ -68,7 +68,8 @@ def run_reduce(
         return ReductionStudy(
             case=case.name, title=case.title, bodies=(given.upper, given.lower), transfer=()
         )
-    problem = build_problem(case, progress, threads=threads)
+    case.require_ends("a reduction")
+    problem = build_problem(case.without_outputs(), progress, threads=threads)
     pools = mode_pools(problem, at_least=TRANSFER_MODES, progress=progress)
     progress("reduced", 0.0)
     pair = own_pair(problem, pools, stiffness=first_stiffness(problem), recovery=True)

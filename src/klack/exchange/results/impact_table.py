@@ -64,6 +64,16 @@ def _level(level: LevelResult) -> ResultRun:
         ),
     ]
     channels = _history(history)
+    for record in level.gauges:
+        channels.append(
+            ResultChannel(
+                name=f"output {record.name}",
+                axis="time_edge",
+                unit=record.unit,
+                values=record.values,
+                meaning=record.label,
+            )
+        )
     for item in level.modal_energy:
         axis = f"frequency_{item.body}"
         order = np.argsort(item.frequency, kind="stable")

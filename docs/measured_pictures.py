@@ -1,0 +1,71 @@
+"""Make the pictures of the page of measured comparisons: ``python docs/measured_pictures.py``.
+
+From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
+struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres.
+"""
+
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from klack.report.chart import COLOURS
+from klack.report.printed import STYLE, svg
+from klack.verification.measured import SHOTS, struck_bar
+from klack.verification.oblique_spheres import oblique_spheres
+
+IMAGES = Path(__file__).parent / "images"
+
+
+def main() -> None:
+    """Compute all shots and draw them."""
+    with rc_context(STYLE):
+        for name, figure in figures().items():
+            (IMAGES / name).write_bytes(svg(figure))
+
+
+def figures() -> dict[str, Figure]:
+    """Both pictures, by the names of their files."""
+    whole = Figure(figsize=(9.0, 5.6), layout="constrained")
+    near = Figure(figsize=(9.0, 5.6), layout="constrained")
+    for k, shot in enumerate(SHOTS):
+        domed, flat = struck_bar(shot), struck_bar(shot, flat=True)
+        pulse = domed.pulses[0]
+        for figure in (whole, near):
+            axes = figure.add_subplot(2, 3, k + 1)
+            time = 1e6 * domed.time
+            level = pulse.computed.plateau
+            axes.plot(time, domed.middle / level, color=COLOURS["blue"], lw=1.6)
+            axes.plot(1e6 * flat.time, flat.computed / flat.pulses[0].computed.plateau,
+                      color=COLOURS["orange"], lw=1.1, ls=":")  # fmt: skip
+            axes.plot(time, domed.computed / level, color=COLOURS["black"], lw=1.1, ls="--")
+            axes.set_title(f"{shot.name}: {shot.striker} mm, {shot.speed:g} m/s")
+            axes.grid(visible=True, color="#dddddd", lw=0.5)
+            if k > 2:
+                axes.set_xlabel("time since the front [us]")
+            if k % 3 == 0:
+                axes.set_ylabel("strain over plateau")
+        end = 1e6 * pulse.measured.length
+        near.axes[k].set_xlim(end - 28.0, end + 28.0)
+        near.axes[k].set_ylim(-0.15, 1.2)
+    labels = ("measured", "computed, flat faces", "computed, dome of 0.12 mm")
+    for figure in (whole, near):
+        figure.legend(figure.axes[0].lines, labels, loc="outside lower center", ncols=3)
+    return {"struck-bar.svg": whole, "struck-bar-ends.svg": near, "alumina.svg": alumina()}
+
+
+def alumina() -> Figure:
+    """Tangential restitution of alumina on glass over the angle of incidence."""
+    curve = next(check.curve for check in oblique_spheres() if check.curve is not None)
+    figure = Figure(figsize=(5.4, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(*curve.expected, "o", color=COLOURS["blue"], ms=4, label="measured")
+    axes.plot(*curve.computed, color=COLOURS["black"], lw=1.2, ls="--", label="computed")
+    axes.set(xlabel=curve.x_label, ylabel=curve.y_label, ylim=(0.5, 1.0))
+    axes.grid(visible=True, color="#dddddd", lw=0.5)
+    axes.legend()
+    return figure
+
+
+if __name__ == "__main__":
+    main()

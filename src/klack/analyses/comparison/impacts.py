@@ -1,0 +1,238 @@
+"""A computed output of an impact beside recordings of the same sensor."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.comparison.calculix import level_of
+from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpactStudy
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.record import case_fields, run_fields
+from klack.errors import InputError
+from klack.gauges.gauge import GaugeKind, GaugeRecord
+from klack.low_pass import LowPass
+from klack.measurement.files.opening import open_recording
+from klack.measurement.pulse import Pulse, measure_pulse
+from klack.measurement.pulse_fit import fit_pulse
+from klack.measurement.recording import ChannelInfo, Recording, some_names
+from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+from klack.units import LENGTH, PRESSURE, SPEED
+
+__all__ = ["compare_impact", "gauge_of"]
+
+Floats = NDArray[np.float64]
+
+_KINDS = {"displacement": LENGTH, "velocity": SPEED, "stress": PRESSURE}
+_STRAINS = {
+    **dict.fromkeys(("um/m", "microstrain", "ustrain", "ue", "με", "uε", "ppm"), 1e-6),
+    **dict.fromkeys(("mm/m", "millistrain"), 1e-3),
+    **dict.fromkeys(("m/m", "strain", "1"), 1.0),
+    "%": 1e-2,
+}
+_MARGIN = 0.3  # of the length, shown before the front and behind the end
+_POINTS = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Record:
+    """One recording in SI, with its pulse."""
+
+    name: str
+    channel: str
+    time: Floats
+    values: Floats
+    pulse: Pulse
+
+
+def compare_impact(
+    study: ImpactStudy,
+    paths: Sequence[Path],
+    *,
+    level: str,
+    output: str | None = None,
+    channel: str | None = None,
+    low_pass: LowPass | None = None,
+    known_speed: bool = False,
+    progress: Progress = silent,
+) -> MeasuredImpactStudy:
+    """Lay an output of an impact over measured pulses.
+
+    Parameters
+    ----------
+    study : ImpactStudy
+    paths : sequence of Path
+        Recordings of repeated shots.
+    level : str
+    output : str, optional
+        Name of the output; needed where the case has several.
+    channel : str, optional
+        Name in the recordings; needed where they have several.
+    low_pass : LowPass, optional
+        Instead of that of the output.
+    known_speed : bool
+        The speed is known and the recordings are absolute: no factor is fitted.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        For a level, an output or a channel that is not there, and for a record without a pulse
+        that has a front, a plateau and an end.
+    """
+    begin = perf_counter()
+    clock = StageClock(progress)
+    gauge = gauge_of(study, level, output)
+    sensor = gauge.low_pass if low_pass is None else low_pass
+    shown = gauge.exact if sensor is None else sensor(gauge.exact, gauge.step)
+    where = f"result of case '{study.case}': output '{gauge.name}'"
+    computed = measure_pulse(gauge.time, shown, where)
+    with collected_warnings() as notes:
+        clock("read recordings", 0.0)
+        records = [_read(path, gauge.kind, channel) for path in paths]
+        clock("compare pulses", 0.0)
+        pulses = [_compared(record, gauge.time, shown, computed, known_speed) for record in records]
+    time = _axis(computed)
+    rows = np.array(
+        [_on_axis(record, pulse, time) for record, pulse in zip(records, pulses, strict=True)]
+    )
+    aside = "" if sensor is None else f", {sensor.words}"
+    return MeasuredImpactStudy(
+        **case_fields(study),
+        **run_fields(begin, clock),
+        level=level,
+        output=gauge.name,
+        label=f"{gauge.kind} of {gauge.body} {gauge.place}{aside}",
+        unit=gauge.unit,
+        speed=study.speed,
+        pulses=tuple(pulses),
+        time=time - computed.front,
+        measured=rows.astype(np.float32),
+        middle=np.median(rows, axis=0),
+        low=np.quantile(rows, 0.05, axis=0),
+        high=np.quantile(rows, 0.95, axis=0),
+        computed=computed.sign * (np.interp(time, gauge.time, shown) - computed.rest),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def gauge_of(study: ImpactStudy, level: str, output: str | None) -> GaugeRecord:
+    """Output of a level by name; the only one by default.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or several and no name.
+    """
+    gauges = {record.name: record for record in level_of(study, level).gauges}
+    if not gauges:
+        raise InputError(
+            f"result of case '{study.case}', level '{level}'",
+            got="no outputs",
+            expected="an output where the sensor of the measurement sits",
+            hint="add the section 'outputs' to the case, and run klack impact again.",
+        )
+    if output is None and len(gauges) == 1:
+        return next(iter(gauges.values()))
+    if output not in gauges:
+        raise InputError(
+            "--output",
+            got="several outputs and no name" if output is None else f"'{output}'",
+            expected=f"one of: {', '.join(gauges)}",
+            hint=f"--output {next(iter(gauges))}.",
+        )
+    return gauges[output]
+
+
+def _compared(
+    record: _Record, time: Floats, shown: Floats, computed: Pulse, known_speed: bool
+) -> ComparedPulse:
+    fit = fit_pulse(
+        record.time,
+        record.values,
+        record.pulse,
+        time,
+        shown,
+        computed,
+        factor=1.0 if known_speed else None,
+    )
+    return ComparedPulse(
+        name=record.name,
+        channel=record.channel,
+        measured=record.pulse,
+        computed=computed,
+        factor=fit.factor,
+        fitted=not known_speed,
+        shift=fit.shift,
+        rms=fit.rms,
+    )
+
+
+def _axis(computed: Pulse) -> Floats:
+    margin = _MARGIN * computed.length
+    return np.linspace(computed.front - margin, computed.end + margin, _POINTS)
+
+
+def _on_axis(record: _Record, pulse: ComparedPulse, time: Floats) -> Floats:
+    """A recording on the clock and at the speed of the computed pulse."""
+    values = np.interp(time - pulse.shift, record.time, record.values)
+    return np.asarray(record.pulse.sign * (values - record.pulse.rest) / pulse.factor)
+
+
+# ------------------------------------------------------------------------ reading
+
+
+def _read(path: Path, kind: GaugeKind, channel: str | None) -> _Record:
+    with open_recording(path) as recording:
+        info = _channel(recording, channel)
+        factor = _factor(path, info, kind)
+        time, values = recording.read(info.name)
+    known = np.isfinite(values) & np.isfinite(time)
+    time, values = time[known], factor * values[known]
+    where = f"{path.name}: {info.name}"
+    if len(time) > 1 and not np.all(np.diff(time) > 0.0):
+        raise InputError(
+            where,
+            got="times that do not rise",
+            expected="one record with rising times",
+            hint="give every shot a file of its own.",
+        )
+    pulse = measure_pulse(time, values, where)
+    label = info.label or info.name
+    return _Record(name=path.name, channel=label, time=time, values=values, pulse=pulse)
+
+
+def _channel(recording: Recording, name: str | None) -> ChannelInfo:
+    if name is not None:
+        return recording.channel(name)
+    if len(recording.channels) == 1:
+        return recording.channels[0]
+    raise InputError(
+        f"{recording.path.name}: channels",
+        got=f"{len(recording.channels)} channels and no name",
+        expected=f"one of: {some_names(recording.channels)}",
+        hint=f"--channel {recording.channels[0].name}.",
+    )
+
+
+def _factor(path: Path, info: ChannelInfo, kind: GaugeKind) -> float:
+    """From the unit of the file to SI; numbers without a unit are taken for SI."""
+    if no_unit(info.unit):
+        return 1.0
+    where = f"{path.name}: {info.name}"
+    if kind != "strain":
+        return unit_factor(info.unit, _KINDS[kind], where).factor
+    unit = plain_unit(info.unit)
+    if unit not in _STRAINS:
+        raise InputError(
+            where,
+            got=f"the unit '{info.unit}'",
+            expected=f"a unit of a strain: {', '.join(_STRAINS)}",
+            hint="check that it is the right channel; volts of a bridge need its factor.",
+        )
+    return _STRAINS[unit]

@@ -1,0 +1,256 @@
+r"""What the gauges of a case read at each level.
+
+Full order: the row of a gauge on the displacements of all nodes, step by step.  Modal levels: the
+modes are linear oscillators under the contact forces that the level found, so their motion follows
+once more from these forces, exactly for forces that are constant within each step, and
+
+.. math:: y = \rho^T \Phi q + \Big(\rho^T K^+ - \rho^T \Phi_e \Omega_e^{-2} \Phi_e^T\Big) f
+
+with the row :math:`\rho`, the kept modes and the static answer of the modes left out to the contact
+forces *f* (mode acceleration; Craig & Kurdila 2006, ch. 17).  The level ``reduced`` has the
+pressure pattern of its contact port for all forces: near the contact its gauges are no better than
+that.  A velocity is that of the modes alone.  Constant forces and springs act on the whole body
+like its weight, so they move it and do not strain it.
+"""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from klack.analyses.impact.record import LevelResult
+from klack.assembling.bodies import BodyPair
+from klack.assembling.problem import ContactProblem
+from klack.assembling.reduced_pair import ReducedPair
+from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
+from klack.errors import AccuracyWarning
+from klack.gauges.gauge import Gauge, GaugeRecord
+from klack.reduction.reduced_body import ReducedBody
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_result import InterfaceResult
+from klack.transient.result import MotionOfBody, Snapshots
+
+__all__ = ["FullGauges", "interface_gauges", "modal_motion", "with_reduced_gauges"]
+
+Floats = NDArray[np.float64]
+
+
+# ------------------------------------------------------------------------ full order
+
+
+class FullGauges:
+    """Reads the gauges of two bodies while every degree of freedom moves."""
+
+    def __init__(self, pair: BodyPair) -> None:
+        self._gauges = pair.gauges
+        self._time: list[float] = []
+        self._values: list[list[float]] = []
+
+    def snapshots(self, case: Case) -> Snapshots | None:
+        """Look after every step; None without a gauge."""
+        if not self._gauges:
+            return None
+        steps = int(np.ceil(case.run.duration / case.run.full_step)) + 1
+        return Snapshots(steps=range(steps + 1), receive=self._receive)
+
+    def _receive(self, time: float, motion: tuple[MotionOfBody, ...]) -> None:
+        fields = {item.name: item for item in motion}
+        self._time.append(time)
+        self._values.append(
+            [
+                float(
+                    gauge.row
+                    @ (
+                        fields[gauge.body].velocity
+                        if gauge.kind == "velocity"
+                        else fields[gauge.body].displacement
+                    )
+                )
+                for gauge in self._gauges
+            ]
+        )
+
+    def records(self, step: float) -> tuple[GaugeRecord, ...]:
+        """What was read."""
+        return tuple(
+            gauge.record(self._time[0], step, np.array(values))
+            for gauge, values in zip(self._gauges, zip(*self._values, strict=True), strict=False)
+        )
+
+
+# ------------------------------------------------------------------------ modal levels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalMotion:
+    """Modes over time, displacement and velocity, each of shape (n + 1, m)."""
+
+    q: Floats
+    v: Floats
+
+
+def modal_motion(
+    omega: Floats, damping: Floats, loads: Floats, velocity: Floats, step: float
+) -> ModalMotion:
+    r"""Motion of modes from rest under loads that are constant within each step.
+
+    .. math:: q = \frac{1}{p_1 - p_2} (z_1 - z_2), \qquad \dot z_i = p_i z_i + f
+
+    with the two poles of each mode; exact at any step.
+
+    Parameters
+    ----------
+    omega, damping : array, shape (m,) [rad/s], [-]
+    loads : array, shape (n, m)
+        Modal force of each interval.
+    velocity : array, shape (m,)
+        At the start.
+    step : float [s]
+    """
+    n, m = loads.shape
+    q, v = np.zeros((n + 1, m)), np.zeros((n + 1, m))
+    for i in range(m):
+        f = loads[:, i]
+        if omega[i] == 0.0:
+            v[:, i] = velocity[i] + step * np.append(0.0, np.cumsum(f))
+            q[1:, i] = np.cumsum(0.5 * step * (v[1:, i] + v[:-1, i]))
+            continue
+        root = omega[i] * np.sqrt(complex(damping[i] ** 2 - 1.0) or 1e-12)
+        states = []
+        for pole in (-damping[i] * omega[i] + root, -damping[i] * omega[i] - root):
+            decay = np.exp(pole * step)
+            # of an impulse at the start the state is the velocity itself
+            start = np.array([decay * velocity[i]])
+            part, _ = lfilter([(decay - 1.0) / pole], [1.0, -decay], f.astype(complex), zi=start)
+            states.append((pole, np.append(velocity[i], part)))
+        (p1, z1), (p2, z2) = states
+        q[:, i] = ((z1 - z2) / (p1 - p2)).real
+        v[:, i] = ((p1 * z1 - p2 * z2) / (p1 - p2)).real
+    return ModalMotion(q=q, v=v)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Response:
+    """What a body has for its gauges at a modal level.
+
+    ``extra`` (n + 1, k): what the gauges read besides the modes.
+    """
+
+    gauges: tuple[Gauge, ...]
+    shapes: Floats
+    motion: ModalMotion
+    extra: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def records(self, history: ImpactHistory) -> Iterator[GaugeRecord]:
+        for k, gauge in enumerate(self.gauges):
+            if gauge.kind == "velocity":
+                values = self.motion.v @ self.shapes[k]
+            else:
+                values = self.motion.q @ self.shapes[k] + self.extra[:, k]
+            yield gauge.record(history.start, history.step, values)
+
+
+def _at_edges(values: Floats) -> Floats:
+    """Means of n intervals at their n + 1 ends."""
+    first, last = values[:1], values[-1:]
+    return np.concatenate([first, 0.5 * (values[1:] + values[:-1]), last])
+
+
+def _in_order(problem: ContactProblem, found: list[GaugeRecord]) -> tuple[GaugeRecord, ...]:
+    by_name = {item.name: item for item in found}
+    return tuple(by_name[gauge.name] for gauge in problem.pair.gauges if gauge.name in by_name)
+
+
+def with_reduced_gauges(
+    result: LevelResult, problem: ContactProblem, pair: ReducedPair
+) -> LevelResult:
+    """A reduced level with what its gauges read.
+
+    Parameters
+    ----------
+    result : LevelResult
+    problem : ContactProblem
+        With its static solutions still there.
+    pair : ReducedPair
+        Of that level.
+    """
+    history, found = result.history, []
+    sides = (
+        (pair.upper, problem.flexibility_upper, pair.ports[0], 1.0),
+        (pair.lower, problem.flexibility_lower, pair.ports[1], -1.0),
+    )
+    for body, flexibility, port, sign in sides:
+        gauges = tuple(gauge for gauge in problem.pair.gauges if gauge.body == body.name)
+        if not gauges:
+            continue
+        shapes = body.observer_shapes.T
+        force = sign * history.force
+        extra = np.zeros((len(force) + 1, len(gauges)))
+        if body.correction == "consistent":
+            static = flexibility.deflections(port.pattern[:, None])[:, 0]
+            rows = np.array([gauge.row for gauge in gauges])
+            elastic = slice(body.rigid_count, None)
+            held = shapes[:, elastic] @ (body.port_shapes[elastic, 0] / body.omega[elastic] ** 2)
+            extra = np.outer(_at_edges(force), rows @ static - held)
+        motion = _reduced_motion(body, history, force, moving=sign > 0)
+        response = _Response(gauges=gauges, shapes=shapes, motion=motion, extra=extra)
+        found += list(response.records(history))
+    return replace(result, gauges=_in_order(problem, found))
+
+
+def _reduced_motion(
+    body: ReducedBody, history: ImpactHistory, force: Floats, *, moving: bool
+) -> ModalMotion:
+    loads = np.outer(force, body.port_shapes[:, 0])
+    velocity = np.zeros(body.mode_count)
+    if moving:
+        rigid = slice(0, body.rigid_count)
+        loads[:, rigid] += np.outer(history.external_force / body.mass, body.rigid_axial)
+        velocity[rigid] = -history.speed * body.rigid_axial
+    return modal_motion(body.omega, body.damping, loads, velocity, history.step)
+
+
+def interface_gauges(
+    problem: ContactProblem, model: InterfaceModel, result: InterfaceResult
+) -> tuple[GaugeRecord, ...]:
+    """What the gauges read at the interface level.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where the run is too long to keep the forces of all points: there are no channels then.
+    """
+    if not problem.pair.gauges:
+        return ()
+    segment = result.impacts[0]
+    history = segment.history
+    if not len(segment.point_force):
+        warnings.warn(
+            "outputs: level interface has none, for its run is too long to keep the forces of all "
+            "contact points. Try: a shorter run.duration, or a longer run.interface_step.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return ()
+    forces = segment.point_force.astype(float)
+    traces = model.traces
+    if model.ways:
+        forces = np.hstack([forces, segment.friction_force.astype(float)])
+        traces = np.vstack([traces, model.tangents])
+    loads = forces @ traces
+    velocity = np.zeros(model.mode_count)
+    own = (model.owner == 0) & (model.omega == 0.0)
+    axial = model.mass * model.drift[0] * own  # modal velocities of a unit axial velocity
+    velocity -= history.speed * axial
+    loads += np.outer(history.external_force / model.mass, axial)
+    extra = _at_edges(forces @ model.observed_residual.T)
+    gauges = tuple(
+        gauge for name in model.bodies for gauge in problem.pair.gauges if gauge.body == name
+    )
+    motion = modal_motion(model.omega, model.damping, loads, velocity, history.step)
+    response = _Response(gauges=gauges, shapes=model.observed, motion=motion, extra=extra)
+    return _in_order(problem, list(response.records(history)))
