@@ -14,6 +14,7 @@ from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
+from klack.contact.worn_faces import opened_by
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
@@ -112,7 +113,9 @@ class ContactProblem(PlacedBodies):
 
     @property
     def has_yield(self) -> tuple[bool, bool]:
-        """Whether any material of the upper and of the lower body has a yield stress."""
+        """Whether any material of the upper and of the lower body yields; worn faces do not."""
+        if self.case.contact.worn is not None:
+            return False, False
         upper, lower = self._loaded
         return upper.yields, lower.yields
 
@@ -146,7 +149,7 @@ class ContactProblem(PlacedBodies):
         if not any(self.has_yield):
             return None
         return self.flexibility_upper.remembered(
-            "static loops with yield, strain",
+            "static loops with yield and radius",
             (
                 self.flexibility_lower.key,
                 self.space.gap,
@@ -194,7 +197,7 @@ class ContactProblem(PlacedBodies):
         if self.case.contact.reach is not None or self.opposite is not None:
             raise error
         pair = self.pair
-        return contact_space(
+        wider = contact_space(
             pair.upper.mesh,
             pair.upper_surface,
             pair.lower.mesh,
@@ -202,6 +205,7 @@ class ContactProblem(PlacedBodies):
             reach=_REACH_GROWTH * space.reach,
             slave=space.slave,
         )
+        return opened_by(wider, self.case.contact.worn_faces)
 
 
 def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:
@@ -261,6 +265,7 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
         closing=closing_force(case),
         reach=case.contact.reach,
         progress=progress,
+        worn=case.contact.worn_faces,
     )
     return ContactProblem(
         case=case,

@@ -31,6 +31,7 @@ def check_consistency(case: ImpactSections) -> None:
     _check_solid_only(case)
     _check_guide(case)
     _check_shots(case)
+    _check_worn(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
             ("run", "levels"),
@@ -209,6 +210,21 @@ def _check_solid_only(case: ImpactSections) -> None:
             got=f"{what} of axisymmetric bodies",
             expected="three-dimensional bodies",
             hint="take 'model: swept' with 'layers: 18' for both of them.",
+            on_key=True,
+        )
+
+
+def _check_worn(case: ImpactSections) -> None:
+    """Refuse worn faces, which are those of a centred impact, of bodies that move aside."""
+    if case.contact.worn is None:
+        return
+    aside = not case.motion.placement.is_centred or case.guide is not None
+    if aside or case.shots is not None or not case.has_surfaces:
+        raise CaseProblem(
+            ("contact", "worn"),
+            got="worn faces of bodies that meet off-axis, or of given models",
+            expected="a centred impact of bodies with meshes",
+            hint="remove 'worn', or the placement, guide or shots.",
             on_key=True,
         )
 
