@@ -14,6 +14,7 @@ from klack.contact.statics import (
     contact_compliance,
     static_contact,
 )
+from klack.contact.worn_faces import WornFaces, opened_by
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress
 
@@ -61,6 +62,7 @@ def static_ladder(
     closing: float,
     reach: float | None,
     progress: Progress,
+    worn: WornFaces | None = None,
 ) -> StaticContact:
     """Static contact on as many candidate points as the impact can reach.
 
@@ -76,11 +78,13 @@ def static_ladder(
     reach : float or None [m]
         Largest gap of candidate points; found when None.
     progress : callable
+    worn : WornFaces or None
+        None for faces as made.
     """
     surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
     progress("static contact", 0.0)
     given = reach
-    space = contact_space(*surfaces, reach=given)
+    space = opened_by(contact_space(*surfaces, reach=given), worn)
     reach = space.reach
     compliance = _first_compliance(space, upper, lower)
     # a linear spring stores E + closing * approach at the turning point
@@ -89,7 +93,7 @@ def static_ladder(
     if given is None:
         reach = _REACH_MARGIN * approach
     while True:
-        candidates = contact_space(*surfaces, reach=reach)
+        candidates = opened_by(contact_space(*surfaces, reach=reach), worn)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)

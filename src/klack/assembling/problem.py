@@ -19,6 +19,7 @@ from klack.closing import Closing
 from klack.contact.mortar import ContactSpace
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
+from klack.contact.worn_faces import opened_by
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
@@ -138,6 +139,8 @@ class ContactProblem(PlacedBodies):
         AccuracyWarning
             Where yield is left out though the materials have it.
         """
+        if self.case.contact.worn is not None:  # they do not yield any more
+            return None
         return law_loops(
             self.static,
             *self.loaded,
@@ -161,7 +164,7 @@ class ContactProblem(PlacedBodies):
         """
         if self.case.contact.reach is not None or self.opposite is not None:
             raise error
-        return wider_space(self.pair, space)
+        return opened_by(wider_space(self.pair, space), self.case.contact.worn_faces)
 
 
 def build_problem(case: Case, progress: Progress, *, threads: int | None = None) -> ContactProblem:
@@ -221,6 +224,7 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
         closing=closing_force(case),
         reach=case.contact.reach,
         progress=progress,
+        worn=case.contact.worn_faces,
     )
     return ContactProblem(
         case=case,

@@ -92,7 +92,7 @@ def law_loops(
 
     try:
         loops = upper.flexibility.remembered(
-            "static loops with yield, strain",
+            "static loops with yield and radius",
             (
                 lower.flexibility.key,
                 static.space.gap,

@@ -34,6 +34,7 @@ def check_consistency(case: ImpactSections) -> None:
     _check_shots(case)
     _check_outputs(case)
     _check_ends(case)
+    _check_worn(case)
     if "lumped" in case.run.levels and case.lumped is None:
         raise CaseProblem(
             ("run", "levels"),
@@ -266,6 +267,21 @@ def _check_outputs(case: ImpactSections) -> None:
     others += [key for key in ("guide", "opposite", "shots") if getattr(case, key) is not None]
     dimensions = {name: body.geometry.dimension for name, body in case.bodies.items()}
     check_outputs(case.outputs, dimensions, next(iter(others), ""))
+
+
+def _check_worn(case: ImpactSections) -> None:
+    """Refuse worn faces, which are those of a centred impact, of bodies that move aside."""
+    if case.contact.worn is None:
+        return
+    aside = not case.motion.placement.is_centred or case.guide is not None
+    if aside or case.shots is not None or not case.has_surfaces:
+        raise CaseProblem(
+            ("contact", "worn"),
+            got="worn faces of bodies that meet off-axis, or of given models",
+            expected="a centred impact of bodies with meshes",
+            hint="remove 'worn', or the placement, guide or shots.",
+            on_key=True,
+        )
 
 
 def _check_guide(case: ImpactSections) -> None:

@@ -7,6 +7,7 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
@@ -20,6 +21,7 @@ from klack.case.placement import Placement
 from klack.case.shots import Shots
 from klack.case.study import CaseStudy
 from klack.contact.friction import MOST_FRICTION, Friction
+from klack.contact.worn_faces import WornFaces
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
@@ -36,6 +38,7 @@ from klack.units import (
 
 __all__ = [
     "CaseContact",
+    "CaseWorn",
     "ConsistentLocalLaw",
     "HertzLocalLaw",
     "ImpactSections",
@@ -50,6 +53,9 @@ __all__ = [
 ]
 
 _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
+_MOST_WORN = 0.05
+"""Of the radius: set that is too large for small changes of the faces."""
+
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
 
@@ -94,6 +100,48 @@ LocalLaw = Annotated[
 ]
 
 
+class CaseWorn(Section):
+    """Set that earlier impacts have left in both faces; the bodies are elastic from there on."""
+
+    force: Force = Field(
+        gt=0, description="Highest force of those impacts, up to which the faces stay elastic."
+    )
+    radius: tuple[Length, ...] = Field(
+        min_length=2, description="Distances from the axis of motion, rising."
+    )
+    opening: tuple[Length, ...] = Field(
+        min_length=2,
+        description="Gap that has stayed between both faces at each radius, along their normal.",
+    )
+
+    @model_validator(mode="after")
+    def _a_profile(self) -> Self:
+        if len(self.opening) != len(self.radius):
+            raise CaseProblem(
+                ("opening",),
+                got=f"{len(self.opening)} values for {len(self.radius)} radii",
+                expected="one value for each radius",
+                hint="klack impact with run.run_in writes both into worn.yaml.",
+            )
+        for i, (below, above) in enumerate(zip(self.radius, self.radius[1:], strict=False)):
+            if not 0.0 <= below < above:
+                raise CaseProblem(
+                    ("radius", i + 1),
+                    got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
+                    expected="radii that rise, from 0 on",
+                    hint="sort them, each with its opening.",
+                )
+        if max(self.opening) - min(self.opening) > _MOST_WORN * self.radius[-1]:
+            raise CaseProblem(
+                ("opening",),
+                got=f"a set of {format_si(max(self.opening) - min(self.opening), 'm', 3)} at "
+                f"{format_si(self.radius[-1], 'm', 3)} from the axis",
+                expected=f"at most {_MOST_WORN:g} of the radius",
+                hint="check the units: a set is 0.01 to 10 um as a rule.",
+            )
+        return self
+
+
 class CaseContact(Section):
     """Which surfaces meet, and how."""
 
@@ -106,6 +154,9 @@ class CaseContact(Section):
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
+    )
+    worn: CaseWorn | None = Field(
+        default=None, description="Set of both faces after earlier impacts; default as made."
     )
     local_law: LocalLaw = Field(
         default=ConsistentLocalLaw(kind="consistent"), description="Local law of the reduced level."
@@ -149,6 +200,13 @@ class CaseContact(Section):
                 hint="give the distance to first touch; the upper body is moved there.",
             )
         return gap
+
+    @property
+    def worn_faces(self) -> WornFaces | None:
+        """Profile of worn faces; None for faces as made."""
+        if self.worn is None:
+            return None
+        return WornFaces(radius=np.array(self.worn.radius), opening=np.array(self.worn.opening))
 
     @property
     def faces(self) -> Friction:

@@ -89,6 +89,8 @@ class YieldingLoops:
         Work of closing up to each state.
     half_width : array, shape (n,) [m]
         Of the contact at each state: half the width of the land that it leaves.
+    radius : array, shape (nc,) [m]
+        Of the contact points, from the axis.
     limit : str
         Why they end before an opening gives back the energy of the impact, so that running-in may
         go beyond them; empty where they do not.
@@ -100,6 +102,7 @@ class YieldingLoops:
     openings: tuple[Opening, ...]
     taken: Floats
     half_width: Floats
+    radius: Floats
     limit: str = ""
 
     @property
@@ -107,6 +110,11 @@ class YieldingLoops:
         """Plastic loss [J] of each state, which never falls."""
         stored = np.array([one.energy for one in self.openings])
         return np.asarray(np.maximum.accumulate(np.maximum(self.taken - stored, 0.0)))
+
+    def plastic_gap_after(self, force: float) -> Floats:
+        """Plastic gap [m] of the contact points after a largest force [N], shape (nc,)."""
+        gaps = PchipInterpolator(self.force, [state.plastic_gap for state in self.states])
+        return np.asarray(gaps(np.clip(force, self.force[0], self.force[-1])))
 
     @property
     def force(self) -> Floats:
@@ -178,6 +186,7 @@ def yielding_loops(
             openings=(),
             taken=np.empty(0),
             half_width=np.empty(0),
+            radius=space.points[:, 0],
         )
     states, openings = [contact.load(low)], [as_made(low)]
     slope = openings[0].force[-1] - openings[0].force[-2]
@@ -224,5 +233,6 @@ def yielding_loops(
         openings=tuple(openings),
         taken=taken,
         half_width=np.array([half_width_of(space, state.pressures) for state in states]),
+        radius=space.points[:, 0],
         limit=limit,
     )

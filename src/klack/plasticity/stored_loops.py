@@ -30,6 +30,7 @@ def loops_to_entry(loops: YieldingLoops) -> Entry:
             "plastic gap": np.array([s.plastic_gap for s in loops.states]).reshape(shape),
             "taken": loops.taken,
             "half width": loops.half_width,
+            "radius": loops.radius,
         },
         text=loops.limit,
     )
@@ -61,5 +62,6 @@ def loops_of_entry(entry: Entry) -> YieldingLoops:
         openings=tuple(openings),
         taken=arrays["taken"],
         half_width=arrays["half width"],
+        radius=arrays["radius"],
         limit=entry.text,
     )

@@ -1,5 +1,6 @@
 """``klack impact``: one dry impact at one or several levels."""
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -45,6 +46,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact
+        from klack.analyses.impact.worn_case import WORN, worn_text
         from klack.analyses.incomplete import IncompleteImpactError
 
     incomplete: Exception | None = None
@@ -55,5 +57,14 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
             )
         except IncompleteImpactError as error:
             study, incomplete = error.study, error
-    ending.end(IMPACT, study, incomplete=incomplete)
+
+    def worn(stage: Path) -> tuple[str, ...]:
+        found = study.running_in
+        if found is None or checked.path is None:
+            return ()
+        text = worn_text(checked.source, checked.path, found, ending.folder, version("klack"))
+        (stage / WORN).write_text(text, "utf-8")
+        return (WORN,)
+
+    ending.end(IMPACT, study, incomplete=incomplete, beside=worn)
     return ending.folder

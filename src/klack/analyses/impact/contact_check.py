@@ -63,6 +63,9 @@ _SHALLOW = sin(0.5 * pi / 180.0)
 
 _OVER_THE_END = "it reaches the edge of a named surface"
 
+_BEYOND = 0.98
+"""Of the force: worn by less, the faces yield again."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ContactCheck:
@@ -100,6 +103,7 @@ def check_contact(
     surfaces: str,
     *,
     has_yield: bool = False,
+    worn_by: float = 0.0,
 ) -> ContactCheck:
     """Judge a static contact at an axial force, and warn of what makes it doubtful.
 
@@ -126,6 +130,12 @@ def check_contact(
     space, lam = static.space, static.pattern_at(force)
     ratio = size_over_half_width(static, force)
     edges = _edges(pair)
+    if 0.0 < worn_by < _BEYOND * force:
+        _warn(
+            f"contact {surfaces} is worn up to {format_si(worn_by, 'N', 4)} and yields again "
+            f"at the {format_si(force, 'N', 4)} of this impact, which is computed as elastic. "
+            "Try: the case with faces as made, at this speed with run.run_in."
+        )
     across = points_across(static, force)
     expected = expected_half_width(case, pair, static, force)
     doubts = []
@@ -147,7 +157,7 @@ def check_contact(
         points_across=across,
         expected=nan if corner is not None else expected,
         needed_yield=nan
-        if corner is not None
+        if corner is not None or 0.0 < worn_by
         else check_yield(case, pair, static, force, surfaces, computed=has_yield).needed,
         doubts=tuple(doubts),
     )
@@ -170,6 +180,8 @@ def ends_reached(
     space : ContactSpace
     levels : mapping of level to LevelResult
     surfaces : str
+    worn_by : float [N]
+        Highest force of the impacts that have worn the faces, 0 for faces as made.
 
     Returns
     -------

@@ -256,6 +256,12 @@ class RunningIn:
         Width of the strip that has been in contact at the highest force so far.
     run_in : bool
         The last impact does not yield any more.
+    radius : array, shape (nc,) [m]
+        Of the contact points, from the axis, rising.
+    opening : array, shape (nc,) [m]
+        Gap between both faces that has stayed at them after the last impact.
+    worn_by : float [N]
+        Force up to which the faces are elastic now.
     """
 
     asked: int
@@ -266,6 +272,9 @@ class RunningIn:
     set: NDArray[np.float64]
     land: NDArray[np.float64]
     run_in: bool
+    radius: NDArray[np.float64]
+    opening: NDArray[np.float64]
+    worn_by: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

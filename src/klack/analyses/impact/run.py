@@ -322,7 +322,15 @@ def _study(
                 lambda: compare_transfer(problem, pools, own.ports, progress=clock),
             )
             transfer = found or ()
-        check = check_contact(case, problem.pair, problem.static, peak, _surfaces(case))
+        worn = case.contact.worn
+        check = check_contact(
+            case,
+            problem.pair,
+            problem.static,
+            peak,
+            _surfaces(case),
+            worn_by=0.0 if worn is None else worn.force,
+        )
         if is_last:
             problem.close()
         sections: tuple[SectionPicture, ...] = ()

@@ -83,6 +83,9 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         if measures.cut_off or (settled and len(rows) >= asked):
             break
     columns = np.array(rows).T
+    worn_by = float(np.interp(law.reached, law.largest, law.closing))
+    order = np.argsort(loops.radius)
+    gap = loops.plastic_gap_after(worn_by)[order]
     return RunningIn(
         asked=asked,
         peak_force=columns[0],
@@ -92,6 +95,9 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         set=columns[4],
         land=columns[5],
         run_in=settled,
+        radius=loops.radius[order],
+        opening=gap - gap.min(),
+        worn_by=worn_by,
     )
 
 

@@ -1,0 +1,51 @@
+"""Faces that earlier impacts have worn: the gap that has stayed between them, over the radius."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.mortar import ContactSpace
+
+__all__ = ["WornFaces", "opened_by"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WornFaces:
+    """Set of both faces along the meridian.
+
+    Parameters
+    ----------
+    radius : array, shape (n,) [m]
+        Distance from the axis of motion, increasing.
+    opening : array, shape (n,) [m]
+        Gap that has stayed between both faces, along their normal.  Linear between the radii,
+        constant beyond the first and the last.
+    """
+
+    radius: NDArray[np.float64]
+    opening: NDArray[np.float64]
+
+
+def opened_by(space: ContactSpace, worn: WornFaces | None) -> ContactSpace:
+    """Contact points of worn faces, which touch first where those as made did along the axis.
+
+    Parameters
+    ----------
+    space : ContactSpace
+        Of faces as made; of two or three dimensions.
+    worn : WornFaces or None
+        None for faces as made.
+    """
+    if worn is None:
+        return space
+    radius = np.linalg.norm(space.points[:, :-1], axis=1)
+    start = min(space.clearance, space.touch)
+    opened = replace(
+        space,
+        gap=space.gap + np.interp(radius, worn.radius, worn.opening),
+        beyond=space.beyond + float(worn.opening.min()),
+    )
+    opened = opened.shifted(start - opened.touch)
+    # a worn land closes at once: its weighted gaps touch with the faces themselves
+    return replace(opened, clearance=start)
