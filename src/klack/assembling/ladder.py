@@ -67,7 +67,7 @@ def static_ladder(
     Parameters
     ----------
     pair : BodyPair
-        Only the meshes and surfaces matter; they need not touch.
+        Only meshes, surfaces and their form matter; they need not touch.
     upper, lower : Flexibility
     energy : float [J]
         That the contact must be able to store.
@@ -80,7 +80,7 @@ def static_ladder(
     surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
     progress("static contact", 0.0)
     given = reach
-    space = contact_space(*surfaces, reach=given)
+    space = contact_space(*surfaces, reach=given, form=pair.form)
     reach = space.reach
     compliance = _first_compliance(space, upper, lower)
     # a linear spring stores E + closing * approach at the turning point
@@ -89,7 +89,7 @@ def static_ladder(
     if given is None:
         reach = _REACH_MARGIN * approach
     while True:
-        candidates = contact_space(*surfaces, reach=reach)
+        candidates = contact_space(*surfaces, reach=reach, form=pair.form)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)

@@ -11,7 +11,7 @@ from klack.assembling.yielding import LoadedBody, loops_with_yield
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
-from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.mortar import ContactSpace, contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
 from klack.elasticity.body import ElasticBody
@@ -200,6 +200,7 @@ class ContactProblem(PlacedBodies):
             pair.lower_surface,
             reach=_REACH_GROWTH * space.reach,
             slave=space.slave,
+            form=pair.form,
         )
 
 
@@ -285,8 +286,8 @@ def _budget(case: Case, body: ElasticBody, progress: Progress) -> Budget:
 
 
 def _drawn_gap(pair: BodyPair) -> float:
-    upper, lower = pair.upper.mesh, pair.lower.mesh
-    return axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
+    sides = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    return axial_distance(*sides) if pair.form is None else -touching_shift(*sides, pair.form)
 
 
 def _with_gap(case: Case, gap: float | None) -> Case:

@@ -203,6 +203,11 @@ def _check_solid_only(case: ImpactSections) -> None:
         asked.append((("guide",), "a guide"))
     if case.shots is not None:
         asked.append((("shots",), "shots, which vary in their placement,"))
+    if case.contact.tilt:
+        asked.append((("contact", "tilt"), "a tilt between the faces"))
+    waves = case.contact.waviness
+    if waves is not None and waves.direction is not None:
+        asked.append((("contact", "waviness", "direction"), "straight waves on the faces"))
     for key, what in asked:
         raise CaseProblem(
             key,

@@ -85,6 +85,15 @@ def check_given(case: ImpactSections) -> None:
             expected="no friction: without a surface nothing is known of its slip",
             hint="leave it out, or give the body a mesh.",
         )
+    if case.contact.has_form:
+        form = next(key for key in ("crown", "waviness", "tilt") if getattr(case.contact, key))
+        raise CaseProblem(
+            ("contact", form),
+            got=f"a form of the faces with '{name}', {what}",
+            expected="bodies with surfaces",
+            hint=f"remove '{form}', or give '{name}' a mesh.",
+            on_key=True,
+        )
     for i, level in enumerate(case.run.levels):
         if level not in GIVEN_LEVELS:
             raise CaseProblem(

@@ -5,11 +5,13 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 """
 
 from collections.abc import Mapping
+from math import radians
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
+from klack.case.face_form import FaceWaviness
 from klack.case.guide import CaseGuide
 from klack.case.levels import Level
 from klack.case.measurement import CaseMeasurement
@@ -22,6 +24,7 @@ from klack.contact.friction import MOST_FRICTION, Friction
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
+    Angle,
     Force,
     Frequency,
     Length,
@@ -49,6 +52,7 @@ __all__ = [
 ]
 
 _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
+_LARGEST_TILT = radians(5.0)
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
 
@@ -124,6 +128,24 @@ class CaseContact(Section):
         description="Speed of slip over which the static coefficient fades to 'friction'; "
         "default at once.",
     )
+    crown: Length = Field(
+        default=0.0,
+        examples=["1 um"],
+        ge=0,
+        description="Height of the centre of the face above its edge, of both faces together.",
+    )
+    waviness: FaceWaviness | None = Field(
+        default=None, description="Waves on the faces; default none."
+    )
+    tilt: Angle = Field(
+        default=0.0,
+        ge=0,
+        le=_LARGEST_TILT,
+        description="Angle between the faces when their bodies are upright.",
+    )
+    tilt_direction: Angle = Field(
+        default=0.0, description="Towards which a tilted face opens, from x towards y."
+    )
 
     @model_validator(mode="after")
     def _falling_friction(self) -> Self:
@@ -154,6 +176,11 @@ class CaseContact(Section):
         """Friction between the faces."""
         static = self.friction if self.static_friction is None else self.static_friction
         return Friction(kinetic=self.friction, static=static, speed=self.stribeck_speed)
+
+    @property
+    def has_form(self) -> bool:
+        """Whether the faces differ from the drawing by crown, waviness or tilt."""
+        return self.crown > 0.0 or self.waviness is not None or self.tilt > 0.0
 
     @property
     def moving(self) -> SurfaceName:

@@ -214,7 +214,8 @@ def exact_gaps(problem: ContactProblem) -> "ExactGaps":
     pair, above = problem.pair, problem.opposite
     centre = pair.upper.centre_of_mass
     here = (pair.upper.mesh, pair.upper_surface)
-    seat = RigidGaps.of(problem.space, *here, pair.lower.mesh, pair.lower_surface, centre=centre)
+    below = (pair.lower.mesh, pair.lower_surface)
+    seat = RigidGaps.of(problem.space, *here, *below, centre=centre, form=pair.form)
     if above is None:
         return ExactGaps(seat=seat)
     there = (above.body.mesh, above.surface)
