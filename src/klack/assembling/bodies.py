@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
-from klack.assembling.face_form import form_of_faces
+from klack.assembling.face_form import form_of_faces, layer_of_faces
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.held_nodes import held_nodes
@@ -17,6 +17,7 @@ from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
+from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
@@ -49,6 +50,8 @@ class BodyPair:
         Where the upper body stands, compared with its drawing.
     form : FaceForm or None
         Of both faces, which their meshes do not have.
+    layer : AsperityLayer or None
+        Of both faces.
     """
 
     upper: ElasticBody
@@ -57,6 +60,7 @@ class BodyPair:
     lower_surface: Surface
     pose: Pose
     form: FaceForm | None = None
+    layer: AsperityLayer | None = None
 
     @property
     def shift(self) -> float:
@@ -98,6 +102,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         lower_surface=lower_surface,
         pose=pose,
         form=form,
+        layer=layer_of_faces(case, upper, upper_surface, lower, lower_surface),
     )
 
 

@@ -1,4 +1,4 @@
-"""Form of the faces of a case on its meshes: where their centre is, and whether it fits there."""
+"""Form and roughness of the faces of a case on its meshes: do they fit there, of what are they."""
 
 from math import nan
 
@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.schema import Case
+from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import STEEPEST, FaceForm
 from klack.contact.pairing import face_thickness
 from klack.errors import InputError
-from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh import Mesh, Surface, solid_at
 from klack.units import format_si
 
-__all__ = ["form_of_faces"]
+__all__ = ["form_of_faces", "layer_of_faces"]
 
 _PER_WAVE = 4.0
 """Elements that a wave needs: eight contact points."""
@@ -52,6 +53,46 @@ def form_of_faces(
         waves=None if waves is None else waves.waves,
         tilt=contact.tilt,
         tilt_direction=contact.tilt_direction,
+    )
+
+
+def layer_of_faces(
+    case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface
+) -> AsperityLayer | None:
+    """Layer of asperities between both faces; None where the case gives none.
+
+    Raises
+    ------
+    InputError
+        For summits on a body whose material is only in matrices.
+    """
+    rough = case.contact.roughness
+    if rough is None:
+        return None
+    if rough.curve is not None:
+        closure, pressure = np.array(rough.curve).T
+        if closure[0] > 0.0:
+            closure, pressure = np.append(0.0, closure), np.append(0.0, pressure)
+        return AsperityLayer(closure=closure, pressure=pressure)
+    assert rough.rms is not None
+    assert rough.asperity_radius is not None
+    inverse = 0.0
+    moving, stop = case.contact.between
+    for name, mesh, face in ((moving.body, upper, surface), (stop.body, lower, other)):
+        if case.bodies[name].material is None:
+            raise InputError(
+                f"{case.path or 'case'}: contact.roughness",
+                got=f"summits on '{name}', whose material is only in matrices",
+                expected="a material, or a measured curve",
+                hint="give 'curve': pairs of closure and pressure.",
+            )
+        material = case.materials_of(name, mesh.solids)[solid_at(mesh, face)]
+        inverse += 1.0 / material.plane_strain_modulus
+    return AsperityLayer.of_summits(
+        rms=rough.rms,
+        radius=rough.asperity_radius,
+        density=rough.density,
+        modulus=1.0 / inverse,
     )
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.bodies import BodyPair
 from klack.case.schema import Case
+from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import (
     ReachError,
@@ -94,7 +95,7 @@ def static_ladder(
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)
         try:
-            static = _ladder(candidates, C, energy, closing, force)
+            static = _ladder(candidates, C, pair.layer, energy, closing, force)
         except ReachError:
             if given is not None:
                 raise
@@ -121,7 +122,12 @@ def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibilit
 
 
 def _ladder(
-    space: ContactSpace, C: NDArray[np.float64], energy: float, closing: float, force: float
+    space: ContactSpace,
+    C: NDArray[np.float64],
+    layer: AsperityLayer | None,
+    energy: float,
+    closing: float,
+    force: float,
 ) -> StaticContact:
     """Static contact up to a force above that of a quasi-static impact of this energy.
 
@@ -131,7 +137,7 @@ def _ladder(
     refused: ReachError | None = None
     while True:
         try:
-            static = static_contact(space, C, force)
+            static = static_contact(space, C, force, layer=layer)
         except ReachError as error:
             # elements as wide as the contact bound the force far too high: less may do
             if not error.held > 0 or refused is not None:
@@ -152,4 +158,4 @@ def _ladder(
     # falls up to the closing force, rises from there
     rising = load >= closing
     needed = _LOAD_MARGIN * float(np.interp(energy, surplus[rising], load[rising]))
-    return static_contact(space, C, needed)
+    return static_contact(space, C, needed, layer=layer)

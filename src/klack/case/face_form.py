@@ -1,5 +1,6 @@
-"""Waviness of the faces of a contact, as a case gives it."""
+"""Waviness and roughness of the faces of a contact, as a case gives them."""
 
+from itertools import pairwise
 from math import pi
 from typing import Self
 
@@ -8,9 +9,9 @@ from pydantic import Field, model_validator
 from klack.contact.face_form import STEEPEST, Waves
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
-from klack.units import Angle, Length, format_si
+from klack.units import Angle, Length, Pressure, Ratio, format_si
 
-__all__ = ["FaceWaviness"]
+__all__ = ["FaceRoughness", "FaceWaviness"]
 
 
 class FaceWaviness(Section):
@@ -51,3 +52,59 @@ class FaceWaviness(Section):
             direction=self.direction,
             phase=self.phase,
         )
+
+
+class FaceRoughness(Section):
+    """Asperities of the faces, of both together: summits on a normal law, or a measured curve."""
+
+    rms: Length | None = Field(
+        default=None, gt=0, description="Root mean square of the heights of the summits."
+    )
+    asperity_radius: Length | None = Field(
+        default=None, gt=0, description="Radius of the summits; ground steel has 10 to 200 um."
+    )
+    density: Ratio = Field(
+        default=0.05,
+        gt=0,
+        le=1,
+        description="Summits per area times their radius times rms.",
+    )
+    curve: tuple[tuple[Length, Pressure], ...] | None = Field(
+        default=None,
+        description="Instead: measured pairs of closure and pressure, both rising from 0.",
+    )
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if self.curve is None:
+            for key in ("rms", "asperity_radius"):
+                if getattr(self, key) is None:
+                    raise CaseProblem(
+                        (),
+                        got=f"roughness without '{key}'",
+                        expected="'rms' and 'asperity_radius', or a measured 'curve'",
+                        hint="ground steel has an rms of 0.1 to 0.5 um and summits of 10 to "
+                        "200 um.",
+                    )
+            return self
+        given = [
+            key for key in ("rms", "asperity_radius", "density") if key in self.model_fields_set
+        ]
+        if given:
+            raise CaseProblem(
+                (given[0],),
+                got=f"'{given[0]}' beside a measured 'curve'",
+                expected="one of them",
+                hint="the curve says all; remove the other keys.",
+                on_key=True,
+            )
+        points = ((0.0, 0.0), *self.curve) if self.curve[:1] != ((0.0, 0.0),) else self.curve
+        rises = all(b[0] > a[0] and b[1] > a[1] for a, b in pairwise(points))
+        if len(points) < 2 or not rises:
+            raise CaseProblem(
+                ("curve",),
+                got=f"{len(self.curve)} pairs that do not rise from 0",
+                expected="closures and pressures that both rise",
+                hint="write [[0 um, 0 MPa], [0.3 um, 2 MPa], [0.6 um, 20 MPa]].",
+            )
+        return self

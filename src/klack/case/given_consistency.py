@@ -85,11 +85,12 @@ def check_given(case: ImpactSections) -> None:
             expected="no friction: without a surface nothing is known of its slip",
             hint="leave it out, or give the body a mesh.",
         )
-    if case.contact.has_form:
-        form = next(key for key in ("crown", "waviness", "tilt") if getattr(case.contact, key))
+    forms = ("crown", "waviness", "tilt", "roughness")
+    form = next((key for key in forms if getattr(case.contact, key)), None)
+    if form is not None:
         raise CaseProblem(
             ("contact", form),
-            got=f"a form of the faces with '{name}', {what}",
+            got=f"the key '{form}' of faces with '{name}', {what}",
             expected="bodies with surfaces",
             hint=f"remove '{form}', or give '{name}' a mesh.",
             on_key=True,

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
-from klack.case.face_form import FaceWaviness
+from klack.case.face_form import FaceRoughness, FaceWaviness
 from klack.case.guide import CaseGuide
 from klack.case.levels import Level
 from klack.case.measurement import CaseMeasurement
@@ -136,6 +136,9 @@ class CaseContact(Section):
     )
     waviness: FaceWaviness | None = Field(
         default=None, description="Waves on the faces; default none."
+    )
+    roughness: FaceRoughness | None = Field(
+        default=None, description="Asperities of the faces; default smooth."
     )
     tilt: Angle = Field(
         default=0.0,

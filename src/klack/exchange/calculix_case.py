@@ -37,11 +37,12 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             "one layer, with a different contact problem",
             hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
-    if case.contact.has_form:
-        form = next(key for key in ("crown", "waviness", "tilt") if getattr(case.contact, key))
+    forms = ("crown", "waviness", "tilt", "roughness")
+    form = next((key for key in forms if getattr(case.contact, key)), None)
+    if form is not None:
         raise InputError(
             f"{case.path or 'case'}: contact.{form}",
-            got="a form of the faces, which the meshes do not have",
+            got="a form or roughness of the faces, which the meshes do not have",
             expected="faces as drawn: a deck holds the meshes alone",
             hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
         )

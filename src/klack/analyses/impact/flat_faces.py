@@ -10,14 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from klack.analyses.impact.record import LevelResult
-from klack.analyses.impact.yield_check import solid_at
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.contact.face_front import area_at_once, front_pressure
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.materials import Material
-from klack.mesh.mesh import Surface
+from klack.mesh.mesh import Surface, solid_at
 from klack.units import format_si
 
 __all__ = ["doubt_modal_levels", "flat_for_modes", "flat_for_reduced"]
@@ -48,15 +47,17 @@ def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
     period = max((1.0 / one for one in highest if one > 0.0), default=0.0)
     if None in materials or period == 0.0:
         return ""
-    area = area_at_once(problem.space, speed * period)
-    front = area * front_pressure(speed, *(one for one in materials if one is not None))
+    pressure = front_pressure(speed, *(one for one in materials if one is not None))
+    layer = 0.0 if pair.layer is None else pair.layer.closure_at(pressure)
+    area = area_at_once(problem.space, speed * period - layer)
+    front = area * pressure
     if front < _SHARE * problem.static.max_force:
         return ""
     return (
         f"{1e6 * area:.3g} mm^2 of the faces meet all at once, within the shortest period of the "
         f"kept modes ({format_si(period, 's', 2)}): the force rises by about "
         f"{format_si(front, 'N', 2)} in that time, and rise and peak are those of the truncation. "
-        "Try: the form of real faces (contact.crown, waviness or tilt; ground ends have 0.2 to "
+        "Try: real faces (contact.crown, waviness, tilt, roughness; ground ends deviate by 0.2 to "
         "5 um), more modes, or level full."
     )
 

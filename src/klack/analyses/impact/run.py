@@ -441,6 +441,8 @@ def _certificate(
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
+    if problem.pair.layer is not None:
+        return _Certificate(doubt="the interface level, which estimates errors, has no roughness")
     count = certificate_modes(problem.case)
 
     def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:

@@ -54,6 +54,14 @@ def static_loops_of(problem: ContactProblem, progress: Progress) -> YieldingLoop
             stacklevel=2,
         )
         return None
+    if pair.layer is not None:
+        warnings.warn(
+            f"{left}: its law has either a layer of asperities or yield. Try: the case without "
+            "contact.roughness beside it.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+        return None
     progress("faces that yield", 0.0)
     try:
         loops = problem.yielding
