@@ -10,6 +10,7 @@ from math import gamma, pi, sqrt
 import numpy as np
 import pytest
 
+from klack.analyses.impact.interface_level import build_interface
 from klack.analyses.impact.run import run_impact
 from klack.assembling.problem import build_problem
 from klack.case import find_case, load_case
@@ -143,11 +144,27 @@ def pulse(history):
     return plateau, end - half, high - low
 
 
+def test_a_rough_needle_is_the_same_at_both_levels(tmp_path):
+    """Ring on a cone: the layer takes 7 % of the peak; reduced within 0.2 % of the full order."""
+    text = find_case("demo-valve-axisymmetric").read_text()
+    path = tmp_path / "needle.yaml"
+    path.write_text(text.replace("  gap: 0 um\n", f"  gap: 0 um\n  {SUMMITS}\n"))
+
+    levels = run_impact(load_case(path), levels=("reduced", "full"), certify=False).levels
+
+    ours, full = (levels[name].measures for name in ("reduced", "full"))
+    assert ours.peak_force == pytest.approx(full.peak_force, rel=2e-3)
+    assert ours.contact_time == pytest.approx(full.contact_time, rel=2e-3)
+    assert ours.restitution == pytest.approx(full.restitution, abs=1e-3)
+    assert full.peak_force == pytest.approx(115.2, rel=0.01)  # smooth: 123.4 N
+
+
 @pytest.mark.parametrize(
     ("key", "said"),
     [
         ("roughness: {rms: 0 um, asperity_radius: 50 um}", "rms"),
         ("roughness: {rms: -1 um, asperity_radius: 50 um}", "rms"),
+        ("roughness: {rms: 50 um, asperity_radius: 0.2 um}", "tenth of the radius"),
         ("roughness: {rms: 0.2 um}", "without 'asperity_radius'"),
         ("roughness: {}", "without 'rms'"),
         ("roughness: {rms: 0.2 um, curve: [[1 um, 1 MPa]]}", "beside a measured 'curve'"),
@@ -166,3 +183,10 @@ def test_a_roughness_that_cannot_be_is_one_clear_error(tmp_path, key, said):
 def test_levels_without_a_layer_say_so(tmp_path):
     with pytest.raises(InputError, match="interface"):
         run_impact(rods(tmp_path, SUMMITS), levels=("interface",))
+
+
+def test_the_interface_model_refuses_rough_faces(tmp_path):
+    """Also where no level is asked for: advice and error estimates build it."""
+    problem = build_problem(rods(tmp_path, SUMMITS), silent)
+    with pytest.raises(InputError, match="interface level"):
+        build_interface(problem, {})

@@ -86,7 +86,7 @@ class FaceRoughness(Section):
                         hint="ground steel has an rms of 0.1 to 0.5 um and summits of 10 to "
                         "200 um.",
                     )
-            return self
+            return self._with_round_summits()
         given = [
             key for key in ("rms", "asperity_radius", "density") if key in self.model_fields_set
         ]
@@ -106,5 +106,20 @@ class FaceRoughness(Section):
                 got=f"{len(self.curve)} pairs that do not rise from 0",
                 expected="closures and pressures that both rise",
                 hint="write [[0 um, 0 MPa], [0.3 um, 2 MPa], [0.6 um, 20 MPa]].",
+            )
+        return self
+
+    def _with_round_summits(self) -> Self:
+        """Refuse summits as high as they are round: spheres that touch at their tips are flat."""
+        assert self.rms is not None
+        assert self.asperity_radius is not None
+        most = STEEPEST * self.asperity_radius
+        if self.rms > most:
+            raise CaseProblem(
+                ("rms",),
+                got=f"{format_si(self.rms, 'm')} on summits of radius "
+                f"{format_si(self.asperity_radius, 'm')}",
+                expected=f"at most a tenth of the radius, {format_si(most, 'm', 3)}",
+                hint="ground steel has an rms of 0.1 to 0.5 um and summits of 10 to 200 um.",
             )
         return self

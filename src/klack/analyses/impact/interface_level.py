@@ -103,7 +103,19 @@ def build_interface(
         Other contact points of the same surfaces than those of the static contact.
     compliance : array, shape (nc, nc), optional [m/N]
         Static compliance of both bodies at these.
+
+    Raises
+    ------
+    InputError
+        For rough faces, whose layer this level does not have.
     """
+    if problem.pair.layer is not None:
+        raise InputError(
+            f"{problem.case.path or 'case'}: contact.roughness",
+            got="rough faces at the interface level",
+            expected="smooth faces there",
+            hint="leave contact.roughness out; contact.crown goes with every level.",
+        )
     bodies = [
         InterfaceBody(
             body=body,
