@@ -86,7 +86,7 @@ def test_yield_beside_friction_is_left_out_aloud():
     assert "plastic" not in study.levels["reduced"].energies or (
         study.levels["reduced"].energies["plastic"] == 0.0
     )
-    assert any("its law has either friction or yield" in text for text in study.warnings)
+    assert any("a law has either yield or contact.friction" in text for text in study.warnings)
 
 
 def test_a_law_without_a_step_of_its_own_and_an_export():

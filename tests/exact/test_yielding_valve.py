@@ -139,7 +139,7 @@ def test_friction_and_yield_are_not_had_together():
     """Bad input: the law has one of the two; a warning names what is left out."""
     study = _study(("speed: 0.1 m/s}", "speed: 0.1 m/s, friction: 0.1}"))
 
-    assert any("either friction or yield" in text for text in study.warnings)
+    assert any("either yield or stops.seat.friction" in text for text in study.warnings)
     assert not study.variants["dry"].result.faces
     assert any("yields before" in text for text in study.warnings)
 

@@ -76,3 +76,25 @@ def test_damping_lowers_the_restitution_as_the_page_says(tmp_path):
     text = row(page, "losses in material")[2]
     written = float(re.search(r" 1 %: ([\d.]+)", text)[1])
     assert found.restitution == pytest.approx(written, abs=2e-4)  # versions of the mesher
+
+
+def test_rough_rods_give_the_forces_that_the_page_says(tmp_path):
+    page = "flat-faces.md"
+    yaml = YAML(typ="safe")
+    case = yaml.load(find_case("two-rods"))
+    rough = block(page)
+    forces = {}
+    for faces, changes in (("flat", rough | {"contact": {}}), ("asperities of 0.2 um", rough)):
+        changed = case | {part: case[part] | keys for part, keys in changes.items()}
+        path = tmp_path / "case.yaml"
+        with path.open("w", encoding="utf-8") as stream:
+            yaml.dump(changed, stream)
+        forces[faces] = measures_of(path)
+
+    for faces, found in forces.items():
+        _, _, force, time = row(page, f"{faces} | reduced")
+        assert found.peak_force == pytest.approx(float(force.split()[0]), rel=2e-3)
+        assert 1e6 * found.contact_time == pytest.approx(float(time.split()[0]), rel=2e-3)
+    # rho c A v / 2 of wave theory
+    plateau = 7850.0 * (210e9 / 7850.0) ** 0.5 * 3.141593 * 2e-3**2 * 0.1
+    assert forces["asperities of 0.2 um"].peak_force == pytest.approx(plateau, rel=2e-3)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.assembling.face_form import form_of_faces, layer_of_faces
 from klack.assembling.gauges import place_gauges
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
 from klack.assembling.given_shapes import require_given_shapes
@@ -17,6 +18,8 @@ from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
+from klack.contact.asperity_layer import AsperityLayer
+from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.elasticity.body import ElasticBody, elastic_body
@@ -49,6 +52,10 @@ class BodyPair:
         Where the upper body stands, compared with its drawing.
     gauges : tuple of Gauge
         On either body.
+    form : FaceForm or None
+        Of both faces, which their meshes do not have.
+    layer : AsperityLayer or None
+        Of both faces.
     """
 
     upper: ElasticBody
@@ -57,6 +64,8 @@ class BodyPair:
     lower_surface: Surface
     pose: Pose
     gauges: tuple[Gauge, ...] = ()
+    form: FaceForm | None = None
+    layer: AsperityLayer | None = None
 
     @property
     def shift(self) -> float:
@@ -82,9 +91,9 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
-    pose = _pose(case, upper, upper_surface, lower, lower_surface, touch)
+    pose, form = _pose(case, upper, upper_surface, lower, lower_surface, touch)
     upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)
-    _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose)
+    _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose, form)
     progress("mesh", 1.0)
     progress("assemble", 0.0)
     bodies = []
@@ -98,6 +107,8 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         lower_surface=lower_surface,
         pose=pose,
         gauges=place_gauges(case, {moving.body: (upper, pose), stop.body: (lower, None)}),
+        form=form,
+        layer=layer_of_faces(case, upper, upper_surface, lower, lower_surface),
     )
 
 
@@ -224,10 +235,12 @@ def _sizing(settings: MeshSettings, places: tuple[tuple[float, ...], ...]) -> Me
     )
 
 
-def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface) -> float:
+def _shift(
+    case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, form: FaceForm | None
+) -> float:
     """Find the translation of the upper body along z [m] that gives the gap of the case."""
     if case.contact.gap is not None:
-        return touching_shift(upper, surface, lower, other) + case.contact.gap
+        return touching_shift(upper, surface, lower, other, form) + case.contact.gap
     distance = axial_distance(upper, surface, lower, other)
     if distance < 0:
         raise InputError(
@@ -241,8 +254,11 @@ def _shift(case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surfac
 
 def _pose(
     case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
-) -> Pose:
-    """Tilt the upper body, shift it sideways, and move it along z to the gap of the case."""
+) -> tuple[Pose, FaceForm | None]:
+    """Tilt the upper body, shift it sideways, and move it along z to the gap of the case.
+
+    The form of its face goes with it.
+    """
     placement = case.motion.placement
     about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
     if not placement.is_centred:
@@ -251,8 +267,9 @@ def _pose(
         # z x d: the upper end leans towards d
         lean = placement.tilt * np.cross([0.0, 0.0, 1.0], _towards(placement.tilt_direction))
         upper = upper.placed(Pose(rotation=lean, about=about, shift=aside))
-    shift = _shift(case, upper, surface, lower, other)
-    return Pose(rotation=lean, about=about, shift=aside + np.array([0.0, 0.0, shift]))
+    form = form_of_faces(case, upper, surface, lower, other)
+    shift = _shift(case, upper, surface, lower, other, form)
+    return Pose(rotation=lean, about=about, shift=aside + np.array([0.0, 0.0, shift])), form
 
 
 def _towards(angle: float) -> np.ndarray:
@@ -280,11 +297,12 @@ def _check_refinement(
     other: Surface,
     touch: Touch | None,
     pose: Pose,
+    form: FaceForm | None,
 ) -> None:
     """Warn when the placement carries the first touch away from where the meshes are fine."""
     if case.motion.placement.is_centred or touch is None or not touch.upper:
         return
-    space = contact_space(upper, surface, lower, other)
+    space = contact_space(upper, surface, lower, other, form=form)
     facing = space.axial > 1e-6
     at = space.points[facing][np.argmin(space.gap[facing] / space.axial[facing])]
     sides = (

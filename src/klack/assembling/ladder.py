@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.bodies import BodyPair
 from klack.case.schema import Case
+from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import (
     ReachError,
@@ -69,7 +70,7 @@ def static_ladder(
     Parameters
     ----------
     pair : BodyPair
-        Only the meshes and surfaces matter; they need not touch.
+        Only meshes, surfaces and their form matter; they need not touch.
     upper, lower : Flexibility
     energy : float [J]
         That the contact must be able to store.
@@ -84,7 +85,7 @@ def static_ladder(
     surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
     progress("static contact", 0.0)
     given = reach
-    space = opened_by(contact_space(*surfaces, reach=given), worn)
+    space = opened_by(contact_space(*surfaces, reach=given, form=pair.form), worn)
     reach = space.reach
     compliance = _first_compliance(space, upper, lower)
     # a linear spring stores E + closing * approach at the turning point
@@ -93,12 +94,12 @@ def static_ladder(
     if given is None:
         reach = _REACH_MARGIN * approach
     while True:
-        candidates = opened_by(contact_space(*surfaces, reach=reach), worn)
+        candidates = opened_by(contact_space(*surfaces, reach=reach, form=pair.form), worn)
         progress("static contact", 0.2)
         C = contact_compliance(candidates, upper, lower)
         progress("static contact", 0.8)
         try:
-            static = _ladder(candidates, C, energy, closing, force)
+            static = _ladder(candidates, C, pair.layer, energy, closing, force)
         except ReachError:
             if given is not None:
                 raise
@@ -119,6 +120,7 @@ def wider_space(pair: BodyPair, space: ContactSpace) -> ContactSpace:
         pair.lower_surface,
         reach=_REACH_GROWTH * space.reach,
         slave=space.slave,
+        form=pair.form,
     )
 
 
@@ -137,7 +139,12 @@ def _first_compliance(space: ContactSpace, upper: Flexibility, lower: Flexibilit
 
 
 def _ladder(
-    space: ContactSpace, C: NDArray[np.float64], energy: float, closing: float, force: float
+    space: ContactSpace,
+    C: NDArray[np.float64],
+    layer: AsperityLayer | None,
+    energy: float,
+    closing: float,
+    force: float,
 ) -> StaticContact:
     """Static contact up to a force above that of a quasi-static impact of this energy.
 
@@ -147,7 +154,7 @@ def _ladder(
     refused: ReachError | None = None
     while True:
         try:
-            static = static_contact(space, C, force)
+            static = static_contact(space, C, force, layer=layer)
         except ReachError as error:
             # elements as wide as the contact bound the force far too high: less may do
             if not error.held > 0 or refused is not None:
@@ -168,4 +175,4 @@ def _ladder(
     # falls up to the closing force, rises from there
     rising = load >= closing
     needed = _LOAD_MARGIN * float(np.interp(energy, surplus[rising], load[rising]))
-    return static_contact(space, C, needed)
+    return static_contact(space, C, needed, layer=layer)

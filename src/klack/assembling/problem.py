@@ -16,7 +16,7 @@ from klack.assembling.yielding import law_loops
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
-from klack.contact.mortar import ContactSpace
+from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
@@ -147,8 +147,11 @@ class ContactProblem(PlacedBodies):
             self.wider,
             energy=impact_energy(self.case, self.pair),
             closing=closing_force(self.case),
-            friction=self.case.contact.faces.static,
-            key="contact.friction",
+            beside="contact.friction"
+            if not self.case.contact.faces.is_none
+            else "contact.roughness"
+            if self.pair.layer is not None
+            else "",
             progress=progress,
         )
 
@@ -250,8 +253,8 @@ def _budget(case: Case, body: ElasticBody, progress: Progress) -> Budget:
 
 
 def _drawn_gap(pair: BodyPair) -> float:
-    upper, lower = pair.upper.mesh, pair.lower.mesh
-    return axial_distance(upper, pair.upper_surface, lower, pair.lower_surface)
+    sides = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    return axial_distance(*sides) if pair.form is None else -touching_shift(*sides, pair.form)
 
 
 def _with_gap(case: Case, gap: float | None) -> Case:

@@ -216,8 +216,7 @@ def _loops(
         wider,
         energy=0.5 * effective_mass(pair) * stop.speed**2,
         closing=stop.force,
-        friction=stop.friction,
-        key=_friction_key(name),
+        beside=_friction_key(name) if stop.friction > 0.0 else "",
         progress=progress,
     )
 

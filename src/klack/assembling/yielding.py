@@ -37,8 +37,7 @@ def law_loops(
     *,
     energy: float,
     closing: float,
-    friction: float,
-    key: str,
+    beside: str,
     progress: Progress,
 ) -> YieldingLoops | None:
     """Static loops for the law of a reduced model; None where it stays elastic.
@@ -56,10 +55,8 @@ def law_loops(
     energy : float [J]
     closing : float [N]
         Force that keeps working while the bodies approach.
-    friction : float [-]
-        Between the faces: a law has one of the two.
-    key : str
-        Of the friction in the case, for words.
+    beside : str
+        Key of what else the law has, and so has no yield; empty for nothing.
     progress : callable
 
     Warns
@@ -70,9 +67,9 @@ def law_loops(
     if not (upper.yields or lower.yields) or upper.body.dimension != 2:
         return None
     left = "the reduced level leaves out the yield of its faces"
-    if friction > 0.0:
+    if beside:
         warnings.warn(
-            f"{left}: its law has either friction or yield. Try: the case without {key} beside it.",
+            f"{left}: a law has either yield or {beside}. Try: the case without the latter.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -29,6 +29,7 @@ def check_consistency(case: ImpactSections) -> None:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     _check_local_law(case)
     _check_opposite(case)
+    _check_roughness(case)
     _check_solid_only(case)
     _check_guide(case)
     _check_shots(case)
@@ -196,6 +197,29 @@ def _check_opposite(case: ImpactSections) -> None:
         )
 
 
+def _check_roughness(case: ImpactSections) -> None:
+    """Refuse what a layer of asperities is not computed with."""
+    contact = case.contact
+    if contact.roughness is None:
+        return
+    others: list[tuple[Key, bool, str]] = [
+        (("contact", "friction"), not contact.faces.is_none, "friction between rough faces"),
+        (("contact", "local_law"), contact.local_law.kind != "consistent", "a given local law"),
+        (("guide",), case.guide is not None, "a guide"),
+        (("opposite",), case.opposite is not None, "an upper stop"),
+        (("shots",), case.shots is not None, "shots"),
+    ]
+    for key, is_there, what in others:
+        if is_there:
+            raise CaseProblem(
+                ("contact", "roughness"),
+                got=f"rough faces and {what} ({'.'.join(map(str, key))})",
+                expected="one of them: a layer of asperities has the levels reduced and full",
+                hint="remove one of them; contact.crown goes with all.",
+                on_key=True,
+            )
+
+
 def _check_solid_only(case: ImpactSections) -> None:
     """Refuse what breaks the symmetry of axisymmetric bodies."""
     if case.dimension == 3:
@@ -207,6 +231,11 @@ def _check_solid_only(case: ImpactSections) -> None:
         asked.append((("guide",), "a guide"))
     if case.shots is not None:
         asked.append((("shots",), "shots, which vary in their placement,"))
+    if case.contact.tilt:
+        asked.append((("contact", "tilt"), "a tilt between the faces"))
+    waves = case.contact.waviness
+    if waves is not None and waves.direction is not None:
+        asked.append((("contact", "waviness", "direction"), "straight waves on the faces"))
     for key, what in asked:
         raise CaseProblem(
             key,

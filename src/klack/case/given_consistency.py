@@ -85,6 +85,16 @@ def check_given(case: ImpactSections) -> None:
             expected="no friction: without a surface nothing is known of its slip",
             hint="leave it out, or give the body a mesh.",
         )
+    forms = ("crown", "waviness", "tilt", "roughness")
+    form = next((key for key in forms if getattr(case.contact, key)), None)
+    if form is not None:
+        raise CaseProblem(
+            ("contact", form),
+            got=f"the key '{form}' of faces with '{name}', {what}",
+            expected="bodies with surfaces",
+            hint=f"remove '{form}', or give '{name}' a mesh.",
+            on_key=True,
+        )
     for i, level in enumerate(case.run.levels):
         if level not in GIVEN_LEVELS:
             raise CaseProblem(

@@ -5,12 +5,14 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 """
 
 from collections.abc import Mapping
+from math import radians
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
+from klack.case.face_form import FaceRoughness, FaceWaviness
 from klack.case.guide import CaseGuide
 from klack.case.levels import Level
 from klack.case.measurement import CaseMeasurement
@@ -25,6 +27,7 @@ from klack.contact.worn_faces import WornFaces
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
+    Angle,
     Force,
     Frequency,
     Length,
@@ -56,6 +59,7 @@ _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_s
 _MOST_WORN = 0.05
 """Of the radius: set that is too large for small changes of the faces."""
 
+_LARGEST_TILT = radians(5.0)
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
 
 
@@ -176,6 +180,27 @@ class CaseContact(Section):
         description="Speed of slip over which the static coefficient fades to 'friction'; "
         "default at once.",
     )
+    crown: Length = Field(
+        default=0.0,
+        examples=["1 um"],
+        ge=0,
+        description="Height of the centre of the face above its edge, of both faces together.",
+    )
+    waviness: FaceWaviness | None = Field(
+        default=None, description="Waves on the faces; default none."
+    )
+    roughness: FaceRoughness | None = Field(
+        default=None, description="Asperities of the faces; default smooth."
+    )
+    tilt: Angle = Field(
+        default=0.0,
+        ge=0,
+        le=_LARGEST_TILT,
+        description="Angle between the faces when their bodies are upright.",
+    )
+    tilt_direction: Angle = Field(
+        default=0.0, description="Towards which a tilted face opens, from x towards y."
+    )
 
     @model_validator(mode="after")
     def _falling_friction(self) -> Self:
@@ -213,6 +238,11 @@ class CaseContact(Section):
         """Friction between the faces."""
         static = self.friction if self.static_friction is None else self.static_friction
         return Friction(kinetic=self.friction, static=static, speed=self.stribeck_speed)
+
+    @property
+    def has_form(self) -> bool:
+        """Whether the faces differ from the drawing by crown, waviness or tilt."""
+        return self.crown > 0.0 or self.waviness is not None or self.tilt > 0.0
 
     @property
     def moving(self) -> SurfaceName:

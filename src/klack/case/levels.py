@@ -2,7 +2,7 @@
 
 from typing import Literal, get_args
 
-__all__ = ["LEVELS", "Level"]
+__all__ = ["LEVELS", "ROUGH_LEVELS", "Level"]
 
 Level = Literal[
     "lumped",
@@ -14,3 +14,6 @@ Level = Literal[
     "full",
 ]
 LEVELS: tuple[Level, ...] = get_args(Level)
+
+ROUGH_LEVELS: tuple[Level, ...] = ("lumped", "reduced", "reduced-participation", "full")
+"""Levels that take faces with a layer of asperities."""

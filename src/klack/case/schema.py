@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from klack.case.consistency import check_consistency
 from klack.case.impact_sections import ImpactSections
-from klack.case.levels import LEVELS, Level
+from klack.case.levels import LEVELS, ROUGH_LEVELS, Level
 from klack.case.noise_consistency import check_noise
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
@@ -47,6 +47,14 @@ class Case(ImpactSections):
                     expected="its stiffness, required by the level 'lumped'",
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
+        left_out = [level for level in wanted if level not in ROUGH_LEVELS]
+        if self.contact.roughness is not None and left_out:
+            raise InputError(
+                f"{self._path or 'case'}: contact.roughness",
+                got=f"rough faces at the level '{left_out[0]}'",
+                expected=f"levels that have a layer of asperities: {one_of(ROUGH_LEVELS)}",
+                hint="leave the level out, or the roughness.",
+            )
         return tuple(level for level in LEVELS if level in wanted)
 
     def require_ends(self, what: str) -> None:

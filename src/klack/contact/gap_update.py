@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, hat_quadrature
 from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
 from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
@@ -52,6 +53,8 @@ class RigidGaps:
         Point that a rotation leaves in place.
     slave_moves : bool
         True if body a carries the hats.
+    form : array, shape (p,) [m]
+        Growth of the gaps by the form of the faces, which moves with the slave side.
     away : float [m]
         Gap of a hat that no longer faces the master: the extent of both surfaces.
     """
@@ -65,6 +68,7 @@ class RigidGaps:
     within: float
     centre: NDArray[np.float64]
     slave_moves: bool
+    form: NDArray[np.float64]
     away: float
 
     @classmethod
@@ -77,6 +81,7 @@ class RigidGaps:
         surface_b: Surface,
         *,
         centre: NDArray[np.float64],
+        form: FaceForm | None = None,
     ) -> Self:
         """Prepare the contact points of ``space``, built from these meshes and surfaces.
 
@@ -87,6 +92,8 @@ class RigidGaps:
         mesh_b, surface_b : the other one
         centre : array, shape (3,) [m]
             Point that a rotation leaves in place, usually the centre of mass of a.
+        form : FaceForm, optional
+            That ``space`` was built with.
 
         Raises
         ------
@@ -124,6 +131,7 @@ class RigidGaps:
             within=within,
             centre=np.array(centre, dtype=float),
             slave_moves=moves,
+            form=np.zeros(len(hats.position)) if form is None else form.gaps(*lines),
             away=float(sum(extents)),
         )
 
@@ -155,5 +163,5 @@ class RigidGaps:
         covered = self.weight @ met.astype(float)
         full = self.weight @ np.ones(len(gap))
         facing = covered > COVERED * full
-        mean = self.weight @ np.where(met, gap, 0.0) / np.where(facing, covered, 1.0)
+        mean = self.weight @ np.where(met, gap + self.form, 0.0) / np.where(facing, covered, 1.0)
         return np.where(facing, mean, self.away)

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
+from klack.contact.face_form import FaceForm
 from klack.contact.pairing import (
     FaceGeometry,
     Projection,
@@ -194,6 +195,7 @@ def contact_space(
     *,
     reach: float | None = None,
     slave: Literal["a", "b"] | None = None,
+    form: FaceForm | None = None,
 ) -> ContactSpace:
     """Contact points between two surfaces that face each other.
 
@@ -219,7 +221,7 @@ def contact_space(
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
     others = {"a": sides["b"], "b": sides["a"]}
     looked_at = ("a", "b") if slave is None else (slave,)
-    gaps = {side: face_gaps(*sides[side], *others[side]) for side in looked_at}
+    gaps = {side: face_gaps(*sides[side], *others[side], form) for side in looked_at}
     if not all(np.any(np.isfinite(gap)) for gap in gaps.values()):
         raise _not_facing(surface_a, surface_b)
     floor = min(float(np.nanmin(gap)) for gap in gaps.values())
@@ -232,7 +234,7 @@ def contact_space(
         slave = _finer(sides, gaps, limit)
     limit = max(limit, float(np.nanmin(gaps[slave])))  # a coarse side may be sampled farther away
     near = np.isfinite(gaps[slave]) & (gaps[slave] <= limit)
-    return _build(sides, slave, near, limit, limit - floor)
+    return _build(sides, slave, near, limit, limit - floor, form)
 
 
 def _check_pair(
@@ -355,6 +357,7 @@ def _build(
     near: NDArray[np.bool_],
     limit: float,
     reach: float,
+    form: FaceForm | None,
 ) -> ContactSpace:
     mesh, surface = sides[slave]
     other_mesh, other_surface = sides["b" if slave == "a" else "a"]
@@ -363,7 +366,7 @@ def _build(
     sums = _Sums(mesh.dimension, mesh.node_count)
     for block in _part(surface, ring).blocks:
         for piece in _pieces(block.family):
-            _integrate(sums, mesh, block, piece, other_mesh, other_surface)
+            _integrate(sums, mesh, block, piece, other_mesh, other_surface, form)
     return _assemble(sides, slave, sums, inner, ring, limit, reach)
 
 
@@ -389,17 +392,18 @@ def _integrate(
     piece: _Piece,
     other_mesh: Mesh,
     other_surface: Surface,
+    form: FaceForm | None,
 ) -> None:
     """Add the integrals of one piece of every face."""
     at, hats, share = _shares(mesh, faces, piece)
     f, q, d = at.position.shape
-    met = project_to_surface(
-        at.position.reshape(f * q, d), at.normal.reshape(f * q, d), other_mesh, other_surface
-    )
+    position, normal = at.position.reshape(f * q, d), at.normal.reshape(f * q, d)
+    met = project_to_surface(position, normal, other_mesh, other_surface)
     np.add.at(sums.full, hats, share.sum(axis=1))
     share = np.where(met.met.reshape(f, q, 1), share, 0.0)
     np.add.at(sums.covered, hats, share.sum(axis=1))
-    gap = np.nan_to_num(met.gap).reshape(f, q, 1)
+    gap = np.nan_to_num(met.gap) + (0.0 if form is None else form.gaps(position, normal))
+    gap = gap.reshape(f, q, 1)
     np.add.at(sums.gap, hats, (share * gap).sum(axis=1))
     narrow = share * piece.hats
     square = np.sum((at.position[:, :, None] - mesh.points[hats][:, None]) ** 2, axis=3)
@@ -410,7 +414,6 @@ def _integrate(
     N, _ = shape_functions(faces.family, piece.xi)
     value = -np.einsum("fqk,qn,fqd->fknd", share, N, at.normal)
     _store(sums.slave, sums.dimension, hats[:, :, None], faces.connectivity[:, None, :], value)
-    normal = at.normal.reshape(f * q, d)
     rows = np.repeat(hats, q, axis=0)
     flat = share.reshape(f * q, -1)
     _integrate_master(sums, rows, flat, normal, met, other_surface)
@@ -721,7 +724,13 @@ def _node_size(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
     return total / np.maximum(count, 1.0)
 
 
-def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface) -> float:
+def touching_shift(
+    mesh_a: Mesh,
+    surface_a: Surface,
+    mesh_b: Mesh,
+    surface_b: Surface,
+    form: FaceForm | None = None,
+) -> float:
     """Find the translation of a along z [m] after which the smallest weighted gap is zero.
 
     Lines along z give the first place from any distance or overlap; then the weighted gaps are
@@ -740,7 +749,9 @@ def touching_shift(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
     slope, before, moved = 1.0, 0.0, 0.0
     for _ in range(30):
         along[-1] = shift
-        space = contact_space(mesh_a.moved(along), surface_a, mesh_b, surface_b, slave=slave)
+        space = contact_space(
+            mesh_a.moved(along), surface_a, mesh_b, surface_b, slave=slave, form=form
+        )
         if slave is None:  # only the faces at the touching place matter from now on
             slave = space.slave
             if slave == "a":

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.face_form import FaceForm
 from klack.contact.ray_cutting import cut_nearest, face_boxes, face_polynomials
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
@@ -248,17 +249,22 @@ def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def face_gaps(
-    mesh: Mesh, surface: Surface, other_mesh: Mesh, other_surface: Surface
+    mesh: Mesh,
+    surface: Surface,
+    other_mesh: Mesh,
+    other_surface: Surface,
+    form: FaceForm | None = None,
 ) -> NDArray[np.float64]:
     """Smallest gap [m] sampled on every face (corners and centre); nan where nothing is met.
 
-    The order is that of the blocks of ``surface``.
+    The order is that of the blocks of ``surface``; a form of the faces opens their gaps.
     """
     gaps = []
     for block in surface.blocks:
         position, normal = _samples(mesh, block)
         met = project_to_surface(position, normal, other_mesh, other_surface)
-        gap = np.where(met.met, met.gap, np.inf).reshape(len(block.connectivity), -1).min(axis=1)
+        gap = met.gap if form is None else met.gap + form.gaps(position, normal)
+        gap = np.where(met.met, gap, np.inf).reshape(len(block.connectivity), -1).min(axis=1)
         gaps.append(np.where(np.isfinite(gap), gap, np.nan))
     return np.concatenate(gaps)
 

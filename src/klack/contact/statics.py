@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from klack.cache.entry import Entry
+from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, with_still_directions
 from klack.contact.mortar import ContactSpace
@@ -277,7 +278,12 @@ def _extended(
 
 
 def static_contact(
-    space: ContactSpace, C: NDArray[np.float64], max_force: float, count: int = 24
+    space: ContactSpace,
+    C: NDArray[np.float64],
+    max_force: float,
+    count: int = 24,
+    *,
+    layer: AsperityLayer | None = None,
 ) -> StaticContact:
     """Contact states from first touch to an axial force.
 
@@ -294,6 +300,8 @@ def static_contact(
         more).  Take it above the highest force of the impact.
     count : int
         Number of states.
+    layer : AsperityLayer, optional
+        Of the faces, in series with the bodies.
 
     Raises
     ------
@@ -302,7 +310,7 @@ def static_contact(
     """
     require_positive("static contact: max_force", max_force, "N")
     require_positive("static contact: count", count, "states")
-    ladder = _Ladder(space, C)
+    ladder = _Ladder(space, C, layer)
     highest = _approach_for(ladder, max_force)
     lowest = ladder.first_touch
     approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
@@ -325,8 +333,10 @@ def static_contact(
 class _Ladder:
     """Pressures at one approach after the other."""
 
-    def __init__(self, space: ContactSpace, C: NDArray[np.float64]) -> None:
-        self.space = space
+    def __init__(
+        self, space: ContactSpace, C: NDArray[np.float64], layer: AsperityLayer | None
+    ) -> None:
+        self.space, self.layer = space, layer
         # the surfaces touch a little before the first weighted gap closes
         self.start = min(space.clearance, space.touch)
         self.first_touch = space.touch - self.start
@@ -335,6 +345,8 @@ class _Ladder:
 
     def pressures(self, approach: float) -> NDArray[np.float64]:
         q = self.space.gap - (self.start + approach) * self.space.axial
+        if self.layer is not None:
+            return press(self.layer, self.space.area, self.solver.A, q)[0]
         lam, self.active, _ = self.solver.solve(q, self.active)
         return lam
 

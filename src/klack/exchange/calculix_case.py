@@ -38,6 +38,15 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
     case.require_ends("a deck")
+    forms = ("crown", "waviness", "tilt", "roughness")
+    form = next((key for key in forms if getattr(case.contact, key)), None)
+    if form is not None:
+        raise InputError(
+            f"{case.path or 'case'}: contact.{form}",
+            got="a form or roughness of the faces, which the meshes do not have",
+            expected="faces as drawn: a deck holds the meshes alone",
+            hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
+        )
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
     if left_out:
         warnings.warn(

@@ -11,7 +11,7 @@ from klack.errors import InputError
 from klack.mesh.families import FAMILIES, ElementFamily
 from klack.mesh.rigid import Pose
 
-__all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface"]
+__all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface", "solid_at"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,3 +156,10 @@ class Mesh:
                 hint="take 'model: swept' with 'layers: 18'; a shift along z is 'moved'.",
             )
         return replace(self, points=pose.of(self.points))
+
+
+def solid_at(mesh: Mesh, surface: Surface) -> str:
+    """Solid that most nodes of a surface belong to."""
+    nodes = surface.nodes
+    counts = [np.isin(nodes, block.connectivity).sum() for block in mesh.blocks]
+    return mesh.blocks[int(np.argmax(counts))].solid

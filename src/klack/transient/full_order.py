@@ -53,6 +53,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from klack import energy_balance
+from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
@@ -121,6 +122,7 @@ def simulate_full_order(
     spring_stiffness: float = 0.0,
     damping: tuple[BodyDamping | None, BodyDamping | None] = (None, None),
     friction: FaceFriction | None = None,
+    layer: AsperityLayer | None = None,
     sideways: tuple[float, float] = (0.0, 0.0),
     stop_after_separation: float | None = None,
     energy_interval: int = 10,
@@ -160,6 +162,8 @@ def simulate_full_order(
         Of body a and of body b; without any by default.  Non-reflecting ends are for body b.
     friction : FaceFriction, optional
         Between the faces, of these contact points.
+    layer : AsperityLayer, optional
+        Of the faces, elastic; not with friction nor the massless scheme.
     sideways : tuple of float [m/s]
         Velocity of a along x and y at the start, in addition to ``speed``; of solids only.
     stop_after_separation : float, optional [s]
@@ -208,6 +212,13 @@ def simulate_full_order(
             expected="'contact-stabilised-newmark' or 'massless'",
             hint="use the first one; the second is for comparison.",
         )
+    if layer is not None and (friction is not None or scheme == "massless"):
+        raise InputError(
+            "simulate_full_order: layer",
+            got="a layer of asperities with friction, or with the massless scheme",
+            expected="smooth faces, or no friction and the contact-stabilised scheme",
+            hint="leave one of them out.",
+        )
     begin = perf_counter()
     with ExitStack() as stack:
         if friction is not None and friction.law.is_none:
@@ -228,7 +239,7 @@ def simulate_full_order(
         pool = None
         if threads > 1 and len(bodies) > 1:
             pool = stack.enter_context(ThreadPoolExecutor(max_workers=len(bodies)))
-        run = _Run(bodies, space, speed, step, scheme, pool, axial_force, friction)
+        run = _Run(bodies, space, speed, step, scheme, pool, axial_force, friction, layer)
         run.together(
             [
                 partial(b.set_up, step, scheme, backend, precision, _share(threads, bodies))
@@ -297,11 +308,13 @@ class _Run:
         pool: ThreadPoolExecutor | None,
         axial_force: float,
         friction: FaceFriction | None,
+        layer: AsperityLayer | None,
     ) -> None:
         self.bodies, self.space, self.speed, self.step = bodies, space, speed, step
         self.scheme, self.pool, self.axial_force = scheme, pool, axial_force
         count = self.count = len(space.gap)
         ways = 0 if friction is None else friction.T_a.shape[0] // count
+        self.layer = layer
         self.rubbing = None
         if friction is not None:
             still = np.diff(friction.T_a.indptr)[:count] == 0
@@ -420,6 +433,8 @@ class _Run:
         self.mu = np.zeros(len(flight))
         if self.scheme == "massless":
             return self.lam
+        if self.layer is not None:  # it takes an overshoot up
+            return np.zeros(len(self.lam))
         flight = (
             flight - self.step * sum(b.mobility @ self.y for b in self.bodies)
             if np.any(self.y)
@@ -446,6 +461,12 @@ class _Run:
         gap = free[: len(self.points)]
         if not np.any(active) and np.all(gap >= 0.0):
             return np.zeros(len(free)), active, 0
+        if self.layer is not None:
+            area, before = self.space.area[self.points], self.gap[self.points]
+            force, ends = press(
+                self.layer, area, self.force_problem.A, gap, before=before, start=before
+            )
+            return force, ends < 0.0, 1
         if self.rubbing is None:
             return self.force_problem.solve(gap, active)
         slip = free[len(gap) :] - self.ends[self.rows[len(gap) :]]
@@ -487,6 +508,13 @@ class _Run:
             if np.any(near != self.watched):
                 self.watch(near)
         return float(self.axial @ mean), float(np.min(0.5 * (before + gap)))
+
+    @property
+    def held(self) -> float:
+        """Energy of the layer of asperities [J], part of what the contact has taken."""
+        if self.layer is None:
+            return 0.0
+        return float(self.space.area @ self.layer.state(-self.gap)[2])
 
     @property
     def travel(self) -> float:
@@ -673,7 +701,7 @@ def _result(
         speed=run.speed,
         mass_a=bodies[0].mass,
         mass_b=inf if count == 1 or bodies[1].supported or bodies[1].endless else bodies[1].mass,
-        ledger=_ledger(bodies, book, velocity[-1]),
+        ledger=_ledger(bodies, book, velocity[-1], run.held),
         external_force=np.array(record.outside),
         longest_period=longest_period,
         solver=f"full order, {sum(len(body.free) for body in bodies)} degrees of freedom, "
@@ -704,7 +732,7 @@ def _result(
 
 
 def _ledger(
-    bodies: Sequence[FullBody], book: EnergyRecord, velocity: NDArray[np.float64]
+    bodies: Sequence[FullBody], book: EnergyRecord, velocity: NDArray[np.float64], held: float
 ) -> EnergyLedger:
     entries = []
     for i, body in enumerate(bodies):
@@ -721,7 +749,8 @@ def _ledger(
     return EnergyLedger(
         initial=float(book.total[0]),
         bodies=tuple(entries),
-        contact_dissipation=float(book.contact[-1] + book.overshoot[-1]),
+        contact=held,
+        contact_dissipation=float(book.contact[-1] + book.overshoot[-1]) - held,
         damping=float(book.damping[-1]),
         work=float(book.work[-1]),
         spring=float(book.spring[-1]),

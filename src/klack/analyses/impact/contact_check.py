@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from klack.analyses.impact.record import LevelResult
-from klack.analyses.impact.yield_check import check_yield, solid_at
+from klack.analyses.impact.yield_check import check_yield
 from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
 from klack.contact.hertz import line_half_width, point_radius
@@ -34,7 +34,7 @@ from klack.contact.surface_edges import SurfaceEdges, surface_edges
 from klack.contact.touch_shape import relative_curvatures
 from klack.elasticity.body import ElasticBody
 from klack.errors import AccuracyWarning
-from klack.mesh.mesh import FaceBlock, Mesh, Surface
+from klack.mesh.mesh import FaceBlock, Mesh, Surface, solid_at
 from klack.stages import warnings_of
 from klack.units import format_si
 

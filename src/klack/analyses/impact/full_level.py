@@ -85,6 +85,7 @@ def simulate_in_full(
             pair.lower.mesh,
             pair.lower_surface,
         ),
+        layer=pair.layer,
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,

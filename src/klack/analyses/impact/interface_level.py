@@ -104,7 +104,19 @@ def build_interface(
         Other contact points of the same surfaces than those of the static contact.
     compliance : array, shape (nc, nc), optional [m/N]
         Static compliance of both bodies at these.
+
+    Raises
+    ------
+    InputError
+        For rough faces, whose layer this level does not have.
     """
+    if problem.pair.layer is not None:
+        raise InputError(
+            f"{problem.case.path or 'case'}: contact.roughness",
+            got="rough faces at the interface level",
+            expected="smooth faces there",
+            hint="leave contact.roughness out; contact.crown goes with every level.",
+        )
     bodies = [
         InterfaceBody(
             body=body,
@@ -218,7 +230,8 @@ def exact_gaps(problem: ContactProblem) -> "ExactGaps":
     pair, above = problem.pair, problem.opposite
     centre = pair.upper.centre_of_mass
     here = (pair.upper.mesh, pair.upper_surface)
-    seat = RigidGaps.of(problem.space, *here, pair.lower.mesh, pair.lower_surface, centre=centre)
+    below = (pair.lower.mesh, pair.lower_surface)
+    seat = RigidGaps.of(problem.space, *here, *below, centre=centre, form=pair.form)
     if above is None:
         return ExactGaps(seat=seat)
     there = (above.body.mesh, above.surface)

@@ -9,6 +9,11 @@ import numpy as np
 
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.contact_check import ContactCheck, check_contact, ends_reached
+from klack.analyses.impact.flat_faces import (
+    doubt_modal_levels,
+    flat_for_modes,
+    flat_for_reduced,
+)
 from klack.analyses.impact.full_level import run_full
 from klack.analyses.impact.gauges import with_reduced_gauges
 from klack.analyses.impact.given_models import run_given_impact
@@ -276,6 +281,11 @@ def _study(
             with warnings_of("modes of the case"):
                 own = own_pair(problem, pools, stiffness=first_stiffness(problem), loops=loops)
         clock("radiating surfaces", 0.0)
+        kept = kept_modes(problem, pools, own.ports)
+        at_once = {
+            "reduced": flat_for_reduced(problem, own),
+            "interface": flat_for_modes(problem, kept.values()),
+        }
         structures = impact_structures(problem, pools, own)
         clock("radiating surfaces", 1.0)
         clock("reduced", 0.5)
@@ -339,13 +349,14 @@ def _study(
                 results["full"], run = run_full(
                     problem,
                     pools,
-                    kept=kept_modes(problem, pools, own.ports),
+                    kept=kept,
                     progress=clock,
                     threads=threads,
                 )
                 sections = _sections(problem, run)
         attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
+    results = doubt_modal_levels(results, **at_once)
     if twins:
         results = doubt_elastic_levels(results, twins)
     else:
@@ -443,6 +454,8 @@ def _certificate(
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
+    if problem.pair.layer is not None:
+        return _Certificate(doubt="the interface level, which estimates errors, has no roughness")
     count = certificate_modes(problem.case)
 
     def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
@@ -458,6 +471,8 @@ def _certificate(
     clock("error estimate", 0.5)
     with warnings_of(f"error estimate, {count // 2} modes"):
         fewer = within_reach(problem, pools, run_again, count=count // 2)
+    names = (problem.pair.upper.name, problem.pair.lower.name)
+    richer = (Modes(pools[n].omega[:count], pools[n].shapes[:, :count]) for n in names)
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("error estimate", 1.0)
@@ -469,7 +484,7 @@ def _certificate(
         estimates={name: compare_histories(history, one) for name, one in histories.items()},
         basis=basis,
         spread=compare_histories(history, fewer).history_l2,
-        doubt=next(iter(level.doubts), ""),
+        doubt=next(iter(level.doubts), flat_for_modes(problem, richer)),
         level=level,
     )
 
@@ -477,7 +492,7 @@ def _certificate(
 def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> None:
     """Take the run behind the estimates among the levels, where it puts the best of them right."""
     level, best = certificate.level, best_level(results)
-    if level is None or level.doubts or certificate.spread > SETTLED:
+    if level is None or certificate.doubt or certificate.spread > SETTLED:
         return
     if best not in certificate.estimates:
         return

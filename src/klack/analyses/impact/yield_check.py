@@ -16,10 +16,10 @@ from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
 from klack.contact.statics import StaticContact, highest_load, ring_radius
 from klack.errors import AccuracyWarning
-from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh import solid_at
 from klack.units import format_si
 
-__all__ = ["YieldCheck", "check_yield", "solid_at"]
+__all__ = ["YieldCheck", "check_yield"]
 
 _LINE = 1.79
 """Highest pressure over the yield stress at first yield, of a line contact (nu = 0.3)."""
@@ -126,10 +126,3 @@ def _first_yield(static: StaticContact, force: float, limit: float) -> float:
     if pressures[-1] < limit:
         return inf
     return float(np.interp(limit, np.append(0.0, pressures), np.append(0.0, loads)))
-
-
-def solid_at(mesh: Mesh, surface: Surface) -> str:
-    """Solid that most nodes of a surface belong to."""
-    nodes = surface.nodes
-    counts = [np.isin(nodes, block.connectivity).sum() for block in mesh.blocks]
-    return mesh.blocks[int(np.argmax(counts))].solid

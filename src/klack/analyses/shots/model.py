@@ -170,7 +170,9 @@ def _touch_height(space: ContactSpace) -> float:
 
 def _gaps(problem: ContactProblem, space: ContactSpace) -> RigidGaps:
     pair = problem.pair
-    return RigidGaps.of(space, *_surfaces(problem), centre=pair.upper.centre_of_mass)
+    return RigidGaps.of(
+        space, *_surfaces(problem), centre=pair.upper.centre_of_mass, form=pair.form
+    )
 
 
 def _surfaces(problem: ContactProblem) -> tuple[Mesh, Surface, Mesh, Surface]:
@@ -186,7 +188,10 @@ def _candidates(
     farthest = extreme_placements(case, drawn_height)
     off_axis = max(float(np.linalg.norm(aside)) for aside, _ in farthest)
     wide = contact_space(
-        *_surfaces(problem), reach=_WIDER * reach + off_axis, slave=problem.space.slave
+        *_surfaces(problem),
+        reach=_WIDER * reach + off_axis,
+        slave=problem.space.slave,
+        form=problem.pair.form,
     )
     gaps = _gaps(problem, wide)
     about, centre = np.array([0.0, 0.0, height]), problem.pair.upper.centre_of_mass
