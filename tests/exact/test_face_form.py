@@ -16,6 +16,7 @@ from klack.case import load_case
 from klack.contact.face_form import FaceForm, Waves
 from klack.contact.hertz import point_radius
 from klack.errors import InputError
+from klack.exchange.calculix_case import calculix_impact
 from klack.progress import silent
 
 CASE = """
@@ -194,3 +195,10 @@ def test_a_form_that_does_not_fit_is_one_clear_error(tmp_path, contact, solid, w
         place_bodies(case(tmp_path, contact, solid=solid), silent)
     assert where in str(caught.value)
     assert hint in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["crown: 1 um", "roughness: {curve: [[1 um, 1 MPa]]}"])
+def test_a_deck_of_calculix_has_no_form(tmp_path, key):
+    """It holds the meshes alone, which stay plane."""
+    with pytest.raises(InputError, match="which the meshes do not have"):
+        calculix_impact(case(tmp_path, key, solid=True), silent)

@@ -241,6 +241,7 @@ def test_matrices_with_nodes_alone(tmp_path):
         ("  local_law: {kind: linear, stiffness: 1e9 N/m}\n", "", "linear or hertz"),
         ("{kind: linear, stiffness: 1e9 N/m}", "{kind: hertz, radius: 1 mm}", "modulus"),
         ("  local_law:", "  friction: 0.1\n  local_law:", "friction with"),
+        ("  local_law:", "  crown: 1 um\n  local_law:", "bodies with surfaces"),
         (
             "motion: {speed: 0.4 m/s}",
             "motion: {speed: 0.4 m/s, placement: {tilt: 1 mrad}}",
