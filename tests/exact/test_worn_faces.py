@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.analyses.impact.command import run_case
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.worn_case import worn_text
 from klack.assembling.problem import build_problem
-from klack.case.reader import read_case
+from klack.case.reader import load_case, read_case
 from klack.contact.worn_faces import WornFaces, opened_by
 from klack.errors import InputError
+from klack.terminal.wanted import WantedResult
 
 CASES = Path(__file__).parents[2] / "cases" / "demo-valve-axisymmetric"
 STEEL = "density: 7850 kg/m^3}"
@@ -108,6 +110,26 @@ def test_a_profile_that_is_none_is_refused(worn, message):
     text = _changed(text, ("  gap: 0 um", f"  gap: 0 um\n  worn: {worn}"))
     with pytest.raises(InputError, match=message):
         read_case(text, CASES / "case.yaml")
+
+
+def test_the_command_writes_a_case_that_it_reads_again(tmp_path):
+    """Exact: the file of one command is that of the next; nothing is written without running-in."""
+    spheres = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
+    text = spheres.read_text("utf-8")
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "case.yaml").write_text(
+        _changed(text, ("run: {", "run: {impacts: 2, "), ("size: 0.004 mm", "size: 0.01 mm")),
+        "utf-8",
+    )
+    wanted = WantedResult(out=tmp_path / "b", report=False, quiet=True)
+    run_case(tmp_path / "a" / "case.yaml", [], wanted, certify=False)
+    worn = load_case(tmp_path / "b" / "worn.yaml")
+    wanted = WantedResult(out=tmp_path / "c", report=False, quiet=True)
+    run_case(tmp_path / "b" / "worn.yaml", [], wanted, certify=False)
+
+    assert worn.contact.worn is not None
+    assert worn.run.impacts == 1
+    assert not (tmp_path / "c" / "worn.yaml").exists()
 
 
 def test_the_written_case_says_where_it_comes_from():

@@ -3,6 +3,7 @@
 import warnings
 
 from klack.assembling.bodies import build_bodies
+from klack.assembling.elastic_only import tell_elastic
 from klack.case.schema import Case
 from klack.contact.friction import Friction
 from klack.errors import AccuracyWarning, InputError
@@ -27,7 +28,8 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     -----
     AccuracyWarning
         If the case has a guide or an upper stop, which only the interface level supports, or
-        friction between the faces, whose law in CalculiX is another.
+        friction between the faces, whose law in CalculiX is another, materials that yield or worn
+        faces.
     """
     if case.dimension != 3:
         raise InputError(
@@ -57,6 +59,14 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
         )
     if said := _other_friction(case.contact.faces):
         warnings.warn(said, AccuracyWarning, stacklevel=2)
+    tell_elastic(case, "the deck is one of")
+    if case.contact.worn is not None:
+        warnings.warn(
+            "left out of the deck: contact.worn, its faces are as made. Try: compare with the case "
+            "without 'worn'.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
     pair = build_bodies(case, progress)
     return CalculixImpact(
         title=case.title,

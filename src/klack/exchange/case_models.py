@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from klack import __version__
+from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
@@ -69,8 +70,9 @@ def case_models(
     Warns
     -----
     AccuracyWarning
-        For friction of the faces, which exported models leave out.
+        For friction of the faces and for materials that yield, which exported models leave out.
     """
+    tell_elastic(case, "exported models are those of")
     if isinstance(case, ValveCase):
         return _of_valve(_smooth_valve(case), progress, threads)
     if not case.has_surfaces:

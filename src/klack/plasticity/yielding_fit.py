@@ -60,9 +60,11 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
         PchipInterpolator(largest, force)(fine),
         PchipInterpolator(largest, shapes)(fine),
     )
+    # the elastic way and not the set: both rise, but their difference need not between states
+    way = PchipInterpolator(largest, largest - parted)(fine)
     return YieldingLaw(
         largest=fine,
-        set=_rising_loss(fine, PchipInterpolator(largest, parted)(fine), closing, shape, places),
+        set=_rising_loss(fine, fine - way, closing, shape, places),
         closing=closing,
         shape=shape,
     )

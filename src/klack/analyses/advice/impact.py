@@ -39,6 +39,7 @@ from klack.analyses.advice.target import (
 )
 from klack.analyses.impact.interface_level import build_interface, simulate_case
 from klack.assembling.bodies import BodyPair, build_bodies
+from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
@@ -162,6 +163,7 @@ def advise_impact(
     case.require_ends("advice")
     log = _Log()
     with collected_warnings() as warned:
+        tell_elastic(case, "advice is measured on")
         base = _base(case, chosen, progress, threads)
     log.notes += warned
     log.runs += 1

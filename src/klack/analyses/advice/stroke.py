@@ -19,6 +19,7 @@ from klack.analyses.advice.modes import explicit_modes, mode_setting
 from klack.analyses.advice.regions import mesh_settings, unmeshed, unmeshed_notes
 from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
+from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
 from klack.case.valve import ValveCase
 from klack.case.variants import Variant
@@ -124,6 +125,7 @@ def advise_stroke(
     measures = stroke_measures(error)
     case = explicit_modes(case).model_copy(update={"noise": None})
     with collected_warnings() as notes:
+        tell_elastic(case, "advice is measured on")
         valve = build_valve(case, progress, threads=threads)
         spent = perf_counter() - begin
         progress("first impacts", 0.0)

@@ -40,7 +40,6 @@ def worn_text(text: str, source: Path, found: RunningIn, folder: Path, version: 
     radius = ", ".join(f"{1e6 * r:.4f} um" for r in found.radius)
     opening = ", ".join(f"{1e9 * w:.4f} nm" for w in found.opening)
     values: dict[Key, str] = {
-        **moved_files(tree, folder),
         ("contact", "worn"): f"{{force: {found.worn_by:.5g} N, "
         f"radius: [{radius}], opening: [{opening}]}}",
     }
@@ -53,6 +52,5 @@ def worn_text(text: str, source: Path, found: RunningIn, folder: Path, version: 
         f"impacts, {state}.\nTheir set at the {len(found.radius)} contact points of that mesh "
         f"is in contact.worn; they are elastic up to {found.worn_by:.4g} N."
     )
-    new = with_values(tree, values, header)
-    read_case(new, folder / WORN)
-    return new
+    read_case(with_values(tree, values, header), source)
+    return with_values(tree, {**moved_files(tree, folder), **values}, header)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
+from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
@@ -63,6 +64,7 @@ def run_reduce(
     a body has no surfaces, both are reduced at their ports, without transfer functions: the full
     order of a reduced model is not known.
     """
+    tell_elastic(case, "reduced bodies are those of")
     if not case.has_surfaces:
         given = build_given_pair(case, progress, threads=threads)
         return ReductionStudy(

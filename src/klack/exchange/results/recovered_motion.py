@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.damping_choice import damping_of
+from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import mode_pools, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
@@ -105,6 +106,7 @@ def recovered_motion(
         The upper body first.
     """
     case, both = problem.case, problem.pair
+    tell_elastic(case, "the recovered motion is that of")
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)
     pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
