@@ -11,9 +11,10 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json, yield_told
+from klack.assembling import yielding
 from klack.case.reader import read_case
 from klack.case.valve_reader import read_valve_case
-from klack.errors import AccuracyWarning
+from klack.errors import AccuracyWarning, InputError
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 VALVE = """
@@ -153,3 +154,17 @@ def test_a_high_yield_stress_changes_no_bit():
         hard.channels["seat gap"].values, soft.channels["seat gap"].values
     )
     assert not hard.faces
+
+
+def test_a_law_that_cannot_be_leaves_the_stop_elastic(monkeypatch):
+    """Bad input: modes that carry more than the loops; a warning, and the yield check says more."""
+
+    def refused(loops, modal):
+        raise InputError("law of faces that yield", got="this", expected="that", hint="a try.")
+
+    monkeypatch.setattr(yielding, "yielding_law", refused)
+    study = run_stroke(_valve())
+
+    assert any("leaves out the yield of its faces" in text for text in study.warnings)
+    assert any("yields before" in text for text in study.warnings)
+    assert not study.variants["dry"].result.faces

@@ -11,6 +11,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.rubbing import fitted_loops
+from klack.assembling.yielding import law_with_yield
 from klack.case.impact_sections import (
     ConsistentLocalLaw,
     HertzLocalLaw,
@@ -33,7 +34,6 @@ from klack.contact.yielding_law import YieldingLaw
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
-from klack.plasticity.yielding_fit import yielding_law
 from klack.reduction.ports import Observer, Port
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -260,7 +260,7 @@ def _reduce_at(
         fit = fitted_loops(static, local, key="contact.friction")
     elif loops is not None and local is not None:
         modal = float(upper.modal_compliance[0, 0] + lower.modal_compliance[0, 0])
-        law = yielding_law(loops, modal)
+        law = law_with_yield(loops, modal) or law
     return ReducedPair(
         upper=upper,
         lower=lower,

@@ -16,7 +16,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
-from klack.assembling.yielding import law_loops
+from klack.assembling.yielding import law_loops, law_with_yield
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_sections import CaseStop
@@ -33,7 +33,6 @@ from klack.errors import InputError
 from klack.mesh.rigid import Pose
 from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
-from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 from klack.reduction.ports import Port
 from klack.reduction.reduce import reduce_body
@@ -227,18 +226,19 @@ def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> St
     Warns
     -----
     AccuracyWarning
-        Where a law has not all of the friction.
+        Where a law has not all of the friction, or not the yield.
     """
     modal = 0.0
     for body, port in zip((upper, lower), contact.ports, strict=True):
         i = body.port_index(port.name)
         modal += float(body.modal_compliance[i, i])
     local, rubbing, key = consistent_law(contact.closing, modal), contact.rubbing, contact.key
-    if contact.loops is not None:
-        yielding = yielding_law(contact.loops, modal)
-        D = bulk_compliance(local, yielding)
-        faces = yielding_law(contact.loops, modal + D)
-        return StopFaces(local=local, law=yielding, faces=faces, bulk=D)
+    whole = None if contact.loops is None else law_with_yield(contact.loops, modal)
+    if contact.loops is not None and whole is not None:
+        D = bulk_compliance(local, whole)
+        alone = law_with_yield(contact.loops, modal + D)
+        if alone is not None:
+            return StopFaces(local=local, law=whole, faces=alone, bulk=D)
     fit = None if rubbing is None else fitted_loops(rubbing, local, key=key)
     law = local.law if fit is None else fit.law
     D = bulk_compliance(local, law)

@@ -13,17 +13,21 @@ from scipy.sparse import csr_array
 
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops, yielding_loops
 from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 from klack.plasticity.yielding_body import YieldingBody
+from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 
-__all__ = ["law_loops", "loops_with_yield"]
+__all__ = ["law_loops", "law_with_yield", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
+
+_LEFT_OUT = "the reduced level leaves out the yield of its faces"
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""
@@ -66,10 +70,9 @@ def law_loops(
     """
     if not (upper.yields or lower.yields) or upper.body.dimension != 2:
         return None
-    left = "the reduced level leaves out the yield of its faces"
     if beside:
         warnings.warn(
-            f"{left}: a law has either yield or {beside}. Try: the case without the latter.",
+            f"{_LEFT_OUT}: a law has either yield or {beside}. Try: the case without the latter.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -105,10 +108,25 @@ def law_loops(
             loops_of_entry,
         )
     except (ConvergenceError, InputError) as error:
-        warnings.warn(f"{left}: {error}", AccuracyWarning, stacklevel=2)
+        warnings.warn(f"{_LEFT_OUT}: {error}", AccuracyWarning, stacklevel=2)
         return None
     progress("faces that yield", 1.0)
     return loops if loops.states else None
+
+
+def law_with_yield(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw | None:
+    """Law of these loops, see :func:`klack.plasticity.yielding_fit.yielding_law`; None for none.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where there is none.
+    """
+    try:
+        return yielding_law(loops, modal_compliance)
+    except InputError as error:
+        warnings.warn(f"{_LEFT_OUT}: {error}", AccuracyWarning, stacklevel=2)
+        return None
 
 
 def loops_with_yield(

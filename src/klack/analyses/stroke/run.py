@@ -28,6 +28,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
 from klack.contact.rubbing_law import RubbingLaw
+from klack.contact.yielding_law import YieldingLaw
 from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import TimedDriver
 from klack.mechanics.end_stop import EndStop
@@ -428,7 +429,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
             contact.closing,
             force,
             surfaces,
-            has_yield=contact.loops is not None,
+            has_yield=law is not None and isinstance(law.law, YieldingLaw),
         )
     return StopSummary(
         name=name,
