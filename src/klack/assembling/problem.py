@@ -12,7 +12,7 @@ from klack.assembling.ladder import (
 )
 from klack.assembling.opposite import OppositeStop, build_opposite
 from klack.assembling.rubbing import static_loops
-from klack.assembling.yielding import law_loops
+from klack.assembling.yielding import law_loops, loaded_body
 from klack.cache.setting import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
@@ -116,18 +116,10 @@ class ContactProblem(PlacedBodies):
     @property
     def loaded(self) -> tuple[LoadedBody, LoadedBody]:
         """Upper and lower body with their materials."""
-        upper, lower = (
-            LoadedBody(
-                body=body,
-                flexibility=flexibility,
-                materials=self.case.materials_of(body.name, body.mesh.solids),
-            )
-            for body, flexibility in (
-                (self.pair.upper, self.flexibility_upper),
-                (self.pair.lower, self.flexibility_lower),
-            )
+        return (
+            loaded_body(self.case, self.pair.upper, self.flexibility_upper),
+            loaded_body(self.case, self.pair.lower, self.flexibility_lower),
         )
-        return upper, lower
 
     def yielding(self, progress: Progress) -> YieldingLoops | None:
         """Static loops of faces that yield, for a law; None where it stays elastic.

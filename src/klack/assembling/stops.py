@@ -16,7 +16,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
-from klack.assembling.yielding import law_loops, law_with_yield
+from klack.assembling.yielding import law_loops, law_with_yield, loaded_body
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_sections import CaseStop
@@ -31,7 +31,6 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.rigid import Pose
-from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress
 from klack.reduction.ports import Port
@@ -194,15 +193,6 @@ def _loops(
     progress: Progress,
     name: str,
 ) -> YieldingLoops | None:
-    upper, lower = (
-        LoadedBody(
-            body=body,
-            flexibility=flexibility,
-            materials=case.materials_of(body.name, body.mesh.solids),
-        )
-        for body, flexibility in zip((pair.upper, pair.lower), flexibilities, strict=True)
-    )
-
     def wider(space: ContactSpace, error: ReachError) -> ContactSpace:
         if stop.reach is not None:
             raise error
@@ -210,8 +200,8 @@ def _loops(
 
     return law_loops(
         static,
-        upper,
-        lower,
+        loaded_body(case, pair.upper, flexibilities[0]),
+        loaded_body(case, pair.lower, flexibilities[1]),
         wider,
         energy=0.5 * effective_mass(pair) * stop.speed**2,
         closing=stop.force,

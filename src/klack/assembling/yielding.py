@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.case.bodies import CaseFile
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
 from klack.contact.yielding_law import YieldingLaw
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.loaded_body import LoadedBody
@@ -23,7 +26,7 @@ from klack.plasticity.yielding_body import YieldingBody
 from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 
-__all__ = ["law_loops", "law_with_yield", "loops_with_yield"]
+__all__ = ["law_loops", "law_with_yield", "loaded_body", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +34,13 @@ _LEFT_OUT = "the reduced level leaves out the yield of its faces"
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""
+
+
+def loaded_body(case: CaseFile, body: ElasticBody, flexibility: Flexibility) -> LoadedBody:
+    """Body of a contact with its materials; one that is given by its matrices does not yield."""
+    given = case.bodies[body.name].material is None
+    materials = {} if given else case.materials_of(body.name, body.mesh.solids)
+    return LoadedBody(body=body, flexibility=flexibility, materials=materials)
 
 
 def law_loops(
