@@ -256,7 +256,13 @@ def _face(closed: Closed, s: int, mu: float, yields: float, along: Matrix) -> No
 
 @inner
 def _start_afresh(
-    closed: Closed, d: int, mu: Vector, doing: States, along: Matrix, stiffer: Vector
+    closed: Closed,
+    d: int,
+    mu: Vector,
+    doing: States,
+    along: Matrix,
+    stiffer: Vector,
+    fine: bool,
 ) -> None:
     """Compute the inverse for what the points do."""
     m = 0
@@ -270,7 +276,7 @@ def _start_afresh(
                 closed.unknown[m] = d * s + kind
                 m += 1
     closed.counts[1], closed.counts[2] = m, 0
-    invert(closed)
+    invert(closed, fine)
 
 
 @inner
@@ -435,7 +441,7 @@ def _rounds(
         paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
         slow = ratio > _SLOW
         if lost or paid or not _follow(closed, d, mu, doing, along, stiffer, slow):
-            _start_afresh(closed, d, mu, doing, along, stiffer)
+            _start_afresh(closed, d, mu, doing, along, stiffer, fresh > 0)
             fresh += 1
             if fresh > _FRESH:
                 return -rounds
