@@ -78,6 +78,14 @@ def test_the_shortest_contact_that_carries_counts():
 
     (doubt,) = run("reduced", steps=200, shape=two).doubts
     assert "40 steps" in doubt
+
+
+def test_many_contacts_of_which_none_carries_a_share_count_all():
+    """25 half sines in one impact, of 4 % of its impulse and 80 steps each."""
+    many = run("interface", steps=4000, shape=lambda x: np.maximum(np.sin(50 * np.pi * x), 0.0))
+    assert many.measures.sub_contacts == 25
+    (doubt,) = many.doubts
+    assert "80 steps" in doubt
     assert run("reduced", steps=600, shape=two).doubts == ()
 
 
