@@ -420,8 +420,8 @@ def _rounds(
 ) -> int:
     """Newton's method over the closed points; returns the rounds, negative where they stand still.
 
-    The inverse is computed afresh where the rounds still to come, at the pace of the last one, would
-    cost more, and where the rounds beyond two since the last time have cost as much.
+    The inverse is computed afresh where the rounds still to come would cost more, at the pace of
+    the last one, and where the rounds beyond two since the last time have cost as much.
     """
     d = len(closed.row) // len(closed.points)
     size = d * closed.counts[0]
