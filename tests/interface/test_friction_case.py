@@ -45,6 +45,15 @@ def test_interface_level_and_full_order_rub_alike(both):
     assert abs(ours.energy_residual) < 1e-12
 
 
+@pytest.mark.parametrize("friction", [0.05, 0.3])
+def test_so_they_do_with_less_and_more_of_it(tmp_path, friction):
+    found = impact(case(tmp_path, "[interface, full]", friction=friction), certify=False).levels
+    ours, full = found["interface"].measures, found["full"].measures
+    assert ours.peak_force == pytest.approx(full.peak_force, rel=0.005)
+    assert ours.contact_time == pytest.approx(full.contact_time, rel=0.01)
+    assert ours.restitution == pytest.approx(full.restitution, abs=0.002)
+
+
 def test_the_record_tells_what_the_impact_would_be_without(both, tmp_path):
     smooth = impact(case(tmp_path)).levels["interface"]
     told = both.levels["interface"].frictionless
