@@ -210,6 +210,13 @@ def test_a_law_without_memory_says_so(study):
     assert any("leaves out contact.friction 0.1" in text for text in study.warnings)
 
 
+def test_a_consistent_law_without_memory_says_why():
+    """Not that the law of the case is the wrong kind."""
+    doubt = friction_doubt(case(0.1), has_memory=False, correction="consistent")
+    assert "faces that lock have no law" in doubt
+    assert "only the consistent" in friction_doubt(case(0.1), has_memory=False)
+
+
 def test_what_slows_with_speed_says_so():
     rough = case(0.1, more=", static_friction: 0.2")
     assert "leaves out static_friction 0.2" in friction_doubt(rough, has_memory=True)
