@@ -273,7 +273,7 @@ def _reduce_at(
     )
 
 
-def friction_doubt(case: Case, *, has_memory: bool) -> str:
+def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") -> str:
     """Doubt about a model of a case that has not all of its friction; else empty.
 
     Parameters
@@ -281,6 +281,8 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
     case : Case
     has_memory : bool
         Its law closes and opens on two curves.
+    correction : str
+        Of its modes.
     """
     faces = case.contact.faces
     if faces.is_none:
@@ -289,10 +291,10 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
         left = (
             f"friction {faces.kinetic:g}" if faces.kinetic else f"static_friction {faces.static:g}"
         )
-        return (
-            f"it leaves out contact.{left}: only the consistent local law has "
-            "friction. Try: level interface."
-        )
+        why = "only the consistent local law has friction"
+        if _rubs(case, correction):
+            why = "faces that lock have no law, nor have loops that it cannot follow"
+        return f"it leaves out contact.{left}: {why}. Try: level interface."
     if not faces.is_constant:
         return (
             f"its law takes contact.friction {faces.kinetic:g} at every speed of slip and leaves "
@@ -301,7 +303,7 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
     return ""
 
 
-def _rubs(case: Case, correction: Correction) -> bool:
+def _rubs(case: Case, correction: str) -> bool:
     law = case.contact.local_law
     is_consistent = isinstance(law, ConsistentLocalLaw) and correction == "consistent"
     return is_consistent and case.contact.faces.kinetic > 0.0

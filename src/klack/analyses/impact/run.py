@@ -535,7 +535,7 @@ _CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none":
 
 def _law_words(pair: ReducedPair) -> str:
     if pair.rubbing is not None:
-        return f"consistent law with friction (losses within {100 * pair.rubbing.error:.2g} %)"
+        return "consistent law with friction"
     if pair.yields:
         return "consistent law with yield"
     if pair.local is not None:
