@@ -9,7 +9,6 @@ from typing import Any
 
 from klack.errors import InputError
 from klack.hydraulics.fluid_definition import (
-    Constant,
     FluidDefinition,
     MeasuredProperties,
     MineralOil,
@@ -17,6 +16,7 @@ from klack.hydraulics.fluid_definition import (
 )
 from klack.hydraulics.liquid import PressureRange
 from klack.input.problem import nearest, one_of
+from klack.sourced import Constant, entry_named
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
 
@@ -309,7 +309,7 @@ FLUIDS: Mapping[str, FluidDefinition] = {
 
 def find_fluid(name: str) -> FluidDefinition | None:
     """Library fluid of this name, or None; case, blanks and hyphens do not matter."""
-    return next((f for key, f in FLUIDS.items() if _plain(key) == _plain(name)), None)
+    return entry_named(name, FLUIDS)
 
 
 def library_fluid(name: str) -> FluidDefinition:
@@ -330,7 +330,3 @@ def library_fluid(name: str) -> FluidDefinition:
             hint=nearest(name, FLUIDS, "describe your own by FluidChoice or FluidDefinition."),
         )
     return found
-
-
-def _plain(name: str) -> str:
-    return "".join(character for character in name.lower() if character.isalnum())
