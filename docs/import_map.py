@@ -27,9 +27,18 @@ imports at first use, so arrows that begin there are not counted."""
 
 FLOORS: tuple[tuple[str, ...], ...] = (
     # ground: errors, units, files that are whole or not there
-    ("errors", "closing", "cores", "sourced", "swapped_names", "progress"),
+    ("errors", "closing", "cores", "swapped_names", "progress"),
     ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance", "hardening"),
-    ("units", "unit_systems", "materials", "signals", "low_pass", "held_folder", "cache"),
+    (
+        "units",
+        "unit_systems",
+        "materials",
+        "sourced",
+        "signals",
+        "low_pass",
+        "held_folder",
+        "cache",
+    ),
     ("folder_lock", "material_library", "stages"),
     ("compiling",),
     ("stage",),

@@ -10,11 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from klack.errors import InputError
 from klack.hardening import Hardening, vickers_of_rockwell, yield_of_hardness
-from klack.input.problem import nearest, one_of
 from klack.materials import Material
-from klack.sourced import Constant, entry_named
+from klack.sourced import Constant, entry_named, require_entry
 
 __all__ = ["MATERIALS", "MaterialEntry", "find_material", "library_material"]
 
@@ -239,12 +237,6 @@ def library_material(name: str) -> MaterialEntry:
     InputError
         For an unknown name.
     """
-    found = find_material(name)
-    if found is None:
-        raise InputError(
-            "library_material: name",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(MATERIALS)}",
-            hint=nearest(name, MATERIALS, "give young, poisson, density, and yield."),
-        )
-    return found
+    return require_entry(
+        "library_material: name", name, MATERIALS, "give young, poisson, density, and yield."
+    )

@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-__all__ = ["Constant", "entry_named"]
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+
+__all__ = ["Constant", "entry_named", "require_entry"]
 
 _Entry = TypeVar("_Entry")
 
@@ -41,6 +44,34 @@ def entry_named(name: str, library: Mapping[str, _Entry]) -> _Entry | None:
     1
     """
     return next((entry for key, entry in library.items() if _plain(key) == _plain(name)), None)
+
+
+def require_entry(where: str, name: str, library: Mapping[str, _Entry], otherwise: str) -> _Entry:
+    """Entry of this name.
+
+    Parameters
+    ----------
+    where : str
+        For the error.
+    name : str
+    library : mapping of str to entry
+    otherwise : str
+        What to try where no entry has a similar name.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, with the nearest one.
+    """
+    found = entry_named(name, library)
+    if found is None:
+        raise InputError(
+            where,
+            got=f"'{name}'",
+            expected=f"one of: {one_of(library)}",
+            hint=nearest(name, library, otherwise),
+        )
+    return found
 
 
 def _plain(name: str) -> str:

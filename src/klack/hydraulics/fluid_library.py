@@ -7,7 +7,6 @@ fluids allow bands, and two barrels of one name differ by more than the digits g
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from klack.errors import InputError
 from klack.hydraulics.fluid_definition import (
     FluidDefinition,
     MeasuredProperties,
@@ -15,8 +14,7 @@ from klack.hydraulics.fluid_definition import (
     TaitOil,
 )
 from klack.hydraulics.liquid import PressureRange
-from klack.input.problem import nearest, one_of
-from klack.sourced import Constant, entry_named
+from klack.sourced import Constant, entry_named, require_entry
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
 
@@ -321,12 +319,6 @@ def library_fluid(name: str) -> FluidDefinition:
     >>> oil.name, oil.verified
     ('ISO VG 46', False)
     """
-    found = find_fluid(name)
-    if found is None:
-        raise InputError(
-            "library_fluid: name",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(FLUIDS)}",
-            hint=nearest(name, FLUIDS, "describe your own by FluidChoice or FluidDefinition."),
-        )
-    return found
+    return require_entry(
+        "library_fluid: name", name, FLUIDS, "describe your own by FluidChoice or FluidDefinition."
+    )
