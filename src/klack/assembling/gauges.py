@@ -69,6 +69,7 @@ def _line(case: Case, output: CaseOutput, mesh: Mesh, pose: Pose | None) -> Line
         direction=direction,
         length=output.length,
         where=f"{case.path or 'case'}: outputs.{output.name}",
+        pose=pose,
     )
 
 

@@ -145,6 +145,11 @@ class CaseWorn(Section):
             )
         return self
 
+    @property
+    def faces(self) -> WornFaces:
+        """The same as arrays."""
+        return WornFaces(radius=np.array(self.radius), opening=np.array(self.opening))
+
 
 class CaseContact(Section):
     """Which surfaces meet, and how."""
@@ -229,9 +234,7 @@ class CaseContact(Section):
     @property
     def worn_faces(self) -> WornFaces | None:
         """Profile of worn faces; None for faces as made."""
-        if self.worn is None:
-            return None
-        return WornFaces(radius=np.array(self.worn.radius), opening=np.array(self.worn.opening))
+        return None if self.worn is None else self.worn.faces
 
     @property
     def faces(self) -> Friction:

@@ -33,6 +33,7 @@ def check_valve(case: ValveSections) -> None:
         _check_stop(case, name, meetings)
     _check_laws(case)
     _check_friction(case)
+    _check_worn(case)
     if case.lumped is None:
         for variant in case.run.variants:
             if variant.endswith("lumped"):
@@ -185,6 +186,20 @@ def _check_friction(case: ValveSections) -> None:
                 got=f"{restitution:g} beside the friction {stop.friction:g} of the same stop",
                 expected="one of them: a restitution stands for all that an impact loses",
                 hint=f"leave the restitution out, or stops.{name}.friction.",
+            )
+
+
+def _check_worn(case: ValveSections) -> None:
+    """Worn faces are those of a computed law."""
+    for name, stop in case.stops.items():
+        if stop.worn is not None and not is_consistent(case.network.components[name]):
+            raise CaseProblem(
+                ("stops", name, "worn"),
+                got="worn faces at an end stop whose law is not computed",
+                expected="the consistent law at this stop: the only one with faces",
+                hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave "
+                "'worn' out.",
+                on_key=True,
             )
 
 
