@@ -192,6 +192,16 @@ MISTAKES = {
         "network.components.spring.type",
         "did you mean 'spring'?",
     ),
+    "unknown shape of a film": (
+        changed("gap: 0 um,", "gap: 0 um, film: {shape: spherical, radius: 1 mm},"),
+        "network.components.seat.film.shape",
+        "did you mean 'sphere'?",
+    ),
+    "film without a shape": (
+        changed("gap: 0 um,", "gap: 0 um, film: {radius: 1 mm},"),
+        "network.components.seat.film",
+        "a mapping with the key 'shape'",
+    ),
     "port on a surface that is not drawn": (
         changed(
             "    material: ferritic\n", "    material: ferritic\n    ports: {a: {surface: b}}\n"
