@@ -114,7 +114,9 @@ def test_two_shifted_attachment_modes_are_exact_at_both_shifts(free, shifts, end
 
     for f in shifts:
         k = 2 * np.pi * np.sqrt(complex(np.sign(f))) * abs(f) * np.sqrt(rho / E)
-        exact = -1 / (E * np.pi * RADIUS**2 * k * (np.tan if ends == (0, 0) else np.sin)(k * LENGTH))
+        exact = -1 / (
+            E * np.pi * RADIUS**2 * k * (np.tan if ends == (0, 0) else np.sin)(k * LENGTH)
+        )
         phi = body.port_shapes
         computed = np.sum(phi[:, ends[0]] * phi[:, ends[1]] / (body.omega**2 - shift_at(f)))
         assert computed == pytest.approx(exact.real, rel=1e-5)
@@ -123,7 +125,7 @@ def test_two_shifted_attachment_modes_are_exact_at_both_shifts(free, shifts, end
 @pytest.mark.parametrize(("count", "shifts"), [(1, (20e3, 190e3)), (3, (-50e3, 30e3, -200e3))])
 def test_every_shift_adds_one_orthonormal_mode_per_port(free, count, shifts):
     """M-orthonormal and K-diagonal to round-off: the recovered shapes of all nodes tell."""
-    body, ports, pool, flexibility = free
+    body, ports, pool, _ = free
     kept = Modes(omega=pool.omega[:count], shapes=pool.shapes[:, :count])
     patterns = np.column_stack([port.pattern for port in ports])
 
@@ -133,7 +135,9 @@ def test_every_shift_adds_one_orthonormal_mode_per_port(free, count, shifts):
     V = np.hstack([body.rigid_modes, kept.shapes, extra.shapes])
     omega = np.concatenate([np.zeros(body.rigid_modes.shape[1]), kept.omega, extra.omega])
     assert_allclose(V.T @ (body.M @ V), np.eye(len(omega)), atol=1e-9)
-    assert_allclose(V.T @ (body.K @ V) / omega.max() ** 2, np.diag(omega / omega.max()) ** 2, atol=1e-9)
+    assert_allclose(
+        V.T @ (body.K @ V) / omega.max() ** 2, np.diag(omega / omega.max()) ** 2, atol=1e-9
+    )
 
 
 def test_two_low_shifts_leave_the_square_of_the_static_error_of_one(free):

@@ -5,8 +5,8 @@ kept modes miss of it must come back in one of two ways, never in both:
 
 - ``"consistent"``: the modes stay alone, and the local contact law takes exactly the missing
   compliance; nothing is counted twice, for any number of modes (default).
-- ``"attachment"``: one attachment mode per port (and shift) joins the basis, and the contact keeps a constant
-  local stiffness; the classical recipe.
+- ``"attachment"``: one attachment mode per port (and shift) joins the basis, and the contact keeps
+  a constant local stiffness; the classical recipe.
 - ``"none"``: nothing comes back; to show what is lost.
 """
 
