@@ -3,7 +3,7 @@ r"""A contact closed over observers instead of its ports, to show what that cost
 The force enters each body by the load vector ``b`` of its contact port, but the gap is that of one
 node (``c`` instead of ``b``), as in state-space models with one node as output.  The force then
 does the work ``F d(b^T u)`` on the body and takes ``F d(c^T u)`` from the spring of the contact;
-nobody supplies the difference,
+the difference comes from nowhere,
 
 .. math:: \Delta E = \sum_\text{bodies} \int F \, \mathrm d(b^T u - c^T u),
 

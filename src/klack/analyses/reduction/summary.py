@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 _THEORY = "theory/reduction"
-_ROUND_OFF = 1e-6  # [%]
 
 
 def _highest(body: ReducedBody) -> float:
@@ -216,21 +215,26 @@ def _impacts_told(study: ReductionStudy) -> TextTable:
     rows = []
     for item in study.impacts:
         for name, found in (("one node", item.nodes), ("port", item.ports)):
-            change = 100.0 * (found.energy - 1.0)
-            change = 0.0 if abs(change) < _ROUND_OFF else change
             rows.append(
                 (
                     f"{item.modes} modes, {name}",
                     f"{found.peak_force:.2f}",
                     f"{found.restitution:.4f}",
-                    f"{change:+.3g}" if change else "0",
+                    _change(100.0 * (found.energy - 1.0)),
                 )
             )
     return TextTable(
         title="Impact of the recipe with its gap read there",
-        columns=("output", "peak force [N]", "restitution", "energy made [%]"),
+        columns=("output", "peak force [N]", "restitution", "energy change [%]"),
         rows=rows,
     )
+
+
+def _change(percent: float) -> str:
+    """With a sign; what is below 0.005 % depends on the step and is not told."""
+    if abs(percent) < 0.005:
+        return "0.00"
+    return f"{percent:+.2f}" if abs(percent) < 1.0 else f"{percent:+.1f}"
 
 
 def reduction_measured(study: ReductionStudy) -> Iterator[Measured]:
