@@ -149,6 +149,16 @@ def quieter_design(folder: Path) -> dict[str, bytes]:
         return {"quieter": svg(figure)}
 
 
+def classical_chain(folder: Path) -> dict[str, bytes]:
+    """Transfer function to one node, force and spectrum; the section is that of the README."""
+    study = IMPACT.load(folder / "impact")
+    return {
+        "chain-node": (folder / "reduce" / "needle.node.svg").read_bytes(),
+        "chain-force": svg_chart(force_chart(study)),
+        "chain-spectrum": svg_chart(spectrum_chart(study)),
+    }
+
+
 def _third_octaves(path: Path) -> np.ndarray:
     """Centre frequencies [Hz] and levels [dB]."""
     rows = json.loads(path.read_text(encoding="utf-8"))["third_octave"]
@@ -196,6 +206,7 @@ PAGES = {
     "system-tool": system_tool,
     "quieter-design": quieter_design,
     "stairs": stairs,
+    "classical-chain": classical_chain,
 }
 
 if __name__ == "__main__":

@@ -167,6 +167,16 @@ MISTAKES = {
         "reduction.correction",
         "linear law",
     ),
+    "shifts of attachment modes with a consistent law": (
+        changed("reduction:\n", "reduction:\n  shifts: {needle: [-20 kHz]}\n"),
+        "reduction.shifts",
+        "correction: attachment",
+    ),
+    "shifts of an unknown body": (
+        changed("reduction:\n", "reduction:\n  shifts: {neddle: [-20 kHz]}\n"),
+        "reduction.shifts.neddle",
+        "did you mean 'needle'?",
+    ),
     "lumped without stiffness": (
         changed("lumped: {stiffness: 1e9 N/m, restitution: 0.5}", ""),
         "run.variants",

@@ -52,6 +52,7 @@ __all__ = [
     "hertz_coefficient",
     "impact_system",
     "own_pair",
+    "recipe_stiffness",
     "reduce_pair",
     "simulate_bodies",
     "starting_gap",
@@ -63,6 +64,7 @@ PORT = "contact"
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
+_USUAL_STIFFNESS = 1e9  # [N/m] that the literature puts beside modes, corrected or not
 _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
 
 
@@ -116,6 +118,12 @@ def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStif
         size=size,
         cache=problem.flexibility_upper.cache,
     )
+
+
+def recipe_stiffness(case: Case) -> float:
+    """Contact stiffness [N/m] of the classical recipe: that of the case, or the usual 1e9 N/m."""
+    law = case.contact.local_law
+    return law.stiffness if isinstance(law, LinearLocalLaw) else _USUAL_STIFFNESS
 
 
 def first_stiffness(problem: ContactProblem) -> float:
@@ -244,6 +252,7 @@ def _reduce_at(
             damping=damping_of(problem.case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            shifts=problem.case.reduction.shifts_of(body.name, correction),
             recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
             observers=[
                 Observer(gauge.name, gauge.row)

@@ -325,6 +325,7 @@ def _peak_force(
             damping=damping_of(case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            shifts=case.reduction.shifts_of(body.name, case.reduction.correction),
         )
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )

@@ -45,6 +45,9 @@ __all__ = [
 ]
 
 
+_MOST_SHIFTS = 8  # more are nearly parallel or near eigenfrequencies
+
+
 class SurfaceName(NamedTuple):
     """A surface of a body, written ``needle.tip``."""
 
@@ -387,9 +390,46 @@ class Reduction(Section):
         default_factory=dict, description="Kept modes of each body; 40 where none is given."
     )
 
+    shifts: Mapping[Name, tuple[Frequency, ...]] = Field(
+        default_factory=dict,
+        description="Of a body: shifted instead of residual attachment modes, one per frequency; "
+        "exact there, below zero at an imaginary frequency.",
+        examples=[{"needle": ["-20 kHz", "150 kHz"]}],
+    )
+
+    @field_validator("shifts", mode="after")
+    @classmethod
+    def _some_shifts(
+        cls, shifts: Mapping[str, tuple[float, ...]]
+    ) -> Mapping[str, tuple[float, ...]]:
+        for body, frequencies in shifts.items():
+            if not 1 <= len(frequencies) <= _MOST_SHIFTS:
+                raise CaseProblem(
+                    (body,),
+                    got=f"{len(frequencies)} shifts",
+                    expected=f"1 to {_MOST_SHIFTS} frequencies",
+                    hint="two are usual for a free body; leave the body out for its residual mode.",
+                )
+            if len(set(frequencies)) < len(frequencies):
+                raise CaseProblem(
+                    (body,),
+                    got="the same shift twice",
+                    expected="different frequencies",
+                    hint="each adds one mode per contact; a second one at its place adds nothing.",
+                )
+        return shifts
+
     def choice(self, body: str) -> ModeChoice:
         """Modes to keep of one body."""
         return self.modes.get(body, ModeChoice(count=40))
+
+    def shifts_of(self, body: str, correction: str) -> tuple[float, ...] | None:
+        """Shifts [(rad/s)^2] of the attachment modes of a body; None for residual ones or none."""
+        if correction != "attachment" or body not in self.shifts:
+            return None
+        from klack.reduction.attachment import shift_at  # loads the solvers: not to read a case
+
+        return tuple(shift_at(frequency) for frequency in self.shifts[body])
 
 
 class CaseFile(Section):

@@ -291,6 +291,12 @@ class TransferSweep(Section):
     points: Count = Field(
         default=200, ge=2, le=5000, description="Number of frequencies, logarithmic."
     )
+    nodes: Mapping[Name, tuple[Length, ...]] = Field(
+        default_factory=dict,
+        description="Of a body: a place in its drawing, [r, z] axisymmetric or [x, y, z] solid. "
+        "klack reduce reads the node next to it, along the axis, beside the contact.",
+        examples=[{"needle": ["0 mm", "0 mm", "-0.6 mm"]}],
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -1,6 +1,6 @@
 """Checks of a case of a whole valve that need more than one section."""
 
-from klack.case.consistency import check_body, check_surface, require_known
+from klack.case.consistency import check_body, check_shifts, check_surface, require_known
 from klack.case.given_consistency import require_surfaces
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
@@ -26,6 +26,15 @@ def check_valve(case: ValveSections) -> None:
             )
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
+    check_shifts(case, case.reduction)
+    if case.reduction.shifts and case.reduction.correction != "attachment":
+        raise CaseProblem(
+            ("reduction", "shifts"),
+            got=f"shifts of attachment modes with the correction '{case.reduction.correction}'",
+            expected="the correction 'attachment'",
+            hint="remove 'shifts', or write 'correction: attachment' and give the end stops a law.",
+            on_key=True,
+        )
     _check_flexible_bodies(case)
     network = case.network.network()
     meetings = find_meetings(network)
